@@ -65,8 +65,9 @@ static State rates(State y, double zone, double M, double t) {
     State rate;
     double k = 1;
     rate.bristle = y.speed - fabs(y.speed) / settled(y.speed) * y.bristle;
-    if (p[ZONE] > 0)
+    if (p[ZONE] > 0) {
         k = p[GAMMA] + (1 - p[GAMMA]) * (0.5 + (y.bristle >= 0 ? zone : -zone) / p[ZONE]);
+    }
     rate.angle = y.speed;
     rate.speed =
         (M - p[M_0] - k * p[SIGMA_0] * y.bristle - p[SIGMA_1] * rate.bristle - viscous(t) * y.speed) / p[INERTIA];
@@ -87,10 +88,12 @@ int main(int count, char **texts) {
         fprintf(stderr, "axis: %d numbers are needed\n", COUNT);
         return 2;
     }
-    for (i = 0; i < COUNT; i++)
+    for (i = 0; i < COUNT; i++) {
         p[i] = strtod(texts[i + 1], NULL);
-    if (fread(&now, sizeof now, 1, stdin) != 1)
+    }
+    if (fread(&now, sizeof now, 1, stdin) != 1) {
         return 2;
+    }
     y.angle = now;
     M = p[M_0]; /* at rest, the weight held and the bristles relaxed */
     integral = M;
@@ -103,8 +106,9 @@ int main(int count, char **texts) {
             ramp = before + (wanted - before) * (j + 1) / TICKS;
             away = ramp - y.speed;
             torque = p[K_P] * away + integral + p[K_P] * tick / p[T_N] * away;
-            if (fabs(torque) < p[LIMIT])
+            if (fabs(torque) < p[LIMIT]) {
                 integral += p[K_P] * tick / p[T_N] * away;
+            }
             torque = bounded(torque, p[LIMIT]);
             for (r = 0; r < ROWS; r++) {
                 const double out[3] = {y.angle, y.speed, M};

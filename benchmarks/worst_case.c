@@ -52,8 +52,9 @@ static void fail(const char *what) {
 
 static void *symbol(void *library, const char *name) {
     void *found = dlsym(library, name);
-    if (found == NULL)
+    if (found == NULL) {
         fail(name);
+    }
     return found;
 }
 #define FIND(variable, name) *(void **)&variable = symbol(library, name)
@@ -77,8 +78,9 @@ static void give_back(void *memory) {
 
 static double number(FILE *file) {
     double value;
-    if (fscanf(file, "%lf", &value) != 1)
+    if (fscanf(file, "%lf", &value) != 1) {
         fail("the script ends early");
+    }
     return value;
 }
 
@@ -100,45 +102,54 @@ static void begin(void *library, const char *path) {
     static const fmi2CallbackFunctions callbacks = {logger, allocate, give_back, NULL, NULL};
     char guid[64], resources[4096];
     FILE *file = fopen(path, "r");
-    if (file == NULL || fscanf(file, "%63s %4095s", guid, resources) != 2)
+    if (file == NULL || fscanf(file, "%63s %4095s", guid, resources) != 2) {
         fail("no script");
+    }
     h = number(file);
     steps = (size_t)number(file);
     unit = instantiate("unit", fmi2CoSimulation, guid, strcmp(resources, "-") ? resources : NULL, &callbacks, 0, 0);
-    if (unit == NULL)
+    if (unit == NULL) {
         fail("fmi2Instantiate");
+    }
     for (size_t i = (size_t)number(file); i > 0; i--) {
         const fmi2ValueReference reference = (fmi2ValueReference)number(file);
         const double value = number(file);
-        if (set(unit, &reference, 1, &value) != fmi2OK)
+        if (set(unit, &reference, 1, &value) != fmi2OK) {
             fail("a parameter");
+        }
     }
     driven = (size_t)number(file);
-    if (driven > MOST)
+    if (driven > MOST) {
         fail("too many inputs");
+    }
     for (size_t i = 0; i < driven; i++) {
         inputs[i] = (fmi2ValueReference)number(file);
         first[i] = 1;
     }
     rows = calloc((steps + 1) * driven + 1, sizeof *rows);
-    if (rows == NULL)
+    if (rows == NULL) {
         fail("memory");
-    for (size_t i = 0; i < (steps + 1) * driven; i++)
+    }
+    for (size_t i = 0; i < (steps + 1) * driven; i++) {
         rows[i] = number(file);
+    }
     fclose(file);
     if (set_up(unit, 0, 0, 0, 0, 0) != fmi2OK || enter(unit) != fmi2OK ||
-        (driven > 0 && set(unit, inputs, driven, rows) != fmi2OK) || leave(unit) != fmi2OK)
+        (driven > 0 && set(unit, inputs, driven, rows) != fmi2OK) || leave(unit) != fmi2OK) {
         fail("initialisation");
+    }
 }
 
 static void drive(size_t k) {
     const double *now = rows + k * driven, *next = now + driven;
     double slopes[MOST];
-    for (size_t i = 0; i < driven; i++)
+    for (size_t i = 0; i < driven; i++) {
         slopes[i] = (next[i] - now[i]) / h;
+    }
     if (driven > 0 &&
-        (set(unit, inputs, driven, now) != fmi2OK || set_slopes(unit, inputs, driven, first, slopes) != fmi2OK))
+        (set(unit, inputs, driven, now) != fmi2OK || set_slopes(unit, inputs, driven, first, slopes) != fmi2OK)) {
         fail("inputs");
+    }
 }
 
 static int step(size_t k) {
@@ -166,60 +177,74 @@ static int ascending(const void *a, const void *b) {
 static unsigned char *read_marks(const char *path) {
     unsigned char *marks = calloc(steps, 1);
     FILE *file = path != NULL ? fopen(path, "r") : NULL;
-    if (marks == NULL || (path != NULL && file == NULL))
+    if (marks == NULL || (path != NULL && file == NULL)) {
         fail("no indices");
+    }
     unsigned long k;
-    while (file != NULL && fscanf(file, "%lu", &k) == 1)
-        if (k < steps)
+    while (file != NULL && fscanf(file, "%lu", &k) == 1) {
+        if (k < steps) {
             marks[k] = 1;
-    if (file != NULL)
+        }
+    }
+    if (file != NULL) {
         fclose(file);
-    else
+    } else {
         memset(marks, 1, steps);
+    }
     return marks;
 }
 
 static volatile unsigned char sink;
 static void fill_caches(unsigned char *memory) {
-    for (size_t i = 0; i < FLUSHED; i += 64)
+    for (size_t i = 0; i < FLUSHED; i += 64) {
         sink = (unsigned char)(sink + memory[i]++);
+    }
 }
 
 static void time_steps(size_t repeats, const unsigned char *marks, unsigned char *flush) {
     fmi2FMUstate start = NULL;
     double *shortest = calloc(steps, sizeof *shortest), clock_cost = 1e9;
     float *all = calloc(steps * repeats, sizeof *all), *setting = calloc(steps, sizeof *setting);
-    if (shortest == NULL || all == NULL || setting == NULL || save(unit, &start) != fmi2OK)
+    if (shortest == NULL || all == NULL || setting == NULL || save(unit, &start) != fmi2OK) {
         fail("memory");
+    }
     for (int i = 0; i < 100000; i++) {
         const double begun = now_ns(), cost = now_ns() - begun;
-        if (cost < clock_cost)
+        if (cost < clock_cost) {
             clock_cost = cost;
+        }
     }
     for (size_t r = 0; r < repeats; r++) {
-        if (restore(unit, start) != fmi2OK)
+        if (restore(unit, start) != fmi2OK) {
             fail("fmi2SetFMUstate");
+        }
         for (size_t k = 0; k < steps; k++) {
             const double set_out = now_ns();
             drive(k);
             const float set_for = (float)(now_ns() - set_out - clock_cost);
-            if (r == 0 || set_for < setting[k])
+            if (r == 0 || set_for < setting[k]) {
                 setting[k] = set_for;
-            if (flush != NULL && marks[k])
+            }
+            if (flush != NULL && marks[k]) {
                 fill_caches(flush);
+            }
             const double begun = now_ns();
             const int good = step(k);
             const double spent = now_ns() - begun - clock_cost;
-            if (!good)
+            if (!good) {
                 fail("fmi2DoStep");
-            if (r == 0 || spent < shortest[k])
+            }
+            if (r == 0 || spent < shortest[k]) {
                 shortest[k] = spent;
+            }
             all[r * steps + k] = (float)spent;
         }
     }
-    for (size_t k = 0; k < steps; k++)
-        if (marks[k])
+    for (size_t k = 0; k < steps; k++) {
+        if (marks[k]) {
             printf("%zu %.0f\n", k, shortest[k]);
+        }
+    }
     const size_t count = steps * repeats;
     qsort(all, count, sizeof *all, ascending);
     qsort(setting, steps, sizeof *setting, ascending);
@@ -230,10 +255,12 @@ static void time_steps(size_t repeats, const unsigned char *marks, unsigned char
 static void run_confined(size_t repeats) {
 #ifdef __linux__
     const long before = asked;
-    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0)
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) {
         fail("seccomp is not to be had");
-    if (repeats == 0)
+    }
+    if (repeats == 0) {
         syscall(SYS_getppid);
+    }
     int good = 1;
     for (size_t k = 0; good && k < steps; k++) {
         drive(k);
@@ -241,8 +268,9 @@ static void run_confined(size_t repeats) {
     }
     char text[64];
     const int length = snprintf(text, sizeof text, "%s %ld\n", good ? "stepped" : "failed", asked - before);
-    if (write(1, text, (size_t)length) != length)
+    if (write(1, text, (size_t)length) != length) {
         good = 0;
+    }
     syscall(SYS_exit, good ? 0 : 1);
 #else
     (void)repeats;
@@ -256,8 +284,9 @@ int main(int count, char *words[]) {
         return 2;
     }
     void *library = dlopen(words[2], RTLD_NOW | RTLD_LOCAL);
-    if (library == NULL)
+    if (library == NULL) {
         fail(dlerror());
+    }
     begin(library, words[3]);
     const size_t repeats = (size_t)atol(words[4]);
     const unsigned char *marks = read_marks(count == 6 ? words[5] : NULL);
@@ -265,8 +294,9 @@ int main(int count, char *words[]) {
         time_steps(repeats, marks, NULL);
     } else if (strcmp(words[1], "cold") == 0) {
         unsigned char *memory = malloc(FLUSHED);
-        if (memory == NULL)
+        if (memory == NULL) {
             fail("memory");
+        }
         memset(memory, 1, FLUSHED);
         time_steps(repeats, marks, memory);
     } else if (strcmp(words[1], "confined") == 0) {
@@ -274,8 +304,9 @@ int main(int count, char *words[]) {
     } else {
         for (size_t k = 0; k < steps; k++) {
             drive(k);
-            if (!(marks[k] ? measured_step(k) : step(k)))
+            if (!(marks[k] ? measured_step(k) : step(k))) {
                 fail("fmi2DoStep");
+            }
         }
     }
     return 0;

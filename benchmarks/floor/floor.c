@@ -34,8 +34,9 @@ void floor_run(void *plant, void *const controllers[], void *const frictions[], 
             table += axes * PLANT_AXIS_ROW + PLANT_TOOL_ROW;
             due += every;
         }
-        if (k == total)
+        if (k == total) {
             break;
+        }
         if (k == sent) {
             setpoint = setpoints + 2 * (k / ratio);
             sent += ratio;

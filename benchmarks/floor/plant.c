@@ -33,8 +33,9 @@ void plant_floor_step(void *unit, PlantMotion *motion, const double *M_a, const 
     modal_advance(modal, plant->axes, u, du, q, q + plant->size, q_end, q_end + plant->size);
     motion->now = q_end;
     motion->next = q;
-    for (size_t i = 0; i < plant->axes; i++)
+    for (size_t i = 0; i < plant->axes; i++) {
         n[i] = modal_sum(modal, i, q_end + plant->size);
+    }
 }
 
 void plant_floor_measure(void *unit, const PlantMotion *motion, const double *n, double *x_a_n_a) {
@@ -48,8 +49,9 @@ void plant_floor_measure(void *unit, const PlantMotion *motion, const double *n,
 
 void plant_floor_record(void *unit, const PlantMotion *motion, const double *x_a_n_a, double *row) {
     const Plant *plant = plant_of(unit);
-    for (size_t i = 0; i < PLANT_AXIS_ROW * plant->axes; i++)
+    for (size_t i = 0; i < PLANT_AXIS_ROW * plant->axes; i++) {
         *row++ = x_a_n_a[i];
+    }
     for (size_t i = 0; i < TOOL_DIRECTIONS; i++) {
         const size_t axis = plant->tool_axis[i];
         const double x = modal_sum(&plant->modal[0], plant->axes + i, motion->now);

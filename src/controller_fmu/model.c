@@ -29,7 +29,7 @@ typedef struct Controller {
     bool warned; /* of orders too fast for the sampling rate */
 } Controller;
 
-/* --- parameters to coefficients ----------------------------------------------------------------------------------- */
+/* --- parameters to coefficients */
 
 static bool derive_cycles(Unit *unit, const Scalars *v, Drive *p) {
     double ratio = v->T_pos / v->T_c;
@@ -256,7 +256,7 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
                      (double)x->instant, (double)x->tick, (double)p.ticks);
 }
 
-/* --- time --------------------------------------------------------------------------------------------------------- */
+/* --- time */
 
 /* What the outputs show that belong to the last instant. */
 static void show_instant(Scalars *v, const DriveState *x) {

@@ -107,8 +107,9 @@ static fmi2Status execute(const Operation *o, int64_t kind, address y, double t)
 }
 
 static fmi2Status work_rest(Operation *o, int64_t k, double t) {
-    if (o->kind != EXCHANGE_due)
+    if (o->kind != EXCHANGE_due) {
         return execute(o, o->kind, o->y, t);
+    }
     return o->next == k ? execute(o, o->what, take_row(o), t) : fmi2OK;
 }
 
@@ -141,16 +142,20 @@ static ALWAYS_INLINE fmi2Status work(Operation **at, int64_t k, double t, const 
         PART(do_step, t)
         PART(get_real, o->y)
         PART(get_slopes, o->y)
-        while (o->kind >= EXCHANGE_copy && o->kind <= EXCHANGE_bond)
+        while (o->kind >= EXCHANGE_copy && o->kind <= EXCHANGE_bond) {
             work_out(o++);
-        if (o->kind < EXCHANGE_get_boolean)
+        }
+        if (o->kind < EXCHANGE_get_boolean) {
             continue;
-        if (o->kind == EXCHANGE_end)
+        }
+        if (o->kind == EXCHANGE_end) {
             break;
+        }
         note(mark, k, o - operations);
         status = work_rest(o, k, t);
-        if (status > fmi2Warning)
+        if (status > fmi2Warning) {
             break;
+        }
         o++;
     }
 #undef PART
@@ -162,15 +167,17 @@ static ALWAYS_INLINE fmi2Status work(Operation **at, int64_t k, double t, const 
  * cycle in which one of them is due. */
 static int64_t count_head(const Operation operations[]) {
     int64_t count = 0;
-    while (operations[count].kind == EXCHANGE_due)
+    while (operations[count].kind == EXCHANGE_due) {
         count++;
+    }
     return count;
 }
 
 static int64_t first_due(const Operation operations[], int64_t count) {
     int64_t first = INT64_MAX;
-    for (int64_t i = 0; i < count; i++)
+    for (int64_t i = 0; i < count; i++) {
         first = operations[i].next < first ? operations[i].next : first;
+    }
     return first;
 }
 
@@ -185,8 +192,9 @@ static ALWAYS_INLINE int run(Operation operations[], double T_c, int64_t begin, 
             *fault = (Fault){k, at - operations};
             return (int)status;
         }
-        if (k >= due)
+        if (k >= due) {
             due = first_due(operations, head);
+        }
     }
     return fmi2OK;
 }

@@ -7,18 +7,21 @@
 #include <stddef.h>
 
 static inline void vector_copy(size_t n, double y[], const double a[]) {
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         y[i] = a[i];
+    }
 }
 
 static inline void vector_line(size_t n, double y[], const double a[], double s, const double b[]) {
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         y[i] = a[i] + s * b[i];
+    }
 }
 
 static inline void vector_rate(size_t n, double y[], const double a[], const double b[], double s) {
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         y[i] = (a[i] - b[i]) / s;
+    }
 }
 
 /* Over a step h: what friction takes from the bond, what the plant has assumed that it would take, and the difference,
@@ -31,8 +34,9 @@ static inline void bond_exchange(size_t n, double h, const double M_fr[], const 
         residual[i] += 0.5 * h * (assumed_torque[i] * n_end[i] - taken);
         dissipated[i] += h * taken;
         const double size = fabs(residual[i]);
-        if (size > residual_peak[i] || isnan(size))
+        if (size > residual_peak[i] || isnan(size)) {
             residual_peak[i] = size;
+        }
     }
 }
 

@@ -29,14 +29,17 @@ void call_tell(Unit *unit, Call call, const char *format, ...) {
 }
 
 bool call_begin(Unit *unit, Call call) {
-    if (unit == NULL)
+    if (unit == NULL) {
         return false;
+    }
     unit->call = call;
     Phase phase = (Phase)unit_header(unit)->phase;
-    if (calls[call].phases & 1u << phase)
+    if (calls[call].phases & 1u << phase) {
         return true;
-    if (calls[call].phases == 0)
+    }
+    if (calls[call].phases == 0) {
         return unit_fail(unit, "not allowed in any state: steps are never asynchronous, so none can be in progress");
+    }
     char allowed[128] = "";
     for (unsigned i = 0; i < PHASE_COUNT; i++) {
         if (calls[call].phases & 1u << i) {

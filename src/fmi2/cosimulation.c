@@ -57,8 +57,9 @@ static const char *const status_kinds[] = {"fmi2DoStepStatus", "fmi2PendingStatu
                                            "fmi2Terminated"};
 
 static bool asks_for(Unit *unit, fmi2StatusKind asked, fmi2StatusKind told, const void *value) {
-    if (asked == told && value != NULL)
+    if (asked == told && value != NULL) {
         return true;
+    }
     unit_warn(unit, "%s cannot be told here (only %s can, and needs a place to put it)",
               (unsigned)asked < sizeof status_kinds / sizeof *status_kinds ? status_kinds[asked]
                                                                            : "an unknown status kind",
@@ -68,16 +69,18 @@ static bool asks_for(Unit *unit, fmi2StatusKind asked, fmi2StatusKind told, cons
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
     BEGIN(GetStatus, "kind = %d", (int)s);
-    if (!asks_for(unit, s, fmi2DoStepStatus, value))
+    if (!asks_for(unit, s, fmi2DoStepStatus, value)) {
         return fmi2Discard;
+    }
     *value = (fmi2Status)unit_header(unit)->last_step;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
     BEGIN(GetRealStatus, "kind = %d", (int)s);
-    if (!asks_for(unit, s, fmi2LastSuccessfulTime, value))
+    if (!asks_for(unit, s, fmi2LastSuccessfulTime, value)) {
         return fmi2Discard;
+    }
     *value = unit_header(unit)->time;
     return fmi2OK;
 }
@@ -91,16 +94,18 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
     BEGIN(GetBooleanStatus, "kind = %d", (int)s);
-    if (!asks_for(unit, s, fmi2Terminated, value))
+    if (!asks_for(unit, s, fmi2Terminated, value)) {
         return fmi2Discard;
+    }
     *value = fmi2False; /* no model ends a simulation by itself */
     return fmi2OK;
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
     BEGIN(GetStringStatus, "kind = %d", (int)s);
-    if (!asks_for(unit, s, fmi2PendingStatus, value))
+    if (!asks_for(unit, s, fmi2PendingStatus, value)) {
         return fmi2Discard;
+    }
     *value = "no step is pending: steps are synchronous";
     return fmi2OK;
 }

@@ -32,22 +32,26 @@ static inline bool first_order(Unit *unit, fmi2ValueReference reference, int ord
 
 bool derivatives_set_inputs(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Integer orders[],
                             const fmi2Real values[]) {
-    if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders))
+    if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders)) {
         return false;
+    }
     for (size_t i = 0; i < count; i++) {
         if (!is(unit, references[i], CAUSALITY_input, "a slope goes with an") ||
-            !first_order(unit, references[i], orders[i], "inputs are linear over a step"))
+            !first_order(unit, references[i], orders[i], "inputs are linear over a step")) {
             return false;
+        }
         if (!isfinite(values[i])) {
             char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
             return unit_fail(unit, "the slope of input '%s' is not finite: %s",
                              values_name(unit, &unit->variables[references[i]], name), number_text(text, values[i]));
         }
     }
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         unit_slopes(unit)[references[i]] = values[i];
-    if (count > 0)
+    }
+    if (count > 0) {
         unit_header(unit)->sloped = 1;
+    }
     unit->tame = false; /* perhaps */
     return true;
 }
@@ -79,37 +83,49 @@ static bool has_coefficients(Unit *unit) {
 
 bool derivatives_get_outputs(Unit *unit, size_t count, const fmi2ValueReference references[],
                              const fmi2Integer orders[], fmi2Real values[]) {
-    if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders))
+    if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         if (!is(unit, references[i], CAUSALITY_output, "derivatives with respect to time are those of an") ||
-            !first_order(unit, references[i], orders[i], "maxOutputDerivativeOrder"))
+            !first_order(unit, references[i], orders[i], "maxOutputDerivativeOrder")) {
             return false;
-    if (!has_coefficients(unit))
+        }
+    }
+    if (!has_coefficients(unit)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         values[i] = MODEL.output_derivative(unit, references[i]);
+    }
     return true;
 }
 
 bool derivatives_get_directional(Unit *unit, size_t unknown_count, const fmi2ValueReference unknowns[],
                                  size_t known_count, const fmi2ValueReference knowns[], const fmi2Real seed[],
                                  fmi2Real sensitivity[]) {
-    if (!values_arrays(unit, unknown_count, unknowns, sensitivity) || !values_arrays(unit, known_count, knowns, seed))
+    if (!values_arrays(unit, unknown_count, unknowns, sensitivity) || !values_arrays(unit, known_count, knowns, seed)) {
         return false;
-    for (size_t i = 0; i < unknown_count; i++)
-        if (!is(unit, unknowns[i], CAUSALITY_output, "an unknown of a directional derivative is an"))
+    }
+    for (size_t i = 0; i < unknown_count; i++) {
+        if (!is(unit, unknowns[i], CAUSALITY_output, "an unknown of a directional derivative is an")) {
             return false;
-    for (size_t k = 0; k < known_count; k++)
-        if (!is(unit, knowns[k], CAUSALITY_input, "a known of a directional derivative is an"))
+        }
+    }
+    for (size_t k = 0; k < known_count; k++) {
+        if (!is(unit, knowns[k], CAUSALITY_input, "a known of a directional derivative is an")) {
             return false;
+        }
+    }
     const bool initial = unit_header(unit)->phase == PHASE_INITIALIZATION;
-    if (initial ? !run_refresh(unit) : !has_coefficients(unit))
+    if (initial ? !run_refresh(unit) : !has_coefficients(unit)) {
         return false;
+    }
     for (size_t i = 0; i < unknown_count; i++) {
         sensitivity[i] = 0;
-        for (size_t k = 0; k < known_count; k++)
+        for (size_t k = 0; k < known_count; k++) {
             sensitivity[i] += MODEL.partial(unit, unknowns[i], knowns[k], initial) * seed[k];
+        }
     }
     return true;
 }

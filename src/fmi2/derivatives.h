@@ -30,8 +30,9 @@ bool derivatives_get_directional(Unit *unit, size_t unknown_count, const fmi2Val
 
 static inline bool derivatives_first_order(size_t count, const fmi2Integer orders[]) {
     int other = 0;
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         other |= orders[i] ^ 1;
+    }
     return other == 0;
 }
 
@@ -39,11 +40,13 @@ static inline bool derivatives_set_usual(Unit *unit, size_t count, const fmi2Val
                                          const fmi2Integer orders[], const fmi2Real values[]) {
     if (!unit_usual(unit) || references == NULL || orders == NULL || values == NULL || count == 0 ||
         count > unit->variable_count || !values_all_tame(unit, count, references, values, REAL_INPUT) ||
-        !derivatives_first_order(count, orders))
+        !derivatives_first_order(count, orders)) {
         return false;
+    }
     double *slopes = unit_slopes(unit);
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         slopes[references[i]] = values[i];
+    }
     unit_header(unit)->sloped = 1;
     return true;
 }
@@ -52,10 +55,12 @@ static inline bool derivatives_get_usual(Unit *unit, size_t count, const fmi2Val
                                          const fmi2Integer orders[], fmi2Real values[]) {
     if (!unit_usual(unit) || references == NULL || orders == NULL || values == NULL || !unit->derived_valid ||
         count > unit->variable_count || !values_all(unit, count, references, REAL_OUTPUT) ||
-        !derivatives_first_order(count, orders))
+        !derivatives_first_order(count, orders)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         values[i] = MODEL.output_derivative(unit, references[i]);
+    }
     return true;
 }
 
@@ -66,13 +71,15 @@ static inline bool derivatives_inputs_finite(Unit *unit, double h) {
 
 static inline void derivatives_clear_inputs(Unit *unit) {
     Header *header = unit_header(unit);
-    if (!header->sloped)
+    if (!header->sloped) {
         return;
+    }
     double *slopes = unit_slopes(unit);
     const unsigned *inputs = unit->inputs;
     const size_t count = unit->input_count;
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         slopes[inputs[i]] = 0;
+    }
     header->sloped = 0;
 }
 

@@ -27,8 +27,9 @@ const char *fmi2GetVersion(void) {
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
     BEGIN(SetDebugLogging, "loggingOn = %d, nCategories = %.0f", loggingOn, (double)nCategories);
-    if (!values_arrays(unit, nCategories, categories, categories))
+    if (!values_arrays(unit, nCategories, categories, categories)) {
         return fmi2Error;
+    }
     return log_select(unit, loggingOn != fmi2False, nCategories, categories) ? fmi2OK : fmi2Warning;
 }
 
@@ -44,37 +45,42 @@ static bool accept_guid(Unit *unit, const char *guid) {
     char own[HASH_TEXT_SIZE];
     table_hash(own);
     if (guid == NULL || strlen(guid) != GUID_SIZE - 1 || !hash_digits(guid) || guid[HASH_TEXT_SIZE - 1] != '-' ||
-        !hash_digits(guid + HASH_TEXT_SIZE))
+        !hash_digits(guid + HASH_TEXT_SIZE)) {
         return unit_fail(unit,
                          "the GUID '%s' has not the form <16 hexadecimal digits>-<16 hexadecimal digits>; this binary "
                          "has '%s-...'",
                          guid != NULL ? guid : "(NULL)", own);
-    if (strncmp(guid, own, HASH_TEXT_SIZE - 1) != 0)
+    }
+    if (strncmp(guid, own, HASH_TEXT_SIZE - 1) != 0) {
         return unit_fail(unit,
                          "the GUID '%s' does not belong to this binary, whose table of variables is '%s-...': "
                          "modelDescription.xml and binary are of different builds",
                          guid, own);
+    }
     char nothing[HASH_TEXT_SIZE];
-    if (!MODEL.has_resources && strcmp(guid + HASH_TEXT_SIZE, hash_text(nothing, HASH_OF_NOTHING)) != 0)
+    if (!MODEL.has_resources && strcmp(guid + HASH_TEXT_SIZE, hash_text(nothing, HASH_OF_NOTHING)) != 0) {
         return unit_fail(unit,
                          "the GUID '%s' speaks of resources, but the unit '%s' has none: its GUID is '%s-%s'; "
                          "modelDescription.xml and binary do not belong together",
                          guid, MODEL.identifier, own, nothing);
+    }
     memcpy(unit->guid, guid, GUID_SIZE);
     return true;
 }
 
 static bool accept_location(Unit *unit, const char *location) {
-    if (location == NULL || *location == '\0')
+    if (location == NULL || *location == '\0') {
         return true;
+    }
 #ifdef _WIN32
     const bool drive_letters = true;
 #else
     const bool drive_letters = false;
 #endif
     unit->resources = unit_alloc(unit, strlen(location) + 1, 1);
-    if (unit->resources == NULL)
+    if (unit->resources == NULL) {
         return false;
+    }
     if (!location_path(location, drive_letters, unit->resources)) {
         unit_free(unit, unit->resources);
         unit->resources = NULL;
@@ -86,17 +92,22 @@ static bool accept_location(Unit *unit, const char *location) {
 }
 
 static bool prepare(Unit *unit, fmi2String instanceName, fmi2Type fmuType, fmi2String guid, fmi2String location) {
-    if (instanceName == NULL || *instanceName == '\0')
+    if (instanceName == NULL || *instanceName == '\0') {
         return unit_fail(unit, "the instance name is %s", instanceName == NULL ? "NULL" : "empty");
-    if (fmuType != fmi2CoSimulation)
+    }
+    if (fmuType != fmi2CoSimulation) {
         return unit_fail(unit, "the unit '%s' is for co-simulation only (type %d was asked for)", MODEL.identifier,
                          (int)fmuType);
-    if (!accept_guid(unit, guid) || !accept_location(unit, location))
+    }
+    if (!accept_guid(unit, guid) || !accept_location(unit, location)) {
         return false;
-    if (MODEL.load != NULL && !MODEL.load(unit))
+    }
+    if (MODEL.load != NULL && !MODEL.load(unit)) {
         return false;
-    if (!unit_keep_start(unit))
+    }
+    if (!unit_keep_start(unit)) {
         return false;
+    }
     run_reset(unit);
     return true;
 }
@@ -106,8 +117,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2Boolean visible, fmi2Boolean loggingOn) {
     (void)visible;
     Unit *unit = unit_create(functions, instanceName != NULL ? instanceName : "");
-    if (unit == NULL)
+    if (unit == NULL) {
         return NULL;
+    }
     log_select(unit, loggingOn != fmi2False, 0, NULL);
     if (!prepare(unit, instanceName, fmuType, fmuGUID, fmuResourceLocation)) {
         unit_destroy(unit);
@@ -120,8 +132,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 
 void fmi2FreeInstance(fmi2Component c) {
     Unit *unit = c;
-    if (unit == NULL)
+    if (unit == NULL) {
         return;
+    }
     call_tell(unit, CALL_FreeInstance, "called");
     unit_destroy(unit);
 }
@@ -133,11 +146,13 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     char text[2][NUMBER_TEXT_SIZE];
     BEGIN(SetupExperiment, "startTime = %s, stopTimeDefined = %d, stopTime = %s", number_text(text[0], startTime),
           stopTimeDefined, number_text(text[1], stopTime));
-    if (!isfinite(startTime))
+    if (!isfinite(startTime)) {
         return STATUS(unit_fail(unit, "the start time is not finite: %s", number_text(text[0], startTime)));
-    if (stopTimeDefined && !(stopTime >= startTime))
+    }
+    if (stopTimeDefined && !(stopTime >= startTime)) {
         return STATUS(unit_fail(unit, "the stop time of %s s is not after the start time of %s s",
                                 number_text(text[0], stopTime), number_text(text[1], startTime)));
+    }
     Header *header = unit_header(unit);
     header->start_time = header->time = startTime;
     header->stop_time = stopTimeDefined ? stopTime : INFINITY;
@@ -152,8 +167,9 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     BEGIN(ExitInitializationMode, "called");
-    if (!run_refresh(unit))
+    if (!run_refresh(unit)) {
         return fmi2Error;
+    }
     unit_header(unit)->phase = PHASE_STEPPING;
     char text[NUMBER_TEXT_SIZE];
     log_write(unit, LOG_EVENTS, "initialised, start time %s s", number_text(text, unit_header(unit)->start_time));
@@ -229,8 +245,9 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     BEGIN(GetFMUstate, "called");
-    if (!given(unit, FMUstate, "the pointer to the state"))
+    if (!given(unit, FMUstate, "the pointer to the state")) {
         return fmi2Error;
+    }
     Snapshot *snapshot = *FMUstate;
     bool good = state_save(unit, &snapshot);
     *FMUstate = snapshot;
@@ -244,10 +261,12 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     BEGIN(FreeFMUstate, "called");
-    if (FMUstate == NULL || *FMUstate == NULL)
+    if (FMUstate == NULL || *FMUstate == NULL) {
         return fmi2OK;
-    if (!state_known(unit, *FMUstate))
+    }
+    if (!state_known(unit, *FMUstate)) {
         return fmi2Error;
+    }
     unit_free(unit, *FMUstate);
     *FMUstate = NULL;
     return fmi2OK;
@@ -256,8 +275,9 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
     BEGIN(SerializedFMUstateSize, "called");
     if (!given(unit, FMUstate, "the state") || !given(unit, size, "the pointer to the size") ||
-        !state_known(unit, FMUstate))
+        !state_known(unit, FMUstate)) {
         return fmi2Error;
+    }
     *size = (size_t)((const Snapshot *)FMUstate)->size;
     return fmi2OK;
 }
@@ -271,8 +291,9 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
     BEGIN(DeSerializeFMUstate, "size = %.0f", (double)size);
-    if (!given(unit, serializedState, "the array of bytes") || !given(unit, FMUstate, "the pointer to the state"))
+    if (!given(unit, serializedState, "the array of bytes") || !given(unit, FMUstate, "the pointer to the state")) {
         return fmi2Error;
+    }
     Snapshot *snapshot = *FMUstate;
     bool good = state_deserialize(unit, serializedState, size, &snapshot);
     *FMUstate = snapshot;

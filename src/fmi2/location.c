@@ -11,18 +11,22 @@ static bool letter(char c) {
 static size_t scheme_length(const char *location) {
     size_t length = 0;
     while (letter(location[length]) ||
-           (length > 0 && strchr("0123456789+-.", location[length]) != NULL && location[length]))
+           (length > 0 && strchr("0123456789+-.", location[length]) != NULL && location[length])) {
         length++;
+    }
     return location[length] == ':' && length > 1 ? length : 0;
 }
 
 /* Do the first `length` characters of `text` spell `word` (lower case), whatever their case? */
 static bool spells(const char *text, size_t length, const char *word) {
-    if (length != strlen(word))
+    if (length != strlen(word)) {
         return false;
-    for (size_t i = 0; i < length; i++)
-        if ((text[i] | 0x20) != word[i])
+    }
+    for (size_t i = 0; i < length; i++) {
+        if ((text[i] | 0x20) != word[i]) {
             return false;
+        }
+    }
     return true;
 }
 
@@ -51,8 +55,9 @@ static bool drive(const char *text) {
 
 static void drop_closing_separators(char *path, bool drive_letters) {
     size_t length = strlen(path), keep = drive_letters && drive(path) ? 3 : 1;
-    while (length > keep && (path[length - 1] == '/' || (drive_letters && path[length - 1] == '\\')))
+    while (length > keep && (path[length - 1] == '/' || (drive_letters && path[length - 1] == '\\'))) {
         path[--length] = '\0';
+    }
 }
 
 bool location_path(const char *location, bool drive_letters, char *path) {
@@ -67,13 +72,15 @@ bool location_path(const char *location, bool drive_letters, char *path) {
             /* file://host/path: no host and localhost are this machine, any other is a network share //host/path */
             const char *host = rest + 2, *behind = strchr(host, '/');
             size_t length = behind != NULL ? (size_t)(behind - host) : strlen(host);
-            if (length == 0 || spells(host, length, "localhost"))
+            if (length == 0 || spells(host, length, "localhost")) {
                 rest = host + length;
-            else if (drive_letters && drive(host)) /* file://C:/path, one slash short */
+            } else if (drive_letters && drive(host)) { /* file://C:/path, one slash short */
                 rest = host;
+            }
         }
-        if (drive_letters && rest[0] == '/' && drive(rest + 1))
+        if (drive_letters && rest[0] == '/' && drive(rest + 1)) {
             rest++;
+        }
         decode(rest, path);
     }
     drop_closing_separators(path, drive_letters);

@@ -23,16 +23,18 @@ enum { CATEGORY_COUNT = sizeof categories / sizeof *categories };
 /* The logger is a printf that also expands references to variables between number signs: both signs are doubled. */
 static void escape(const char *text, char *escaped) {
     for (; *text; text++) {
-        if (*text == '%' || *text == '#')
+        if (*text == '%' || *text == '#') {
             *escaped++ = *text;
+        }
         *escaped++ = *text;
     }
     *escaped = '\0';
 }
 
 void log_write_list(Unit *unit, unsigned category, const char *format, va_list arguments) {
-    if (!(unit->log_categories & category) || unit->callbacks.logger == NULL)
+    if (!(unit->log_categories & category) || unit->callbacks.logger == NULL) {
         return;
+    }
     char text[MESSAGE_SIZE], escaped[2 * MESSAGE_SIZE];
     int used = snprintf(text, sizeof text, "%s", call_name(unit->call));
     if (unit->call == CALL_DoStep) {
@@ -84,8 +86,9 @@ bool log_select(Unit *unit, bool on, size_t count, const fmi2String names[]) {
     bool known = true;
     for (size_t i = 0; i < count; i++) {
         int k = 0;
-        while (k < CATEGORY_COUNT && (names[i] == NULL || strcmp(names[i], categories[k].name) != 0))
+        while (k < CATEGORY_COUNT && (names[i] == NULL || strcmp(names[i], categories[k].name) != 0)) {
             k++;
+        }
         if (k < CATEGORY_COUNT) {
             chosen |= categories[k].categories;
         } else {

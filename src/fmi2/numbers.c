@@ -12,8 +12,9 @@ static bool digit(char c) {
 }
 
 static const char *digits(const char *text) {
-    while (digit(*text))
+    while (digit(*text)) {
         text++;
+    }
     return text;
 }
 
@@ -35,13 +36,15 @@ bool number_parse(const char *text, const char **end, double *value) {
     const char *point = digits(whole);
     const char *fraction = point + (*point == '.');
     const char *behind = digits(fraction);
-    if (behind - whole == fraction - point) /* no digit on either side of the point */
+    if (behind - whole == fraction - point) { /* no digit on either side of the point */
         return false;
+    }
     const char *last = behind;
     if (*last == 'e' || *last == 'E') {
         const char *power = last + 1 + (last[1] == '+' || last[1] == '-');
-        if (digit(*power))
+        if (digit(*power)) {
             last = digits(power);
+        }
     }
 
     /* strtod is exact, but expects the separator of the current locale. Whole numbers get one too: 12 is 12., 1e5 is
@@ -50,19 +53,22 @@ bool number_parse(const char *text, const char **end, double *value) {
     const size_t width = separator_of_locale(separator);
     size_t head = (size_t)(point - text), tail = (size_t)(last - fraction);
     char copy[LONGEST];
-    if (width == 0 || head + width + tail >= sizeof copy)
+    if (width == 0 || head + width + tail >= sizeof copy) {
         return false;
+    }
     memcpy(copy, text, head);
     memcpy(copy + head, separator, width);
     memcpy(copy + head + width, fraction, tail);
     copy[head + width + tail] = '\0';
 
     double number = strtod(copy, NULL);
-    if (!isfinite(number))
+    if (!isfinite(number)) {
         return false;
+    }
     *value = number;
-    if (end != NULL)
+    if (end != NULL) {
         *end = last;
+    }
     return true;
 }
 
@@ -73,8 +79,9 @@ char *number_text(char *text, double value) {
     }
     for (int digit_count = 15; digit_count <= 17; digit_count++) {
         snprintf(text, NUMBER_TEXT_SIZE, "%.*g", digit_count, value);
-        if (strtod(text, NULL) == value)
+        if (strtod(text, NULL) == value) {
             break;
+        }
     }
     char separator[SEPARATOR_SIZE];
     const size_t width = separator_of_locale(separator);

@@ -20,8 +20,9 @@ static bool parameters_differ(const Unit *unit, const unsigned char *block) {
         const Variable *variable = &unit->variables[i];
         if (variable->info->causality == CAUSALITY_parameter &&
             memcmp(block + variable->offset, unit->derived_for + (variable->offset - SCALARS_AT),
-                   field_size(variable->info->kind)) != 0)
+                   field_size(variable->info->kind)) != 0) {
             return true;
+        }
     }
     return false;
 }
@@ -40,14 +41,17 @@ bool run_derive(Unit *unit, bool may_resize) {
         return true;
     }
     unit->derived_valid = false;
-    if (!MODEL.derive(unit))
+    if (!MODEL.derive(unit)) {
         return false;
+    }
     size_t state_size = MODEL.state_size(unit), old_size = unit->block_size - unit->state_at;
-    if (state_size != old_size && !may_resize)
+    if (state_size != old_size && !may_resize) {
         return unit_fail(unit, "a tunable parameter changed the size of the model's state from %.0f to %.0f bytes",
                          (double)old_size, (double)state_size);
-    if (state_size != old_size && !unit_resize_state(unit, state_size))
+    }
+    if (state_size != old_size && !unit_resize_state(unit, state_size)) {
         return false;
+    }
     memcpy(unit->derived_for, unit->block + SCALARS_AT, unit->slopes_at - SCALARS_AT);
     unit->derived_valid = true;
     unit->parameters_touched = false;
@@ -73,12 +77,14 @@ RARE static bool results_not_finite(Unit *unit) {
     size_t offset = at->offset;
     while (isfinite(result(unit, offset))) {
         offset += sizeof(double);
-        if (offset == at->offset + at->count * sizeof(double))
+        if (offset == at->offset + at->count * sizeof(double)) {
             offset = (++at)->offset;
+        }
     }
     const Variable *variable = unit->variables;
-    while (variable->offset != offset)
+    while (variable->offset != offset) {
         variable++;
+    }
     return not_finite(unit, variable);
 }
 
@@ -95,22 +101,26 @@ static inline bool results_finite(Unit *unit) {
             second += number_probe(y[1]);
             third += number_probe(y[2]);
         }
-        for (; left > 0; left--, y++)
+        for (; left > 0; left--, y++) {
             probe += number_probe(*y);
+        }
     }
     return !isnan((probe + second) + third) || results_not_finite(unit);
 }
 
 static bool late_finite(Unit *unit) {
-    for (unsigned reference = MODEL.late_first; reference < MODEL.late_end; reference++)
-        if (!isfinite(result(unit, unit->variables[reference].offset)))
+    for (unsigned reference = MODEL.late_first; reference < MODEL.late_end; reference++) {
+        if (!isfinite(result(unit, unit->variables[reference].offset))) {
             return not_finite(unit, &unit->variables[reference]);
+        }
+    }
     return true;
 }
 
 bool run_show_late(Unit *unit) {
-    if (!unit->late)
+    if (!unit->late) {
         return true;
+    }
     if (!unit->derived_valid) { /* the coefficients may be anything, of another size of the state even */
         char name[VARIABLE_NAME_SIZE];
         return unit_fail(unit, "output '%s' cannot be computed: the parameters of now were refused",
@@ -122,15 +132,18 @@ bool run_show_late(Unit *unit) {
 }
 
 bool run_refresh(Unit *unit) {
-    if (!unit_header(unit)->stale)
+    if (!unit_header(unit)->stale) {
         return true;
-    if (!run_derive(unit, true))
+    }
+    if (!run_derive(unit, true)) {
         return false;
+    }
     memset(unit_state(unit), 0, unit->block_size - unit->state_at);
     unit->late = false;
     MODEL.start(unit);
-    if (!results_finite(unit) || !late_finite(unit))
+    if (!results_finite(unit) || !late_finite(unit)) {
         return false;
+    }
     unit_header(unit)->stale = 0;
     return true;
 }
@@ -158,13 +171,16 @@ static double tolerance(double t, double h) {
 RARE static bool step_refused(Unit *unit, double t, double h) {
     const Header *header = unit_header(unit);
     char text[3][NUMBER_TEXT_SIZE];
-    if (!isfinite(t))
+    if (!isfinite(t)) {
         return unit_fail(unit, "the communication point is not finite");
-    if (!(isfinite(h) && h > 0))
+    }
+    if (!(isfinite(h) && h > 0)) {
         return unit_fail(unit, "the step size must be finite and greater than 0");
-    if (fabs(t - header->time) > tolerance(header->time, h))
+    }
+    if (fabs(t - header->time) > tolerance(header->time, h)) {
         return unit_fail(unit, "the communication point is %s s, but the unit stands at %s s", number_text(text[0], t),
                          number_text(text[1], header->time));
+    }
     return unit_fail(unit, "the step would end at %s s, past the stop time of %s s", number_text(text[0], t + h),
                      number_text(text[1], header->stop_time));
 }
@@ -187,8 +203,9 @@ RARE static bool step_allowed(Unit *unit, double t, double h) {
  * state brings back. */
 bool run_step(Unit *unit, double t, double h) {
     if ((!step_usual(unit_header(unit), t, h) && !step_allowed(unit, t, h)) || !derivatives_inputs_finite(unit, h) ||
-        ((!unit->derived_valid || unit->parameters_touched) && !run_derive(unit, false)))
+        ((!unit->derived_valid || unit->parameters_touched) && !run_derive(unit, false))) {
         return false;
+    }
     bool good = MODEL.step(unit, t, h) && results_finite(unit);
     Header *header = unit_header(unit);
     derivatives_clear_inputs(unit);

@@ -135,8 +135,9 @@ static inline bool unit_usual(const Unit *unit) {
 
 /* call_begin(), for a function whose states are known where it is compiled. */
 static inline bool call_begin_in(Unit *unit, Call call, unsigned phases) {
-    if (unit == NULL || !(phases & 1u << unit_header(unit)->phase))
+    if (unit == NULL || !(phases & 1u << unit_header(unit)->phase)) {
         return call_begin(unit, call);
+    }
     unit->call = call;
     return true;
 }

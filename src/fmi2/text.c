@@ -7,11 +7,13 @@ static bool follows(char c) {
 }
 
 size_t text_whole(const char *text, size_t size, size_t length) {
-    if (length >= size)
+    if (length >= size) {
         return size;
+    }
     size_t whole = length;
-    while (whole > 0 && length - whole < 4 && follows(text[whole]))
+    while (whole > 0 && length - whole < 4 && follows(text[whole])) {
         whole--;
+    }
     return follows(text[whole]) ? length : whole; /* no beginning within reach: these are no characters at all */
 }
 
@@ -37,8 +39,9 @@ void text_mend(char *text) {
     while (*text != '\0') {
         const int bytes = bytes_of(*text);
         int found = bytes > 0 && !controls(text);
-        while (found > 0 && found < bytes && follows(text[found]) && (found > 1 || may_follow(text[0], text[1])))
+        while (found > 0 && found < bytes && follows(text[found]) && (found > 1 || may_follow(text[0], text[1]))) {
             found++;
+        }
         if (found == bytes && bytes > 0) {
             text += bytes;
         } else if (found > 0 && text[found] == '\0') {

@@ -17,17 +17,20 @@ void *unit_alloc(Unit *unit, size_t count, size_t size) {
     if (size == 0 || count <= SIZE_MAX / size) {
         size_t bytes = count * size > 0 ? count * size : 1;
         memory = unit->callbacks.allocateMemory(bytes, 1);
-        if (memory != NULL)
+        if (memory != NULL) {
             memset(memory, 0, bytes); /* the standard promises zeroes, not every importer keeps it */
+        }
     }
-    if (memory == NULL)
+    if (memory == NULL) {
         unit_fail(unit, "out of memory: %.0f bytes asked for", (double)count * (double)size);
+    }
     return memory;
 }
 
 void unit_free(Unit *unit, void *memory) {
-    if (memory != NULL)
+    if (memory != NULL) {
         unit->callbacks.freeMemory(memory);
+    }
 }
 
 char *unit_copy_text(Unit *unit, const char *text) {
@@ -58,8 +61,9 @@ static bool is_late(unsigned reference) {
 }
 
 static unsigned what_is(const VariableInfo *info, bool late) {
-    if (info->kind != KIND_REAL)
+    if (info->kind != KIND_REAL) {
         return 0;
+    }
     const bool input = info->causality == CAUSALITY_input, bounded = !(isinf(info->min) && isinf(info->max));
     return (late ? 0u : READY_REAL) | (input && !bounded ? FREE_INPUT : 0u) | (input ? REAL_INPUT : 0u) |
            (info->causality == CAUSALITY_output ? REAL_OUTPUT : 0u);
@@ -67,10 +71,11 @@ static unsigned what_is(const VariableInfo *info, bool late) {
 
 static void lay_result(Unit *unit, size_t offset) {
     Stretch *last = unit->result_count > 0 ? &unit->results[unit->result_count - 1] : NULL;
-    if (last != NULL && last->offset + last->count * sizeof(double) == offset)
+    if (last != NULL && last->offset + last->count * sizeof(double) == offset) {
         last->count++;
-    else
+    } else {
         unit->results[unit->result_count++] = (Stretch){offset, 1};
+    }
 }
 
 static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
@@ -79,16 +84,19 @@ static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
     unit->variables[reference] = (Variable){info, offset};
     unit->slots[reference] = (Slot){(uint32_t)offset, what_is(info, is_late(reference))};
     write_start(info, unit->block + offset);
-    if (info->kind == KIND_REAL && info->causality == CAUSALITY_input)
+    if (info->kind == KIND_REAL && info->causality == CAUSALITY_input) {
         unit->inputs[unit->input_count++] = reference;
+    }
     if (info->kind == KIND_REAL && (info->causality == CAUSALITY_output || info->causality == CAUSALITY_local) &&
-        !is_late(reference))
+        !is_late(reference)) {
         lay_result(unit, offset);
+    }
 }
 
 static void lay_rows(Unit *unit, size_t base, const VariableInfo *rows, size_t count) {
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         lay_row(unit, base, &rows[i]);
+    }
 }
 
 static void free_tables(Unit *unit) {
@@ -113,26 +121,31 @@ static bool lay_out(Unit *unit, size_t axes) {
     unit->results = unit_alloc(unit, count, sizeof *unit->results);
     unit->block = unit_alloc(unit, unit->block_size, 1);
     if (unit->slots == NULL || unit->variables == NULL || unit->inputs == NULL || unit->results == NULL ||
-        unit->block == NULL)
+        unit->block == NULL) {
         return false;
-    if (unit->slopes_at > UINT32_MAX)
+    }
+    if (unit->slopes_at > UINT32_MAX) {
         return unit_fail(unit, "%.0f axes are more than this unit can address", (double)axes);
+    }
     lay_rows(unit, SCALARS_AT, table_scalars, SCALAR_ROWS);
-    for (size_t axis = 0; axis < axes; axis++)
+    for (size_t axis = 0; axis < axes; axis++) {
         lay_rows(unit, AXES_AT + axis * sizeof(AxisBlock), table_axis, AXIS_ROWS);
+    }
     return true;
 }
 
 static void free_axis_names(Unit *unit) {
-    for (size_t axis = 0; unit->axis_names != NULL && axis < unit->axes; axis++)
+    for (size_t axis = 0; unit->axis_names != NULL && axis < unit->axes; axis++) {
         unit_free(unit, unit->axis_names[axis]);
+    }
     unit_free(unit, unit->axis_names);
     unit->axis_names = NULL;
 }
 
 bool unit_set_axes(Unit *unit, size_t count, const char *const *names) {
-    if (unit->start != NULL)
+    if (unit->start != NULL) {
         return unit_fail(unit, "axes can be named only while the model is loaded");
+    }
     free_axis_names(unit);
     unit->axes = 0;
     char **copies = unit_alloc(unit, count, sizeof *copies);
@@ -141,9 +154,11 @@ bool unit_set_axes(Unit *unit, size_t count, const char *const *names) {
         return false;
     }
     unit->axis_names = copies;
-    for (size_t axis = 0; axis < count; axis++)
-        if ((copies[axis] = unit_copy_text(unit, names[axis])) == NULL)
+    for (size_t axis = 0; axis < count; axis++) {
+        if ((copies[axis] = unit_copy_text(unit, names[axis])) == NULL) {
             return false;
+        }
+    }
     return true;
 }
 
@@ -151,16 +166,18 @@ bool unit_keep_start(Unit *unit) {
     size_t size = unit->slopes_at - SCALARS_AT;
     unit->start = unit_alloc(unit, size, 1);
     unit->derived_for = unit_alloc(unit, size, 1);
-    if (unit->start == NULL || unit->derived_for == NULL)
+    if (unit->start == NULL || unit->derived_for == NULL) {
         return false;
+    }
     memcpy(unit->start, unit->block + SCALARS_AT, size);
     return true;
 }
 
 bool unit_resize_state(Unit *unit, size_t state_size) {
     unsigned char *block = unit_alloc(unit, unit->state_at + state_size, 1);
-    if (block == NULL)
+    if (block == NULL) {
         return false;
+    }
     memcpy(block, unit->block, unit->state_at);
     unit_free(unit, unit->block);
     unit->block = block;
@@ -170,15 +187,17 @@ bool unit_resize_state(Unit *unit, size_t state_size) {
 
 Unit *unit_create(const fmi2CallbackFunctions *callbacks, const char *name) {
     fmi2CallbackFunctions used = {NULL, NULL, NULL, NULL, NULL};
-    if (callbacks != NULL)
+    if (callbacks != NULL) {
         used = *callbacks;
+    }
     if (used.allocateMemory == NULL || used.freeMemory == NULL) {
         used.allocateMemory = calloc;
         used.freeMemory = free;
     }
     Unit *unit = used.allocateMemory(1, sizeof *unit);
-    if (unit == NULL)
+    if (unit == NULL) {
         return NULL;
+    }
     memset(unit, 0, sizeof *unit);
     unit->callbacks = used;
     unit->call = CALL_Instantiate;
@@ -192,8 +211,9 @@ Unit *unit_create(const fmi2CallbackFunctions *callbacks, const char *name) {
 }
 
 void unit_destroy(Unit *unit) {
-    if (MODEL.release != NULL && unit->derived != NULL)
+    if (MODEL.release != NULL && unit->derived != NULL) {
         MODEL.release(unit);
+    }
     free_axis_names(unit);
     free_tables(unit);
     unit_free(unit, unit->start);

@@ -19,7 +19,7 @@
 
 typedef struct Unit Unit;
 
-/* --- offered by the shell ----------------------------------------------------------------------------------------- */
+/* --- offered by the shell */
 
 /* Pointers into the block hold until unit_set_axes() is called or derive() returns, either of which may move it. */
 Scalars *unit_scalars(Unit *unit);
@@ -91,7 +91,7 @@ void unit_warn(Unit *unit, const char *format, ...)
 void *unit_alloc(Unit *unit, size_t count, size_t size);
 void unit_free(Unit *unit, void *memory);
 
-/* --- offered by the model ----------------------------------------------------------------------------------------- */
+/* --- offered by the model */
 
 typedef struct Model {
     const char *identifier; /* "plant", "controller", "friction", "setpoint" */

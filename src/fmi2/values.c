@@ -9,11 +9,12 @@
 static const char *const kind_names[] = {"Real", "Integer", "Boolean", "String"};
 
 char *values_name(const Unit *unit, const Variable *variable, char *name) {
-    if (variable->offset < AXES_AT)
+    if (variable->offset < AXES_AT) {
         snprintf(name, VARIABLE_NAME_SIZE, "%s", variable->info->name);
-    else
+    } else {
         snprintf(name, VARIABLE_NAME_SIZE, "%s.%s", unit->axis_names[(variable->offset - AXES_AT) / sizeof(AxisBlock)],
                  variable->info->name);
+    }
     return name;
 }
 
@@ -32,8 +33,9 @@ RARE const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Ki
 }
 
 RARE bool values_no_arrays(Unit *unit, size_t count) {
-    if (count > MOST_ELEMENTS)
+    if (count > MOST_ELEMENTS) {
         return unit_fail(unit, "no array has %.0f elements: was a negative number taken for a size?", (double)count);
+    }
     return unit_fail(unit, "an array of %.0f elements is expected, not NULL", (double)count);
 }
 
@@ -47,22 +49,26 @@ static bool late_ready(Unit *unit, size_t count, const fmi2ValueReference refere
  */
 static bool ready(Unit *unit, size_t count, const fmi2ValueReference references[]) {
     const Header *header = unit_header(unit);
-    if (header->phase != PHASE_INITIALIZATION || !header->stale)
+    if (header->phase != PHASE_INITIALIZATION || !header->stale) {
         return late_ready(unit, count, references);
+    }
     for (size_t i = 0; i < count; i++) {
         if (references[i] < unit->variable_count) {
             Causality causality = unit->variables[references[i]].info->causality;
-            if (causality == CAUSALITY_output || causality == CAUSALITY_local)
+            if (causality == CAUSALITY_output || causality == CAUSALITY_local) {
                 return run_refresh(unit);
+            }
         }
     }
     return true;
 }
 
 static inline bool all_found(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[]) {
-    for (size_t i = 0; i < count; i++)
-        if (values_find(unit, references[i], kind) == NULL)
+    for (size_t i = 0; i < count; i++) {
+        if (values_find(unit, references[i], kind) == NULL) {
             return false;
+        }
+    }
     return true;
 }
 
@@ -73,26 +79,32 @@ static inline bool readable(Unit *unit, Kind kind, size_t count, const fmi2Value
 }
 
 bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]) {
-    if (!readable(unit, KIND_REAL, count, references, values))
+    if (!readable(unit, KIND_REAL, count, references, values)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         values[i] = *unit_real(unit, references[i]);
+    }
     return true;
 }
 
 bool values_get_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], int values[]) {
-    if (!readable(unit, kind, count, references, values))
+    if (!readable(unit, kind, count, references, values)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         values[i] = *(const int *)unit_address(unit, &unit->variables[references[i]]);
+    }
     return true;
 }
 
 bool values_get_string(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2String values[]) {
-    if (!readable(unit, KIND_STRING, count, references, values))
+    if (!readable(unit, KIND_STRING, count, references, values)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         values[i] = unit_address(unit, &unit->variables[references[i]]);
+    }
     return true;
 }
 
@@ -101,12 +113,14 @@ bool values_get_string(Unit *unit, size_t count, const fmi2ValueReference refere
 RARE static bool settable_now(Unit *unit, const Variable *variable) {
     const VariableInfo *info = variable->info;
     char name[VARIABLE_NAME_SIZE];
-    if (info->causality != CAUSALITY_parameter)
+    if (info->causality != CAUSALITY_parameter) {
         return unit_fail(unit, "the %s '%s' is calculated and cannot be set", table_causality(info->causality),
                          values_name(unit, variable, name));
-    if (unit_header(unit)->phase == PHASE_STEPPING && info->variability != VARIABILITY_tunable)
+    }
+    if (unit_header(unit)->phase == PHASE_STEPPING && info->variability != VARIABILITY_tunable) {
         return unit_fail(unit, "the fixed parameter '%s' cannot be set once initialisation is complete",
                          values_name(unit, variable, name));
+    }
     return true;
 }
 
@@ -122,15 +136,18 @@ RARE static bool out_of_range(Unit *unit, const Variable *variable, double value
     number_text(text[0], value);
     number_text(text[1], info->min);
     number_text(text[2], info->max);
-    if (!isfinite(value))
+    if (!isfinite(value)) {
         return unit_fail(unit, "the value of %s '%s' is not finite: %s", table_causality(info->causality), name,
                          text[0]);
-    if (isinf(info->max))
+    }
+    if (isinf(info->max)) {
         return unit_fail(unit, "the value of %s '%s' is out of range: %s%s%s, allowed is at least %s",
                          table_causality(info->causality), name, text[0], gap, info->unit, text[1]);
-    if (isinf(info->min))
+    }
+    if (isinf(info->min)) {
         return unit_fail(unit, "the value of %s '%s' is out of range: %s%s%s, allowed is at most %s",
                          table_causality(info->causality), name, text[0], gap, info->unit, text[2]);
+    }
     return unit_fail(unit, "the value of %s '%s' is out of range: %s%s%s, allowed is %s to %s",
                      table_causality(info->causality), name, text[0], gap, info->unit, text[1], text[2]);
 }
@@ -142,19 +159,23 @@ static inline bool in_range(Unit *unit, const Variable *variable, double value) 
 
 /* What follows from variables having been set. */
 static inline void note_set(Unit *unit, const Variable *variable) {
-    if (variable->info->causality == CAUSALITY_parameter)
+    if (variable->info->causality == CAUSALITY_parameter) {
         unit->parameters_touched = true;
-    if (unit_header(unit)->phase != PHASE_STEPPING)
+    }
+    if (unit_header(unit)->phase != PHASE_STEPPING) {
         unit_header(unit)->stale = 1;
+    }
 }
 
 bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]) {
-    if (!values_arrays(unit, count, references, values))
+    if (!values_arrays(unit, count, references, values)) {
         return false;
+    }
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = values_find(unit, references[i], KIND_REAL);
-        if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i]))
+        if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i])) {
             return false;
+        }
     }
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = &unit->variables[references[i]];
@@ -166,12 +187,14 @@ bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference referenc
 }
 
 bool values_set_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], const int values[]) {
-    if (!values_arrays(unit, count, references, values))
+    if (!values_arrays(unit, count, references, values)) {
         return false;
+    }
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = values_find(unit, references[i], kind);
-        if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i]))
+        if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i])) {
             return false;
+        }
     }
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = &unit->variables[references[i]];
@@ -183,22 +206,26 @@ bool values_set_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueRefere
 
 static bool fits(Unit *unit, const Variable *variable, const char *text) {
     char name[VARIABLE_NAME_SIZE];
-    if (text == NULL)
+    if (text == NULL) {
         return unit_fail(unit, "the value of '%s' is NULL", values_name(unit, variable, name));
+    }
     size_t length = strlen(text);
-    if (length >= STRING_SIZE)
+    if (length >= STRING_SIZE) {
         return unit_fail(unit, "the value of '%s' is too long: %.0f bytes, allowed are at most %d",
                          values_name(unit, variable, name), (double)length, STRING_SIZE - 1);
+    }
     return true;
 }
 
 bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2String values[]) {
-    if (!values_arrays(unit, count, references, values))
+    if (!values_arrays(unit, count, references, values)) {
         return false;
+    }
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = values_find(unit, references[i], KIND_STRING);
-        if (variable == NULL || !settable(unit, variable) || !fits(unit, variable, values[i]))
+        if (variable == NULL || !settable(unit, variable) || !fits(unit, variable, values[i])) {
             return false;
+        }
     }
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = &unit->variables[references[i]];
@@ -214,40 +241,49 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
 /* --- start values from the model's own files */
 
 static const Variable *named(const Unit *unit, const char *name) {
-    for (size_t i = 0; i < SCALAR_ROWS; i++)
-        if (strcmp(unit->variables[i].info->name, name) == 0)
+    for (size_t i = 0; i < SCALAR_ROWS; i++) {
+        if (strcmp(unit->variables[i].info->name, name) == 0) {
             return &unit->variables[i];
+        }
+    }
     for (size_t axis = 0; axis < unit->axes; axis++) {
         const size_t length = strlen(unit->axis_names[axis]);
-        if (strncmp(name, unit->axis_names[axis], length) != 0 || name[length] != '.')
+        if (strncmp(name, unit->axis_names[axis], length) != 0 || name[length] != '.') {
             continue;
+        }
         const Variable *rows = unit->variables + SCALAR_ROWS + axis * (size_t)AXIS_ROWS;
-        for (const Variable *end = rows + AXIS_ROWS; rows < end; rows++)
-            if (strcmp(rows->info->name, name + length + 1) == 0)
+        for (const Variable *end = rows + AXIS_ROWS; rows < end; rows++) {
+            if (strcmp(rows->info->name, name + length + 1) == 0) {
                 return rows;
+            }
+        }
     }
     return NULL;
 }
 
 bool unit_set_start(Unit *unit, const char *name, const char *value) {
     const Variable *variable = named(unit, name);
-    if (variable == NULL || variable->info->causality != CAUSALITY_parameter || variable->info->kind == KIND_STRING)
+    if (variable == NULL || variable->info->causality != CAUSALITY_parameter || variable->info->kind == KIND_STRING) {
         return unit_fail(unit, "'%s' is no parameter of this unit that a number can be the value of", name);
+    }
     const Kind kind = variable->info->kind;
     double number = 0;
     const char *end = value;
     if (!number_parse(value, &end, &number) || *end != '\0' || (kind == KIND_BOOLEAN && number != 0 && number != 1) ||
-        (kind == KIND_INTEGER && number != floor(number)))
+        (kind == KIND_INTEGER && number != floor(number))) {
         return unit_fail(unit, "the value of parameter '%s' is '%s', which is no %s", name, value,
                          kind == KIND_REAL      ? "number with a decimal point"
                          : kind == KIND_INTEGER ? "whole number"
                                                 : "0 or 1");
-    if (!in_range(unit, variable, number))
+    }
+    if (!in_range(unit, variable, number)) {
         return false;
-    if (kind == KIND_REAL)
+    }
+    if (kind == KIND_REAL) {
         *(double *)unit_address(unit, variable) = number;
-    else
+    } else {
         *(int *)unit_address(unit, variable) = (int)number;
+    }
     return true;
 }
 
@@ -255,8 +291,9 @@ bool unit_set_start(Unit *unit, const char *name, const char *value) {
 
 static bool real_sound(Unit *unit, const Variable *variable, double value, bool results) {
     const Causality causality = variable->info->causality;
-    if (causality == CAUSALITY_parameter || causality == CAUSALITY_input)
+    if (causality == CAUSALITY_parameter || causality == CAUSALITY_input) {
         return in_range(unit, variable, value);
+    }
     return !results || isfinite(value) || out_of_range(unit, variable, value);
 }
 
@@ -285,8 +322,10 @@ static bool sound(Unit *unit, const Variable *variable, const unsigned char *at,
 }
 
 bool values_sound(Unit *unit, const unsigned char *block, bool results) {
-    for (size_t i = 0; i < unit->variable_count; i++)
-        if (!sound(unit, &unit->variables[i], block + unit->variables[i].offset, results))
+    for (size_t i = 0; i < unit->variable_count; i++) {
+        if (!sound(unit, &unit->variables[i], block + unit->variables[i].offset, results)) {
             return false;
+        }
+    }
     return true;
 }

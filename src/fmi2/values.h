@@ -51,8 +51,9 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
 bool values_sound(Unit *unit, const unsigned char *block, bool results);
 
 static inline const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind) {
-    if (reference < unit->variable_count && unit->variables[reference].info->kind == kind)
+    if (reference < unit->variable_count && unit->variables[reference].info->kind == kind) {
         return &unit->variables[reference];
+    }
     return values_missing(unit, reference, kind);
 }
 
@@ -66,8 +67,9 @@ static inline bool values_all(const Unit *unit, size_t count, const fmi2ValueRef
     const size_t known = unit->variable_count;
     unsigned all = is;
     for (size_t i = 0; i < count; i++) {
-        if (references[i] >= known)
+        if (references[i] >= known) {
             return false;
+        }
         all &= slots[references[i]].is;
     }
     return all == is;
@@ -80,8 +82,9 @@ static inline bool values_all_tame(const Unit *unit, size_t count, const fmi2Val
     unsigned all = is;
     double probe = 0;
     for (size_t i = 0; i < count; i++) {
-        if (references[i] >= known)
+        if (references[i] >= known) {
             return false;
+        }
         all &= slots[references[i]].is;
         probe += number_probe_tame(values[i]);
     }
@@ -91,20 +94,24 @@ static inline bool values_all_tame(const Unit *unit, size_t count, const fmi2Val
 static inline bool values_get_usual(const Unit *unit, size_t count, const fmi2ValueReference references[],
                                     fmi2Real values[]) {
     if (!unit_usual(unit) || references == NULL || values == NULL || count > unit->variable_count ||
-        !values_all(unit, count, references, READY_REAL))
+        !values_all(unit, count, references, READY_REAL)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         values[i] = *unit_real(unit, references[i]);
+    }
     return true;
 }
 
 static inline bool values_set_usual(Unit *unit, size_t count, const fmi2ValueReference references[],
                                     const fmi2Real values[]) {
     if (!unit_usual(unit) || references == NULL || values == NULL || count > unit->variable_count ||
-        !values_all_tame(unit, count, references, values, FREE_INPUT))
+        !values_all_tame(unit, count, references, values, FREE_INPUT)) {
         return false;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         *unit_real(unit, references[i]) = values[i];
+    }
     return true;
 }
 

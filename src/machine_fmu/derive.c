@@ -26,8 +26,7 @@ const Scheme machine_schemes[SCHEMES] = {
     {.name = "parallel", .speed = SPEED_AT_START, .passes = 1},
 };
 
-/* --- where the parts find theirs -----------------------------------------------------------------------------------
- */
+/* --- where the parts find theirs */
 
 static size_t contact_place(size_t axis) {
     return 1 + axis;
@@ -68,8 +67,7 @@ void machine_bind(Unit *unit, bool with_states) {
     }
 }
 
-/* --- parameters ----------------------------------------------------------------------------------------------------
- */
+/* --- parameters */
 
 static bool one_cycle(Unit *unit, const Machine *machine) {
     const double T_c = unit_axis(unit, 0)->drive_T_c;
@@ -151,8 +149,7 @@ bool machine_derive(Unit *unit) {
     return keep_room(unit, machine);
 }
 
-/* --- saved states --------------------------------------------------------------------------------------------------
- */
+/* --- saved states */
 
 static bool parts_accept(Machine *machine, const Scalars *scalars, const unsigned char *state) {
     const size_t *places = machine->places;

@@ -18,8 +18,7 @@ typedef struct Exchange {
     double *forces; /* as the importer has set them */
 } Exchange;
 
-/* --- inputs from outside -------------------------------------------------------------------------------------------
- */
+/* --- inputs from outside */
 
 /* An input of the plant that is the importer's, a force: its row in the part, and where it lies in the machine. */
 typedef struct Force {
@@ -132,8 +131,7 @@ static void tell_drive(Unit *unit, size_t i, double t, double t_k) {
     }
 }
 
-/* --- drives --------------------------------------------------------------------------------------------------------
- */
+/* --- drives */
 
 static bool step_drives(const Exchange *x, double t, double t_k) {
     const double T_c = x->machine->T_c;
@@ -162,8 +160,7 @@ static bool step_drives(const Exchange *x, double t, double t_k) {
     return true;
 }
 
-/* --- plant and friction --------------------------------------------------------------------------------------------
- */
+/* --- plant and friction */
 
 static bool step_plant(const Exchange *x) {
     Machine *machine = x->machine;
@@ -211,8 +208,7 @@ static bool step_friction(const Exchange *x) {
     return true;
 }
 
-/* --- steps that are taken again ------------------------------------------------------------------------------------
- */
+/* --- steps that are taken again */
 
 /* Copy what plant and friction are made of between the block and `kept`. */
 static void keep(const Exchange *x, bool back) {
@@ -268,9 +264,6 @@ static bool exchange_step(const Exchange *x) {
     }
     return true;
 }
-
-/* -------------------------------------------------------------------------------------------------------------------
- */
 
 static Exchange exchange_of(Unit *unit, Machine *machine) {
     double *v = machine->vectors;

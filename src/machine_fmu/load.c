@@ -17,8 +17,7 @@
 #define FILE_NAME "settings.csv"
 #define CELL_SIZE 512
 
-/* --- what the parts ask for ----------------------------------------------------------------------------------------
- */
+/* --- what the parts ask for */
 
 static void *part_alloc(void *host, size_t count, size_t size) {
     return unit_alloc(host, count, size);
@@ -95,8 +94,7 @@ static Part part_of(Unit *unit, const char *label, const char *resource_hash) {
                   .resource_hash = resource_hash};
 }
 
-/* --- settings ------------------------------------------------------------------------------------------------------
- */
+/* --- settings */
 
 typedef struct Settings {
     const char *source; /* what messages call the file */
@@ -185,8 +183,7 @@ static bool settings_take(Unit *unit, Machine *machine, const Settings *settings
     return true;
 }
 
-/* --- parts ---------------------------------------------------------------------------------------------------------
- */
+/* --- parts */
 
 static bool load_axes(Unit *unit, Machine *machine) {
     const size_t axes = machine->axes;

@@ -59,8 +59,7 @@ static void machine_start(Unit *unit) {
     }
 }
 
-/* --- outputs between two cycles ------------------------------------------------------------------------------------
- */
+/* --- outputs between two cycles */
 
 static unsigned plant_vr(size_t axis, unsigned row) {
     return (unsigned)(plant_part.scalar_rows + axis * plant_part.axis_rows) + row - PLANT_AXIS_FIRST;
@@ -160,8 +159,7 @@ static void machine_show_late(Unit *unit) {
     }
 }
 
-/* --- steps ---------------------------------------------------------------------------------------------------------
- */
+/* --- steps */
 
 enum { FAR_TEXT_SIZE = 256 };
 
@@ -325,8 +323,7 @@ static bool machine_step(Unit *unit, double t, double h) {
     return true;
 }
 
-/* --- derivatives ---------------------------------------------------------------------------------------------------
- */
+/* --- derivatives */
 
 static double machine_output_derivative(Unit *unit, unsigned vr) {
     Machine *machine = unit_derived(unit);

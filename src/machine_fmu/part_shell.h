@@ -17,8 +17,7 @@ struct Unit {
     Part part;
 };
 
-/* --- what the model asks of the shell ------------------------------------------------------------------------------
- */
+/* --- what the model asks of the shell */
 
 Scalars *unit_scalars(Unit *unit) {
     return (Scalars *)(void *)unit->part.scalars;
@@ -111,8 +110,7 @@ void unit_free(Unit *unit, void *memory) {
     }
 }
 
-/* --- the model as the machine sees it ------------------------------------------------------------------------------
- */
+/* --- the model as the machine sees it */
 
 static Unit *part_unit(const Part *part) {
     return (Unit *)(uintptr_t)part; /* its only member */

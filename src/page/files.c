@@ -9,11 +9,13 @@ char *file_read(Unit *unit, const char *directory, const char *name, size_t *siz
     size_t count = 0;
     const char *bytes = directory != NULL ? page_file(name, &count) : NULL;
     char *copy = bytes != NULL ? unit_alloc(unit, count + 1, 1) : NULL;
-    if (copy == NULL)
+    if (copy == NULL) {
         return NULL;
+    }
     memcpy(copy, bytes, count);
     copy[count] = '\0';
-    if (size != NULL)
+    if (size != NULL) {
         *size = count;
+    }
     return copy;
 }

@@ -20,8 +20,7 @@ static struct {
 } files[FILES];
 static fmi2Component unit;
 
-/* --- what the unit asks for ----------------------------------------------------------------------------------------
- */
+/* --- what the unit asks for */
 
 const char *page_file(const char *name, size_t *size) {
     for (size_t i = 0; i < FILES; i++) {
@@ -46,8 +45,7 @@ static void say(fmi2ComponentEnvironment environment, fmi2String instance, fmi2S
 
 static const fmi2CallbackFunctions callbacks = {say, calloc, free, NULL, NULL};
 
-/* --- an instance ---------------------------------------------------------------------------------------------------
- */
+/* --- an instance */
 
 void *EXPORTED(page_alloc)(size_t size) {
     return malloc(size);
@@ -91,8 +89,7 @@ int EXPORTED(page_set_boolean)(fmi2ValueReference variable, int value) {
     return fmi2SetBoolean(unit, &variable, 1, &value);
 }
 
-/* --- a run ---------------------------------------------------------------------------------------------------------
- */
+/* --- a run */
 
 /* Initialisation, with the first row of what is fed. */
 int EXPORTED(page_begin)(double stop, size_t fed, const fmi2ValueReference *feeds, const double *first) {
@@ -111,20 +108,25 @@ int EXPORTED(page_run)(int first, int last, int end, double T_c, int ratio, size
     fmi2Boolean set[FLAGS];
     for (int k = first; flags <= FLAGS && (k < last || (end && k == last)); k++) {
         int status = fmi2OK;
-        if (k % ratio == 0)
+        if (k % ratio == 0) {
             status = fmi2SetReal(unit, feeds, fed, rows + (size_t)(k / ratio) * fed);
+        }
         if (status <= fmi2Warning && k % every == 0) {
             status = fmi2GetReal(unit, real, reals, out);
             out += reals;
-            if (status <= fmi2Warning && flags > 0)
+            if (status <= fmi2Warning && flags > 0) {
                 status = fmi2GetBoolean(unit, flag, flags, set);
-            for (size_t i = 0; i < flags; i++)
+            }
+            for (size_t i = 0; i < flags; i++) {
                 *out++ = set[i];
+            }
         }
-        if (status <= fmi2Warning && k < last)
+        if (status <= fmi2Warning && k < last) {
             status = fmi2DoStep(unit, k * T_c, T_c, fmi2True);
-        if (status > fmi2Warning)
+        }
+        if (status > fmi2Warning) {
             return status;
+        }
     }
     return flags <= FLAGS ? fmi2OK : fmi2Error;
 }

@@ -85,7 +85,7 @@ static void cells_replace(const Crossing *crossing, size_t size, double *values,
     memcpy(values, scratch, size * sizeof *values);
 }
 
-/* --- what the scales read ----------------------------------------------------------------------------------------- */
+/* --- what the scales read */
 
 /* The sum over the elastic modes of x_kA x_kB / omega_k^2 [m/N]. */
 static double cells_compliance(const Modal *modal, const double *x_A, const double *x_B) {
@@ -156,7 +156,7 @@ void cells_hold(const Modal *modal, size_t axes, const double *by, double *q, do
     }
 }
 
-/* --- a step's end ------------------------------------------------------------------------------------------------- */
+/* --- a step's end */
 
 static double cells_scale(const Modal *modal, size_t axes, size_t axis, const double *q) {
     return modal_sum(modal, modal->ports - axes + axis, q);

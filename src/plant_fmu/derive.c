@@ -280,7 +280,7 @@ bool plant_derive(Unit *unit) {
     return good && plant_join_motors(unit, plant);
 }
 
-/* --- saved states ------------------------------------------------------------------------------------------------- */
+/* --- saved states */
 
 /* Hash of the table that plant_derive() would take for this modes_file; false with the reason logged. */
 static bool plant_find_table(Unit *unit, const Plant *plant, const char *path, uint64_t *hash) {

@@ -43,7 +43,7 @@ static double *plant_state(Unit *unit) {
     return plant_state_at(unit, unit_derived(unit), plant_head(unit)->place);
 }
 
-/* --- start and step ----------------------------------------------------------------------------------------------- */
+/* --- start and step */
 
 static double plant_start_position(Unit *unit, const Plant *plant, size_t direction) {
     const size_t axis = plant->tool_axis[direction];
@@ -186,8 +186,7 @@ static void plant_positions(Unit *unit, const Plant *plant, const double *displa
     }
 }
 
-/* --- friction at the guides -----------------------------------------------------------------------------------------
- */
+/* --- friction at the guides */
 
 /* Of each axis, behind the ways of a state. */
 static GuideState *plant_guides(const Plant *plant, double *state) {
@@ -371,8 +370,7 @@ static void plant_show_transmissions(Unit *unit, const Plant *plant, double *sta
     }
 }
 
-/* --- start and step, with all of it ---------------------------------------------------------------------------------
- */
+/* --- start and step, with all of it */
 
 static void plant_start(Unit *unit) {
     Plant *plant = unit_derived(unit);
@@ -555,7 +553,7 @@ static double plant_tool_speed(Unit *unit, const Plant *plant, const Modal *moda
     return plant->errors ? speed + plant_error_speed(unit, plant, modal, direction) : speed;
 }
 
-/* --- derivatives -------------------------------------------------------------------------------------------------- */
+/* --- derivatives */
 
 static double plant_output_derivative(Unit *unit, unsigned vr) {
     const Plant *plant = unit_derived(unit);

@@ -44,7 +44,7 @@ static bool poses_fail(const Reader *reader, const double *where, const char *fo
     return false;
 }
 
-/* --- numbers ------------------------------------------------------------------------------------------------------ */
+/* --- numbers */
 
 size_t poses_capacity(size_t size) {
     return size / NUMBER_SIZE;
@@ -126,7 +126,7 @@ static bool poses_count(const Reader *reader, const char *what, size_t least, si
     return true;
 }
 
-/* --- grid --------------------------------------------------------------------------------------------------------- */
+/* --- grid */
 
 static bool poses_check_centres(const Reader *reader, const GridAxis *grid, size_t g) {
     char text[3][NUMBER_TEXT_SIZE];
@@ -207,7 +207,7 @@ bool poses_read_grid(const char *bytes, size_t size, const char *source, size_t 
     return true;
 }
 
-/* --- cells and transfers ------------------------------------------------------------------------------------------ */
+/* --- cells and transfers */
 
 /* "cell 3 (X 0.1 m, Z 0.325 m)" */
 static const char *poses_place(const Reader *reader, size_t cell, char place[PLACE_SIZE]) {

@@ -19,7 +19,7 @@ enum { SHOWN = 40 }; /* characters of a faulty cell in a message */
 
 static const char *const suffixes[] = {".x_s [m]", ".n_ffw [rad/s]"};
 
-/* --- header ------------------------------------------------------------------------------------------------------- */
+/* --- header */
 
 size_t setpoints_axes_capacity(const char *text, size_t size) {
     Csv csv = csv_open(text, size);
@@ -115,7 +115,7 @@ bool setpoints_read_axes(const char *text, size_t size, const char *source, Setp
     return true;
 }
 
-/* --- rows --------------------------------------------------------------------------------------------------------- */
+/* --- rows */
 
 size_t setpoints_rows_capacity(const char *text, size_t size) {
     return csv_lines(text, size);
@@ -241,7 +241,7 @@ bool setpoints_read_rows(const char *text, size_t size, const char *source, Setp
            setpoints_check_drift(table, source, message, message_size);
 }
 
-/* --- look-up ------------------------------------------------------------------------------------------------------ */
+/* --- look-up */
 
 /* Of two numbers; fmax() and fmin() think of what is none, and are calls. */
 static inline double larger(double a, double b) {

@@ -42,12 +42,14 @@ static size_t some_count(void) {
 
 static fmi2ValueReference some_reference(const Unit *unit, Kind kind) {
     const unsigned choice = byte();
-    if (choice > 250)
+    if (choice > 250) {
         return (fmi2ValueReference)bytes(4);
+    }
     const fmi2ValueReference first = choice % (fmi2ValueReference)(unit->variable_count + 1);
     fmi2ValueReference found = first;
-    while (choice < 200 && found < unit->variable_count && unit->variables[found].info->kind != kind)
+    while (choice < 200 && found < unit->variable_count && unit->variables[found].info->kind != kind) {
         found++;
+    }
     return found;
 }
 
@@ -56,16 +58,18 @@ static bool absent(void) {
 }
 
 static const fmi2ValueReference *some_references(const Unit *unit, Kind kind, size_t count, size_t room) {
-    for (size_t i = 0; i < count && i < MOST; i++)
+    for (size_t i = 0; i < count && i < MOST; i++) {
         LAST(reference_room[room], count)[i] = some_reference(unit, kind);
+    }
     return absent() ? NULL : LAST(reference_room[room], count);
 }
 
 /* Half of them within a factor of the start value: those are mostly allowed. */
 static double some_real(const Unit *unit, fmi2ValueReference reference) {
     const unsigned kind = byte();
-    if (kind < 128 || reference >= unit->variable_count)
+    if (kind < 128 || reference >= unit->variable_count) {
         return number();
+    }
     const VariableInfo *info = unit->variables[reference].info;
     return kind < 132   ? info->min
            : kind < 136 ? info->max
@@ -130,14 +134,18 @@ static Asked some_call(const Pair *pair, Call call) {
         }
         for (size_t i = 0; i < asked.count && i < MOST; i++) {
             LAST(order_room, asked.count)[i] = byte() > 250 ? (int)bytes(4) : 1;
-            if (call == CALL_SetReal || call == CALL_SetRealInputDerivatives)
+            if (call == CALL_SetReal || call == CALL_SetRealInputDerivatives) {
                 LAST(real_room, asked.count)[i] = some_real(unit, LAST(reference_room[0], asked.count)[i]);
-            if (call == CALL_SetInteger || call == CALL_SetBoolean)
+            }
+            if (call == CALL_SetInteger || call == CALL_SetBoolean) {
                 LAST(whole_room, asked.count)[i] = byte() < 200 ? (int)byte() % 8 - 1 : (int)bytes(4);
-            if (call == CALL_SetString)
+            }
+            if (call == CALL_SetString) {
                 LAST(text_room, asked.count)[i] = some_text();
-            if (call == CALL_SetDebugLogging)
+            }
+            if (call == CALL_SetDebugLogging) {
                 LAST(text_room, asked.count)[i] = categories[byte() % (sizeof categories / sizeof *categories)];
+            }
         }
         break;
     case CALL_SetupExperiment:
@@ -174,11 +182,13 @@ static bool settable_in(Phase phase, const VariableInfo *info) {
 /* Whether element i is one that the function takes. */
 static bool fits(const Pair *pair, const Asked *asked, size_t i) {
     const fmi2ValueReference reference = asked->references[i];
-    if (reference >= pair->unit->variable_count)
+    if (reference >= pair->unit->variable_count) {
         return false;
+    }
     const VariableInfo *info = pair->unit->variables[reference].info;
-    if (info->kind != asked->kind)
+    if (info->kind != asked->kind) {
         return false;
+    }
     switch (asked->call) {
     case CALL_SetReal:
         return settable_in(pair->phase, info) && in_range_of(info, asked->reals[i]);
@@ -203,18 +213,24 @@ static Expected expected_of_arrays(const Pair *pair, const Asked *asked) {
     if (asked->count > MOST || asked->known_count > MOST ||
         (asked->count > 0 &&
          (asked->references == NULL || asked->reals == NULL || (ordered && asked->orders == NULL))) ||
-        (asked->known_count > 0 && asked->knowns == NULL))
+        (asked->known_count > 0 && asked->knowns == NULL)) {
         return BAD;
-    for (size_t i = 0; i < asked->count; i++)
-        if (!fits(pair, asked, i))
+    }
+    for (size_t i = 0; i < asked->count; i++) {
+        if (!fits(pair, asked, i)) {
             return BAD;
-    for (size_t i = 0; i < asked->known_count; i++)
+        }
+    }
+    for (size_t i = 0; i < asked->known_count; i++) {
         if (asked->knowns[i] >= pair->unit->variable_count ||
             pair->unit->variables[asked->knowns[i]].info->causality != CAUSALITY_input ||
-            pair->unit->variables[asked->knowns[i]].info->kind != KIND_REAL)
+            pair->unit->variables[asked->knowns[i]].info->kind != KIND_REAL) {
             return BAD;
-    if (asked->call >= CALL_SetReal && asked->call <= CALL_SetString)
+        }
+    }
+    if (asked->call >= CALL_SetReal && asked->call <= CALL_SetString) {
         return GOOD;
+    }
     return asked->call == CALL_SetRealInputDerivatives ? GOOD : EITHER; /* parameters were refused, overflow */
 }
 
@@ -222,8 +238,9 @@ static Expected expected(const Pair *pair, const Asked *asked) {
 #define PHASES_OF(name, phases) PHASES_##name,
     static const unsigned phases[] = {CALLS(PHASES_OF)};
 #undef PHASES_OF
-    if (asked->nobody || !(phases[asked->call] & 1u << pair->phase))
+    if (asked->nobody || !(phases[asked->call] & 1u << pair->phase)) {
         return BAD;
+    }
     switch (asked->call) {
     case CALL_SetDebugLogging:
         return asked->count > MOST || (asked->count > 0 && asked->reals == NULL) ? BAD : GOOD;
@@ -254,8 +271,9 @@ static Expected expected(const Pair *pair, const Asked *asked) {
 
 static void answer_texts(Answer *answer, const Asked *asked) {
     answer->texts = HASH_OF_NOTHING;
-    for (size_t i = 0; i < asked->count && answer->status == fmi2OK; i++)
+    for (size_t i = 0; i < asked->count && answer->status == fmi2OK; i++) {
         answer->texts = hash_bytes(answer->texts, asked->texts[i], strlen(asked->texts[i]) + 1);
+    }
 }
 
 static Answer perform(Unit *unit, const Asked *asked) {
@@ -313,8 +331,9 @@ static Answer perform(Unit *unit, const Asked *asked) {
         break;
     case CALL_GetDirectionalDerivative: {
         double seed[MOST];
-        for (size_t i = 0; i < MOST; i++)
+        for (size_t i = 0; i < MOST; i++) {
             seed[i] = 1 - 0.25 * (double)i;
+        }
         answer.status =
             fmi2GetDirectionalDerivative(c, a->references, a->count, a->knowns, a->known_count, seed, reals);
         break;
@@ -355,8 +374,9 @@ static Answer perform(Unit *unit, const Asked *asked) {
 static const void *variable_named(const Unit *unit, const char *name) {
     for (size_t i = 0; i < unit->variable_count; i++) {
         const char *own = unit->variables[i].info->name, *last = strrchr(own, '.');
-        if (strcmp(own, name) == 0 || (last != NULL && strcmp(last + 1, name) == 0))
+        if (strcmp(own, name) == 0 || (last != NULL && strcmp(last + 1, name) == 0)) {
             return unit->block + unit->variables[i].offset;
+        }
     }
     return NULL;
 }
@@ -366,8 +386,9 @@ static const void *variable_named(const Unit *unit, const char *name) {
 static bool takes_long(const Pair *pair, const Asked *asked) {
     const double *T_c = variable_named(pair->unit, "T_c");
     const int *exchanges = variable_named(pair->unit, "substeps");
-    if (asked->call != CALL_DoStep || pair->phase != PHASE_STEPPING || T_c == NULL)
+    if (asked->call != CALL_DoStep || pair->phase != PHASE_STEPPING || T_c == NULL) {
         return false;
+    }
     int64_t worked;
     memcpy(&worked, unit_state(pair->unit), sizeof worked);
     const double cycles = (asked->t + asked->h - header_of(pair)->start_time) / *T_c - (double)worked;
@@ -377,10 +398,12 @@ static bool takes_long(const Pair *pair, const Asked *asked) {
 /* --- to both, and what must hold then */
 
 static void results_are_finite(const Pair *pair, const Asked *asked, const Answer *answer) {
-    if (asked->call != CALL_GetReal || answer->status != fmi2OK || pair->phase == PHASE_FAILED)
+    if (asked->call != CALL_GetReal || answer->status != fmi2OK || pair->phase == PHASE_FAILED) {
         return;
-    for (size_t i = 0; i < MOST; i++)
+    }
+    for (size_t i = 0; i < MOST; i++) {
         must(isfinite(answer->reals[i]), "what was read is not finite");
+    }
 }
 
 /* What the call has made of the instance. */
@@ -418,8 +441,9 @@ static void follow(Pair *pair, const Asked *asked, const Answer *answer) {
 }
 
 static void ask(Pair *pair, const Asked *asked) {
-    if (takes_long(pair, asked))
+    if (takes_long(pair, asked)) {
         return;
+    }
     const Expected hoped = expected(pair, asked);
     const Phase before = pair->phase;
     begin(false);
@@ -431,15 +455,18 @@ static void ask(Pair *pair, const Asked *asked) {
     must(error || answer.status <= fmi2Discard, "no such status");
     must(hoped != BAD || error, "not refused");
     must(hoped != GOOD || !error || short_of_memory, "refused");
-    if (told && asked->call != CALL_SetDebugLogging)
+    if (told && asked->call != CALL_SetDebugLogging) {
         must(error == (errors_told > 0), "an error without a message, or a message without an error");
-    if (!asked->nobody)
+    }
+    if (!asked->nobody) {
         follow(pair, asked, &answer);
+    }
     results_are_finite(pair, asked, &answer);
     const bool nothing_happened =
         error && (hoped == BAD || short_of_memory || (asked->call == CALL_DoStep && pair->phase == before));
-    if (depth > 0 || nothing_happened)
+    if (depth > 0 || nothing_happened) {
         return;
+    }
     begin(true);
     const Answer other = perform(pair->twin, asked);
     must(memcmp(&answer, &other, sizeof answer) == 0, "the twin answers otherwise");

@@ -50,11 +50,13 @@ void __sanitizer_cov_trace_pc(void) {
 static bool reaches_more(void) {
     bool more = false;
     for (size_t i = 0; i < EDGES; i++) {
-        if (counts[i] == 0)
+        if (counts[i] == 0) {
             continue;
+        }
         uint8_t size = 1;
-        while (size < 128 && counts[i] >= 2 * size)
+        while (size < 128 && counts[i] >= 2 * size) {
             size *= 2;
+        }
         reached += seen[i] == 0;
         more = more || (seen[i] & size) == 0;
         seen[i] |= size;
@@ -83,12 +85,14 @@ static void run(const uint8_t *bytes, size_t size) {
 }
 
 static void keep(const uint8_t *bytes, size_t size, bool write) {
-    if (!reaches_more() || kept_count == KEPT)
+    if (!reaches_more() || kept_count == KEPT) {
         return;
+    }
     kept[kept_count] = (Input){malloc(size + 1), size};
     memcpy(kept[kept_count++].bytes, bytes, size);
-    if (!write || folder == NULL)
+    if (!write || folder == NULL) {
         return;
+    }
     char path[PATH_ROOM];
     snprintf(path, sizeof path, "%s/%lu-%06lu", folder, seed, (unsigned long)kept_count);
     FILE *file = fopen(path, "wb");
@@ -111,14 +115,16 @@ static size_t change(void) {
         const Input other = kept_count > 0 ? kept[pick((uint32_t)kept_count)] : (Input){NULL, 0};
         switch (pick(6)) {
         case 0: /* other bytes */
-            for (uint32_t i = place; i < size && i < place + length; i++)
+            for (uint32_t i = place; i < size && i < place + length; i++) {
                 buffer[i] = (uint8_t)pick(256);
+            }
             break;
         case 1: /* more */
             if (size + length <= longest) {
                 memmove(buffer + place + length, buffer + place, size - place);
-                for (uint32_t i = place; i < place + length; i++)
+                for (uint32_t i = place; i < place + length; i++) {
                     buffer[i] = (uint8_t)pick(256);
+                }
                 size += length;
             }
             break;
@@ -129,18 +135,21 @@ static size_t change(void) {
             }
             break;
         case 3: /* a little up or down */
-            if (place < size)
+            if (place < size) {
                 buffer[place] = (uint8_t)(buffer[place] + pick(9) - 4);
+            }
             break;
         case 4: /* what another has there */
-            for (uint32_t i = place; i < size && i < other.size && i < place + 4 * length; i++)
+            for (uint32_t i = place; i < size && i < other.size && i < place + 4 * length; i++) {
                 buffer[i] = other.bytes[i];
+            }
             break;
         default: /* how another goes on */
             if (other.size > 0) {
                 const size_t from = pick((uint32_t)other.size);
-                for (size_t i = from; i < other.size && size < longest; i++)
+                for (size_t i = from; i < other.size && size < longest; i++) {
                     buffer[size++] = other.bytes[i];
+                }
             }
         }
     }
@@ -151,13 +160,15 @@ static size_t change(void) {
 
 static bool run_file(const char *path, bool keeps) {
     FILE *file = fopen(path, "rb");
-    if (file == NULL)
+    if (file == NULL) {
         return false;
+    }
     const size_t size = fread(buffer, 1, sizeof buffer, file);
     fclose(file);
     run(buffer, size);
-    if (keeps)
+    if (keeps) {
         keep(buffer, size, false);
+    }
     return true;
 }
 
@@ -170,11 +181,14 @@ static void run_folder(const char *path) {
     static char *names[KEPT];
     size_t count = 0;
     DIR *directory = opendir(path);
-    for (struct dirent *entry; directory != NULL && count < KEPT && (entry = readdir(directory)) != NULL;)
-        if (entry->d_name[0] != '.')
+    for (struct dirent *entry; directory != NULL && count < KEPT && (entry = readdir(directory)) != NULL;) {
+        if (entry->d_name[0] != '.') {
             names[count++] = strdup(entry->d_name);
-    if (directory != NULL)
+        }
+    }
+    if (directory != NULL) {
         closedir(directory);
+    }
     qsort(names, count, sizeof *names, by_name);
     for (size_t i = 0; i < count; i++) {
         char whole[PATH_ROOM];
@@ -186,8 +200,9 @@ static void run_folder(const char *path) {
 
 static bool option(const char *word, const char *name, unsigned long *value) {
     const size_t length = strlen(name);
-    if (strncmp(word, name, length) != 0)
+    if (strncmp(word, name, length) != 0) {
         return false;
+    }
     *value = strtoul(word + length, NULL, 10);
     return true;
 }
@@ -196,22 +211,25 @@ int main(int count, char **words) {
     char path[PATH_ROOM];
     int first = 1;
     for (; first < count && words[first][0] == '-'; first++) {
-        if (strncmp(words[first], "-artifact_prefix=", 17) == 0)
+        if (strncmp(words[first], "-artifact_prefix=", 17) == 0) {
             prefix = words[first] + 17;
-        else if (!option(words[first], "-seed=", &seed) && !option(words[first], "-max_total_time=", &seconds) &&
-                 !option(words[first], "-max_len=", &longest) && !option(words[first], "-timeout=", &timeout))
+        } else if (!option(words[first], "-seed=", &seed) && !option(words[first], "-max_total_time=", &seconds) &&
+                   !option(words[first], "-max_len=", &longest) && !option(words[first], "-timeout=", &timeout)) {
             fprintf(stderr, "%s is not known here\n", words[first]);
+        }
     }
     longest = longest < LONGEST ? longest : LONGEST;
     state = seed;
     snprintf(path, sizeof path, "%srunning", prefix);
     const int file = open(path, O_RDWR | O_CREAT | O_TRUNC, 0666);
     const size_t room = sizeof(size_t) + LONGEST;
-    if (file < 0 || ftruncate(file, (off_t)room) != 0)
+    if (file < 0 || ftruncate(file, (off_t)room) != 0) {
         return 2;
+    }
     running = mmap(NULL, room, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
-    if (running == MAP_FAILED)
+    if (running == MAP_FAILED) {
         return 2;
+    }
     LLVMFuzzerInitialize(&count, &words);
     struct stat about;
     for (int i = first; i < count; i++) {

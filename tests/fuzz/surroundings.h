@@ -29,8 +29,9 @@ static void fault(const char *what) {
 }
 
 static void must(bool good, const char *what) {
-    if (!good)
+    if (!good) {
         fault(what);
+    }
 }
 
 /* --- bytes */
@@ -43,8 +44,9 @@ static unsigned byte(void) {
 
 static uint64_t bytes(unsigned count) {
     uint64_t value = 0;
-    while (count-- > 0)
+    while (count-- > 0) {
         value = value << 8 | byte();
+    }
     return value;
 }
 
@@ -54,8 +56,9 @@ static double number(void) {
                                      1.25e-4, 1e-30, 1e9,   2.5e-4, 1e-3,     1e16,      0.5,   1e-6};
     static const double scale[] = {1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1, 100, 1e6};
     const unsigned kind = byte();
-    if (kind < sizeof special / sizeof *special)
+    if (kind < sizeof special / sizeof *special) {
         return special[kind];
+    }
     if (kind < 32) {
         const uint64_t bits = bytes(8);
         double value;
@@ -78,8 +81,9 @@ static void *allocate(size_t count, size_t size) {
         short_of_memory = true;
         return NULL;
     }
-    if (count > SIZE_MAX / (size + 1) || count * size > (size_t)1 << 28)
+    if (count > SIZE_MAX / (size + 1) || count * size > (size_t)1 << 28) {
         return NULL;
+    }
     void *memory = malloc(count * size);
     if (memory != NULL) {
         memset(memory, junk, count * size); /* the standard wants zeroes; not every importer gives them */
@@ -106,8 +110,9 @@ static void tell(fmi2ComponentEnvironment environment, fmi2String instance, fmi2
             c++;
         }
     }
-    if (status == fmi2Error)
+    if (status == fmi2Error) {
         errors_told++;
+    }
 }
 
 static const fmi2CallbackFunctions callbacks = {tell, allocate, give_back, NULL, &held};
@@ -149,8 +154,9 @@ static void read_base(const char *name) {
     char path[PATH_ROOM];
     snprintf(path, sizeof path, "%s/%s", RESOURCES, name);
     FILE *stream = fopen(path, "rb");
-    if (stream == NULL)
+    if (stream == NULL) {
         return;
+    }
     file->name = name;
     file->size = fread(file->content, 1, sizeof file->content, stream);
     fclose(stream);
@@ -171,8 +177,9 @@ static void mutate_text(File *file, size_t place) {
     const char *piece = pieces[byte() % (sizeof pieces / sizeof *pieces)];
     const size_t length = strlen(piece), gone = byte() % 8;
     const size_t behind = place + gone < file->size ? place + gone : file->size;
-    if (file->size - (behind - place) + length > sizeof file->content)
+    if (file->size - (behind - place) + length > sizeof file->content) {
         return;
+    }
     memmove(file->content + place + length, file->content + behind, file->size - behind);
     memcpy(file->content + place, piece, length);
     file->size = file->size - (behind - place) + length;
@@ -184,25 +191,29 @@ static void mutate_numbers(File *file, size_t place) {
     memcpy(image, &value, sizeof image);
     place -= place % 8;
     memcpy(file->content + place, image, place + 8 <= file->size ? 8 : file->size - place);
-    if (byte() % 16 == 0)
+    if (byte() % 16 == 0) {
         file->size = place;
+    }
 }
 
 static void mutate(File *file) {
     for (unsigned count = 1 + byte() % 4; count > 0 && file->size > 0; count--) {
         const size_t place = (size_t)bytes(2) % (byte() < 128 || file->size < 256 ? file->size : 256);
-        if (strstr(file->name, ".bin") != NULL)
+        if (strstr(file->name, ".bin") != NULL) {
             mutate_numbers(file, place);
-        else
+        } else {
             mutate_text(file, place);
+        }
     }
 }
 
 static uint64_t hash_of(const File *chosen, size_t count, const char *names) {
     uint64_t hash = HASH_OF_NOTHING;
-    for (size_t i = 0; i < count; i++)
-        if (names == NULL || strstr(names, chosen[i].name) != NULL)
+    for (size_t i = 0; i < count; i++) {
+        if (names == NULL || strstr(names, chosen[i].name) != NULL) {
             hash = hash_bytes(hash, chosen[i].content, chosen[i].size);
+        }
+    }
     return hash;
 }
 
@@ -211,15 +222,18 @@ static void enter_hash(File *settings, const char *row, uint64_t hash) {
     char text[HASH_TEXT_SIZE];
     const size_t length = strlen(row), digits = HASH_TEXT_SIZE - 1;
     hash_text(text, hash);
-    for (size_t at_byte = 0; at_byte + length + digits <= settings->size; at_byte++)
-        if (memcmp(settings->content + at_byte, row, length) == 0)
+    for (size_t at_byte = 0; at_byte + length + digits <= settings->size; at_byte++) {
+        if (memcmp(settings->content + at_byte, row, length) == 0) {
             memcpy(settings->content + at_byte + length, text, digits);
+        }
+    }
 }
 
 /* Of all files; where there are settings, of these, which hold those of the others. */
 static uint64_t seal(File *chosen, size_t count) {
-    if (count == 0 || strcmp(chosen[0].name, "settings.csv") != 0)
+    if (count == 0 || strcmp(chosen[0].name, "settings.csv") != 0) {
         return hash_of(chosen, count, NULL);
+    }
     enter_hash(&chosen[0], "hash.plant,", hash_of(chosen, count, "axes.csv modes.csv poses.bin"));
     enter_hash(&chosen[0], "hash.motion,", hash_of(chosen, count, "setpoints.csv"));
     return hash_of(chosen, 1, NULL);
@@ -231,21 +245,25 @@ static void choose_resources(void) {
     const unsigned variant = byte() % 8;
     size_t count = file_count;
     char own[HASH_TEXT_SIZE], theirs[HASH_TEXT_SIZE];
-    if (variant == 1 && count > 1)
+    if (variant == 1 && count > 1) {
         count--;
+    }
     snprintf(folder, sizeof folder, "%s", variant < 1 || count == 0 ? RESOURCES : scratch);
     memcpy(changed, files, sizeof files);
-    if (variant > 3 && count > 0)
-        for (unsigned k = 1 + byte() % 2; k > 0; k--)
+    if (variant > 3 && count > 0) {
+        for (unsigned k = 1 + byte() % 2; k > 0; k--) {
             mutate(&changed[byte() % count]);
+        }
+    }
     const uint64_t hash = seal(changed, count);
     for (size_t i = 0; i < file_count && variant >= 1; i++) {
         char path[PATH_ROOM + 32];
         snprintf(path, sizeof path, "%s/%s", scratch, files[i].name);
-        if (i < count)
+        if (i < count) {
             write_file(&changed[i]);
-        else
+        } else {
             remove(path);
+        }
     }
     snprintf(guid, sizeof guid, "%s-%s", table_hash(own), hash_text(theirs, hash));
 }
@@ -263,8 +281,9 @@ static void clear_scratch(void) {
 int LLVMFuzzerInitialize(int *count, char ***words) {
     (void)count, (void)words;
     static const char *const names[] = {"settings.csv", "axes.csv", "modes.csv", "setpoints.csv", "poses.bin"};
-    for (size_t i = 0; i < FILES; i++)
+    for (size_t i = 0; i < FILES; i++) {
         read_base(names[i]);
+    }
     snprintf(other_modes, sizeof other_modes, "%s/other_modes.csv", RESOURCES);
     const char *place = getenv("TMPDIR");
     snprintf(scratch, sizeof scratch, "%s/feedsim-fuzz-XXXXXX", place != NULL ? place : "/tmp");

@@ -53,8 +53,9 @@ static void look(Pair *pair) {
     for (fmi2ValueReference reference = 0; reference < unit->variable_count && asked.count < MOST; reference++) {
         const VariableInfo *info = unit->variables[reference].info;
         orders[asked.count] = 1;
-        if (info->kind == KIND_REAL && info->causality == CAUSALITY_output)
+        if (info->kind == KIND_REAL && info->causality == CAUSALITY_output) {
             outputs[asked.count++] = reference;
+        }
     }
     asked.knowns = unit->inputs;
     for (const Call *call = (const Call[]){CALL_GetReal, CALL_GetRealOutputDerivatives, CALL_GetDirectionalDerivative};
@@ -68,8 +69,9 @@ static void look(Pair *pair) {
 }
 
 static void compare(Pair *pair) {
-    if (depth > 0)
+    if (depth > 0) {
         return;
+    }
     look(pair);
     begin(false);
     Image own = image_of(pair->unit);
@@ -90,28 +92,31 @@ static void put_double(fmi2Byte *bytes, double value) {
 static void forge(Pair *pair) {
     Image image = image_of(pair->unit);
     Snapshot heading;
-    if (image.bytes == NULL)
+    if (image.bytes == NULL) {
         return;
+    }
     for (unsigned count = 1 + byte() % 4; count > 0; count--) {
         const unsigned kind = byte() % 8;
         const size_t first = kind < 7 ? sizeof heading : 0, model = sizeof heading + pair->unit->state_at;
         const size_t from = kind % 2 && model + 8 < image.size ? model : first;
         const size_t place = from + (size_t)bytes(2) % (image.size - from);
-        if (kind < 2)
+        if (kind < 2) {
             image.bytes[place] = (fmi2Byte)byte();
-        else if (kind < 4 && place / 8 * 8 + 8 <= image.size)
+        } else if (kind < 4 && place / 8 * 8 + 8 <= image.size) {
             put_double(image.bytes + place / 8 * 8, number());
-        else if (kind < 6)
+        } else if (kind < 6) {
             image.bytes[place / 4 * 4] = (fmi2Byte)byte(), image.bytes[place / 4 * 4 + 3] = (fmi2Byte)byte();
-        else if (kind == 6)
+        } else if (kind == 6) {
             image.bytes[sizeof heading + offsetof(Header, phase) + byte() % 16] = (fmi2Byte)(byte() % 6);
-        else
+        } else {
             image.bytes[place % sizeof heading] = (fmi2Byte)byte();
+        }
     }
     const uint64_t checksum = hash_bytes(HASH_OF_NOTHING, image.bytes + sizeof heading, image.size - sizeof heading);
     memcpy(image.bytes + offsetof(Snapshot, checksum), &checksum, sizeof checksum);
-    if (byte() > 240)
+    if (byte() > 240) {
         image.bytes = realloc(image.bytes, image.size = 1 + (size_t)bytes(2) % image.size);
+    }
     begin(false);
     if (take_image(pair->unit, image)) {
         pair->phase = (Phase)header_of(pair)->phase;
@@ -127,8 +132,9 @@ static void act(Pair *pair);
 static void make_detour(Pair *pair, bool forged) {
     const Pair before = *pair;
     fmi2FMUstate state = NULL;
-    if (depth == DEEPEST)
+    if (depth == DEEPEST) {
         return;
+    }
     begin(false);
     doing = "fmi2GetFMUstate";
     if (fmi2GetFMUstate(pair->unit, &state) != fmi2OK) {
@@ -136,10 +142,12 @@ static void make_detour(Pair *pair, bool forged) {
         return;
     }
     depth++;
-    if (forged)
+    if (forged) {
         forge(pair);
-    for (unsigned count = byte() % 16; count > 0; count--)
+    }
+    for (unsigned count = byte() % 16; count > 0; count--) {
         act(pair);
+    }
     depth--;
     begin(false);
     doing = "fmi2SetFMUstate";
@@ -153,8 +161,9 @@ static void make_detour(Pair *pair, bool forged) {
     fail_in = 0;
     *pair = before;
     doing = "fmi2GetFMUstate again";
-    if (byte() > 128)
+    if (byte() > 128) {
         must(fmi2GetFMUstate(pair->unit, &state) == fmi2OK, "refused");
+    }
     must(fmi2FreeFMUstate(pair->unit, &state) == fmi2OK && state == NULL, "not freed");
     compare(pair);
 }
@@ -162,8 +171,9 @@ static void make_detour(Pair *pair, bool forged) {
 /* The instance goes on in another one, by bytes. */
 static void move(Pair *pair) {
     Image image = image_of(pair->unit);
-    if (image.bytes == NULL)
+    if (image.bytes == NULL) {
         return;
+    }
     fmi2FreeInstance(pair->unit);
     pair->unit = instantiate(false);
     must(pair->unit != NULL, "the same again is refused");
@@ -210,8 +220,9 @@ static void set_variable(Pair *pair) {
         reference = (reference + 1) % (fmi2ValueReference)unit->variable_count;
         left--;
     }
-    if (left == 0)
+    if (left == 0) {
         return;
+    }
     const Kind kind = unit->variables[reference].info->kind;
     double real = kind == KIND_REAL ? some_real(unit, reference) : 0;
     int whole = kind == KIND_REAL ? 0 : (int)byte() % 4;
@@ -240,17 +251,20 @@ static void plainly(Pair *pair, Call call) {
 }
 
 static void initialise(Pair *pair) {
-    if (pair->phase == PHASE_INSTANTIATED)
+    if (pair->phase == PHASE_INSTANTIATED) {
         plainly(pair, CALL_EnterInitializationMode);
-    if (pair->phase == PHASE_INITIALIZATION)
+    }
+    if (pair->phase == PHASE_INITIALIZATION) {
         plainly(pair, CALL_ExitInitializationMode);
+    }
 }
 
 /* Another life: of the twin as well, unless this is a detour. */
 static void begin_anew(Pair *pair) {
     plainly(pair, CALL_Reset);
-    for (unsigned count = byte() % 4; count > 0; count--)
+    for (unsigned count = byte() % 4; count > 0; count--) {
         set_variable(pair);
+    }
     initialise(pair);
 }
 
@@ -259,11 +273,13 @@ static void instantiate_oddly(void) {
     static char text[80];
     char given[GUID_SIZE + 1] = "", location[2 * PATH_ROOM];
     snprintf(given, sizeof given, "%s", guid);
-    for (unsigned i = 0, length = byte() % sizeof text; i < sizeof text; i++)
+    for (unsigned i = 0, length = byte() % sizeof text; i < sizeof text; i++) {
         text[i] = (char)(i < length ? byte() : 0);
+    }
     const unsigned kind = byte();
-    if (kind % 4 == 0)
+    if (kind % 4 == 0) {
         given[byte() % GUID_SIZE] = (char)byte();
+    }
     snprintf(location, sizeof location, "%s%s", kind % 8 < 4 ? "file://" : "", folder);
     const fmi2String names[] = {"tried%s#1#", "tried%s#1#", "tried%s#1#", NULL, ""};
     const fmi2String locations[] = {location, text, NULL, ""};
@@ -285,19 +301,21 @@ static void ask_for_states_oddly(Pair *pair, Call call) {
     doing = call_name(call);
     begin(false);
     const fmi2Component c = byte() < 200 ? pair->unit : NULL;
-    if (c != NULL && fmi2GetFMUstate(c, &state) != fmi2OK)
+    if (c != NULL && fmi2GetFMUstate(c, &state) != fmi2OK) {
         return;
+    }
     fmi2Status status = fmi2Error;
-    if (call == CALL_GetFMUstate)
+    if (call == CALL_GetFMUstate) {
         status = fmi2GetFMUstate(c, NULL);
-    else if (call == CALL_SetFMUstate)
+    } else if (call == CALL_SetFMUstate) {
         status = fmi2SetFMUstate(c, NULL);
-    else if (call == CALL_SerializedFMUstateSize)
+    } else if (call == CALL_SerializedFMUstateSize) {
         status = byte() % 2 ? fmi2SerializedFMUstateSize(c, NULL, &size) : fmi2SerializedFMUstateSize(c, state, NULL);
-    else if (call == CALL_SerializeFMUstate)
+    } else if (call == CALL_SerializeFMUstate) {
         status = fmi2SerializeFMUstate(c, byte() < 128 ? NULL : state, byte() < 128 ? NULL : room, sizeof room);
-    else if (call == CALL_DeSerializeFMUstate)
+    } else if (call == CALL_DeSerializeFMUstate) {
         status = fmi2DeSerializeFMUstate(c, byte() < 128 ? NULL : room, 0, byte() < 128 ? NULL : &state);
+    }
     must(status == fmi2Error, "not refused");
     must(c == NULL || (fmi2FreeFMUstate(c, &state) == fmi2OK && fmi2FreeFMUstate(c, &state) == fmi2OK), "not freed");
 }
@@ -312,8 +330,9 @@ static void call_anything(Pair *pair) {
         ask_for_states_oddly(pair, call);
         return;
     }
-    if ((call == CALL_Terminate || call == CALL_Reset) && byte() < 192)
+    if ((call == CALL_Terminate || call == CALL_Reset) && byte() < 192) {
         call = CALL_DoStep; /* or nothing would be far from the start */
+    }
     const Asked asked = some_call(pair, call);
     ask(pair, &asked);
 }
@@ -347,16 +366,18 @@ static void act(Pair *pair) {
         fail_in = 0;
         break;
     case 10:
-        if (depth == 0 && byte() % 4 == 0)
+        if (depth == 0 && byte() % 4 == 0) {
             move(pair);
-        else
+        } else {
             compare(pair);
+        }
         break;
     case 11:
-        if (depth == 0 && byte() % 4 == 0)
+        if (depth == 0 && byte() % 4 == 0) {
             renew(pair);
-        else if (depth > 0 || byte() % 4 == 0)
+        } else if (depth > 0 || byte() % 4 == 0) {
             begin_anew(pair);
+        }
         break;
     case 12:
         set_variable(pair);
@@ -373,8 +394,9 @@ static void make_in_short_memory(void) {
     for (long n = 1; unit == NULL && n < 100; n++) {
         fail_in = n;
         unit = instantiate(false);
-        if (fail_in > 0)
-            break;                                         /* there was memory enough, whatever came of it */
+        if (fail_in > 0) {
+            break; /* there was memory enough, whatever came of it */
+        }
         must(unit != NULL || held == 0, "memory is lost"); /* made: it went without a file that need not be there */
     }
     fail_in = 0;
@@ -387,8 +409,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     depth = 0;
     fail_in = 0;
     choose_resources();
-    if (byte() > 250)
+    if (byte() > 250) {
         make_in_short_memory();
+    }
     bool made = make_pair(&pairs[0]);
     Pair *pair = &pairs[0];
     while (made && at < end) {
@@ -401,8 +424,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         act(pair);
     }
     for (pair = pairs; pair < pairs + PAIRS; pair++) {
-        if (pair->unit != NULL)
+        if (pair->unit != NULL) {
             compare(pair);
+        }
         free_pair(pair);
     }
     doing = "the end";

@@ -30,12 +30,13 @@ static void *load(const char *path) {
     return strlen(path) < sizeof unit ? strcpy(unit, path) : NULL;
 }
 static void *symbol(void *library, const char *name) {
-    for (size_t i = 0; static_units[i].unit != NULL; i++)
+    for (size_t i = 0; static_units[i].unit != NULL; i++) {
         if (strcmp(static_units[i].unit, library) == 0 && strcmp(static_units[i].name, name) == 0) {
             void *found;
             memcpy(&found, &static_units[i].address, sizeof found);
             return found;
         }
+    }
     return NULL;
 }
 static FILE *open_file(const char *path, const char *mode) {
@@ -47,8 +48,9 @@ static FILE *open_file(const char *path, const char *mode) {
 static wchar_t *wide(const char *text) {
     const int length = MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, text, -1, NULL, 0);
     wchar_t *path = calloc((size_t)length + 1, sizeof *path);
-    if (path != NULL)
+    if (path != NULL) {
         MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, text, -1, path, length);
+    }
     return path;
 }
 static void *load(const char *path) {
@@ -67,8 +69,9 @@ static FILE *open_file(const char *path, const char *mode) {
 #include <dlfcn.h>
 static void *load(const char *path) {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (library == NULL)
+    if (library == NULL) {
         fprintf(stderr, "drive: %s\n", dlerror());
+    }
     return library;
 }
 static void *symbol(void *library, const char *name) {
@@ -110,8 +113,9 @@ static void print(FILE *result, const double values[], size_t count) {
         fprintf(result, "%08lx%08lx%c", (unsigned long)(bits >> 32), (unsigned long)(bits & 0xffffffffu),
                 i + 1 < count ? ' ' : '\n');
     }
-    if (count == 0)
+    if (count == 0) {
         fprintf(result, "\n");
+    }
 }
 
 static void tell(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
@@ -186,14 +190,17 @@ static int drive(const char *path, FILE *result) {
     }
     const size_t read = whole();
     must(read <= MOST, "as many outputs");
-    for (size_t i = 0; i < read; i++)
+    for (size_t i = 0; i < read; i++) {
         outputs[i] = (fmi2ValueReference)whole();
-    for (size_t i = 0; i < driven; i++)
+    }
+    for (size_t i = 0; i < driven; i++) {
         now[i] = number();
+    }
     MUST(SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
     MUST(EnterInitializationMode(c));
-    if (driven > 0)
+    if (driven > 0) {
         MUST(SetReal(c, inputs, driven, now));
+    }
     MUST(ExitInitializationMode(c));
     MUST(GetReal(c, outputs, read, values));
     print(result, values, read);
@@ -231,17 +238,20 @@ static int run(const char *library, const char *script_path, const char *result_
 /* main() would get the arguments in the code page of the process. */
 int wmain(int count, wchar_t *words[]) {
     static char text[4][LENGTH];
-    if (count != 4)
+    if (count != 4) {
         return 2;
-    for (int i = 1; i < 4; i++)
+    }
+    for (int i = 1; i < 4; i++) {
         WideCharToMultiByte(CP_UTF8, 0, words[i], -1, text[i], LENGTH, NULL, NULL);
+    }
     return run(text[1], text[2], text[3]);
 }
 #else
 int main(int count, char *words[]) {
     int status = count < 4 || count % 3 != 1 ? 2 : 0;
-    for (int i = 1; status == 0 && i < count; i += 3)
+    for (int i = 1; status == 0 && i < count; i += 3) {
         status = run(words[i], words[i + 1], words[i + 2]);
+    }
     return status;
 }
 #endif

@@ -17,25 +17,29 @@ static inline bool check_count(bool good) {
 }
 
 static inline void check_that(bool good, const char *text, const char *file, int line) {
-    if (!check_count(good))
+    if (!check_count(good)) {
         printf("%s:%d: not true: %s\n", file, line, text);
+    }
 }
 
 static inline void check_near(double actual, double expected, double tolerance, const char *text, const char *file,
                               int line) {
-    if (!check_count(fabs(actual - expected) <= tolerance)) /* false where anything is NaN */
+    if (!check_count(fabs(actual - expected) <= tolerance)) { /* false where anything is NaN */
         printf("%s:%d: %s is %.17g, expected %.17g within %g (off by %g)\n", file, line, text, actual, expected,
                tolerance, actual - expected);
+    }
 }
 
 static inline void check_contains(const char *text, const char *part, const char *file, int line) {
-    if (!check_count(strstr(text, part) != NULL))
+    if (!check_count(strstr(text, part) != NULL)) {
         printf("%s:%d: '%s' is not in '%s'\n", file, line, part, text);
+    }
 }
 
 static inline void check_text(const char *actual, const char *expected, const char *file, int line) {
-    if (!check_count(strcmp(actual, expected) == 0))
+    if (!check_count(strcmp(actual, expected) == 0)) {
         printf("%s:%d: '%s' is not '%s'\n", file, line, actual, expected);
+    }
 }
 
 static inline int check_result(const char *file) {

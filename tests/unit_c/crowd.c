@@ -25,14 +25,16 @@ static long long held, most;
 /* Relaxed: a lock would put the threads' lives in an order, and hide from a sanitizer what they share. */
 static void count_held(long long bytes) {
     const long long now = __atomic_add_fetch(&held, bytes, __ATOMIC_RELAXED);
-    if (now > __atomic_load_n(&most, __ATOMIC_RELAXED))
+    if (now > __atomic_load_n(&most, __ATOMIC_RELAXED)) {
         __atomic_store_n(&most, now, __ATOMIC_RELAXED);
+    }
 }
 
 static void *allocate(size_t count, size_t size) {
     size_t *memory = calloc(1, count * size + 2 * sizeof(size_t)); /* keeps the alignment of calloc */
-    if (memory == NULL)
+    if (memory == NULL) {
         return NULL;
+    }
     memory[0] = count * size;
     count_held((long long)memory[0]);
     return memory + 2;
@@ -51,10 +53,12 @@ static long resident(void) {
 #endif
     long size = 0, pages = 0;
     FILE *file = fopen("/proc/self/statm", "r");
-    if (file == NULL)
+    if (file == NULL) {
         return 0;
-    if (fscanf(file, "%ld %ld", &size, &pages) != 2)
+    }
+    if (fscanf(file, "%ld %ld", &size, &pages) != 2) {
         pages = 0;
+    }
     fclose(file);
     return pages;
 }
@@ -93,14 +97,16 @@ static void be_born(Life *life) {
 }
 
 static void go_on(Life *life, int k) {
-    for (size_t i = 0; i < unit.input_count; i++)
+    for (size_t i = 0; i < unit.input_count; i++) {
         life->values[i] = 1e-3 * sin(0.01 * k * (1 + life->seed) + (double)i);
+    }
     live(life, fmu.SetReal(life->c, unit.inputs, unit.input_count, life->values));
     live(life, fmu.DoStep(life->c, life->seed + k * T_C, T_C, fmi2True));
     live(life, fmu.GetReal(life->c, unit.reals, unit.real_count, life->values));
     const unsigned char *bytes = (const unsigned char *)life->values;
-    for (size_t i = 0; i < unit.real_count * sizeof *life->values; i++)
+    for (size_t i = 0; i < unit.real_count * sizeof *life->values; i++) {
         life->results = (life->results ^ bytes[i]) * 0x100000001b3u;
+    }
     if (k % 64 == 0) { /* there and back */
         fmi2FMUstate state = NULL;
         live(life, fmu.GetFMUstate(life->c, &state));
@@ -112,8 +118,9 @@ static void go_on(Life *life, int k) {
 static void *whole(void *given) {
     Life *life = given;
     be_born(life);
-    for (int k = 0; k < steps; k++)
+    for (int k = 0; k < steps; k++) {
         go_on(life, k);
+    }
     fmu.FreeInstance(life->c);
     return NULL;
 }
@@ -127,8 +134,9 @@ static void *whole_at_once(void *given) {
     pthread_mutex_lock(&guard);
     awaited--;
     pthread_cond_broadcast(&opened);
-    while (awaited > 0)
+    while (awaited > 0) {
         pthread_cond_wait(&opened, &guard);
+    }
     pthread_mutex_unlock(&guard);
     return whole(given);
 }
@@ -148,13 +156,15 @@ int main(int count, char *given[]) {
     arguments = given;
     const int instances = atoi(given[4]), threads = atoi(given[5]);
     steps = atoi(given[6]);
-    if (!load(given[1]))
+    if (!load(given[1])) {
         return 2;
+    }
     Life *lives = calloc((size_t)instances, sizeof *lives);
     uint64_t *alone = calloc((size_t)instances, sizeof *alone);
     pthread_t *running = calloc((size_t)threads, sizeof *running);
-    if (lives == NULL || alone == NULL || running == NULL || threads > instances)
+    if (lives == NULL || alone == NULL || running == NULL || threads > instances) {
         return 2;
+    }
 
     be_born(&lives[0]);
     explore(lives[0].c, &unit);
@@ -166,21 +176,26 @@ int main(int count, char *given[]) {
         alone[i] = lives[i].results;
     }
     must(held == 0, "memory returned by instances one after another");
-    if (unit.input_count > 0)
+    if (unit.input_count > 0) {
         must(alone[0] != alone[1], "lives that differ");
+    }
 
     /* in turn: each step of all */
     long pages = 0;
     for (int round = 0; round < ROUNDS; round++) {
         most = 0;
-        for (int i = 0; i < instances; i++)
+        for (int i = 0; i < instances; i++) {
             be_born(&lives[i]);
-        for (int k = 0; k < steps; k++)
-            for (int i = 0; i < instances; i++)
+        }
+        for (int k = 0; k < steps; k++) {
+            for (int i = 0; i < instances; i++) {
                 go_on(&lives[i], k);
+            }
+        }
         compare(lives, alone, instances, "the same in turn with others as alone");
-        for (int i = 0; i < instances; i++)
+        for (int i = 0; i < instances; i++) {
             fmu.FreeInstance(lives[i].c);
+        }
         must(held == 0, "memory returned by instances side by side");
         must(most <= instances * 2 * one, "no more memory than so many instances alone");
         pages = round == 0 ? resident() : pages;
@@ -196,11 +211,14 @@ int main(int count, char *given[]) {
         alone[i] = lives[i].results;
     }
     awaited = threads;
-    for (int i = 0; i < threads; i++)
-        if (pthread_create(&running[i], NULL, whole_at_once, &lives[i]) != 0)
+    for (int i = 0; i < threads; i++) {
+        if (pthread_create(&running[i], NULL, whole_at_once, &lives[i]) != 0) {
             return 2;
-    for (int i = 0; i < threads; i++)
+        }
+    }
+    for (int i = 0; i < threads; i++) {
         pthread_join(running[i], NULL);
+    }
     compare(lives, alone, threads, "the same in threads as alone");
     must(held == 0, "memory returned by instances in threads");
     printf("%lld bytes an instance, %d instances, %d threads, process grew by %ld bytes, %d faults\n", one, instances,

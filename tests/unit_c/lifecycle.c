@@ -34,13 +34,15 @@ static double run(fmi2Component c, const Interface *unit, int first, int count, 
             orders[i] = 1;
         }
         MUST(fmu.SetReal(c, unit->inputs, unit->input_count, values));
-        for (size_t i = 0; i < unit->input_count; i++)
+        for (size_t i = 0; i < unit->input_count; i++) {
             values[i] = 1e-5 / h * cos(0.01 * k + (double)i);
+        }
         MUST(fmu.SetRealInputDerivatives(c, unit->inputs, unit->input_count, orders, values));
         MUST(fmu.DoStep(c, k * h, h, fmi2False));
         MUST(fmu.GetReal(c, unit->reals, unit->real_count, values));
-        for (size_t i = 0; i < unit->real_count; i++)
+        for (size_t i = 0; i < unit->real_count; i++) {
             sum += values[i] * (1 + (double)(k % 7));
+        }
     }
     must(isfinite(sum), "finite results");
     return sum;
@@ -48,12 +50,14 @@ static double run(fmi2Component c, const Interface *unit, int first, int count, 
 
 static void derivatives(fmi2Component c, const Interface *unit) {
     double seed[MOST], values[MOST];
-    for (size_t i = 0; i < unit->input_count; i++)
+    for (size_t i = 0; i < unit->input_count; i++) {
         seed[i] = 1;
+    }
     MUST(fmu.GetDirectionalDerivative(c, unit->outputs, unit->output_count, unit->inputs, unit->input_count, seed,
                                       values));
-    for (size_t i = 0; i < unit->output_count; i++)
+    for (size_t i = 0; i < unit->output_count; i++) {
         must(isfinite(values[i]), "finite directional derivative");
+    }
 }
 
 /* Save, go on, go back by memory and by bytes, go on: the same to the last bit. */
@@ -85,8 +89,9 @@ int main(int count, char *arguments[]) {
     }
     int steps = count > 4 ? atoi(arguments[4]) : 2000;
     double h = count > 5 ? atof(arguments[5]) : 125e-6;
-    if (!load(arguments[1]))
+    if (!load(arguments[1])) {
         return 2;
+    }
 
     static Interface unit;
     fmi2CallbackFunctions callbacks = {tell, calloc, free, NULL, NULL};
@@ -105,8 +110,9 @@ int main(int count, char *arguments[]) {
             set_up(c[i]);
         }
         explore(c[0], &unit);
-        for (int i = 0; i < INSTANCES; i++)
+        for (int i = 0; i < INSTANCES; i++) {
             sums[i] = run(c[i], &unit, 0, steps, h);
+        }
         must(memcmp(&sums[0], &sums[1], sizeof *sums) == 0, "two instances, one result");
         replay(c[0], &unit, steps, steps / 10 + 1, h);
         derivatives(c[0], &unit);
@@ -118,8 +124,9 @@ int main(int count, char *arguments[]) {
             must(memcmp(&sum, &sums[i], sizeof sum) == 0, "the same result after a reset");
         }
         MUST(fmu.Terminate(c[0]));
-        for (int i = 0; i < INSTANCES; i++)
+        for (int i = 0; i < INSTANCES; i++) {
             fmu.FreeInstance(c[i]); /* terminated or not */
+        }
     }
     printf("%s: %zu Real variables, %zu inputs, %zu outputs; %d steps, %d faults\n", arguments[1], unit.real_count,
            unit.input_count, unit.output_count, steps, faults);

@@ -112,14 +112,17 @@ static inline void explore(fmi2Component c, Interface *found) {
     MUST(fmu.SetDebugLogging(c, fmi2True, 1,
                              (const fmi2String[]){"logEvents"})); /* no errors: they are the answer here */
     for (fmi2ValueReference vr = 0; vr < MOST; vr++) {
-        if (fmu.GetReal(c, &vr, 1, &value) != fmi2OK)
+        if (fmu.GetReal(c, &vr, 1, &value) != fmi2OK) {
             continue;
+        }
         found->reals[found->real_count++] = vr;
-        if (fmu.GetRealOutputDerivatives(c, &vr, 1, &order, &value) == fmi2OK)
+        if (fmu.GetRealOutputDerivatives(c, &vr, 1, &order, &value) == fmi2OK) {
             found->outputs[found->output_count++] = vr;
+        }
         value = 0;
-        if (fmu.SetRealInputDerivatives(c, &vr, 1, &order, &value) == fmi2OK)
+        if (fmu.SetRealInputDerivatives(c, &vr, 1, &order, &value) == fmi2OK) {
             found->inputs[found->input_count++] = vr;
+        }
     }
     MUST(fmu.SetDebugLogging(c, fmi2False, 0, NULL));
 }

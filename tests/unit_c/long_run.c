@@ -21,8 +21,9 @@ static fmi2Component start(char *arguments[], double t) {
     static const fmi2CallbackFunctions callbacks = {tell, calloc, free, NULL, NULL};
     fmi2Component c =
         fmu.Instantiate("long run", fmi2CoSimulation, arguments[2], arguments[3], &callbacks, fmi2False, fmi2False);
-    if (c == NULL)
+    if (c == NULL) {
         exit(1);
+    }
     MUST(fmu.SetupExperiment(c, fmi2False, 0, t, fmi2False, 0));
     MUST(fmu.EnterInitializationMode(c));
     MUST(fmu.ExitInitializationMode(c));
@@ -31,8 +32,9 @@ static fmi2Component start(char *arguments[], double t) {
 
 static uint64_t hash(uint64_t seed, const double values[], size_t count) {
     const unsigned char *bytes = (const unsigned char *)values;
-    for (size_t i = 0; i < count * sizeof *values; i++)
+    for (size_t i = 0; i < count * sizeof *values; i++) {
         seed = (seed ^ bytes[i]) * 0x100000001b3u;
+    }
     return seed;
 }
 
@@ -43,8 +45,9 @@ static void reached(fmi2Component c, double t) {
     MUST(fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &told));
     must(fabs(told - t) <= 4e-16 * fabs(t), "the time that was reached");
     MUST(fmu.GetReal(c, unit.reals, unit.real_count, values));
-    for (size_t i = 0; i < unit.real_count; i++)
+    for (size_t i = 0; i < unit.real_count; i++) {
         must(isfinite(values[i]), "finite results");
+    }
 }
 
 /* How masters count: t_0 + k h, or in whole nanoseconds. */
@@ -60,8 +63,9 @@ static uint64_t run(char *arguments[], double t_0, Way way, int64_t count) {
         if (k % 997 == 0) {
             MUST(fmu.GetReal(c, unit.reals, unit.real_count, values));
             results = hash(results, values, unit.real_count);
-            for (size_t i = 0; i < unit.input_count; i++)
+            for (size_t i = 0; i < unit.input_count; i++) {
                 values[i] = 1e-3 * sin(0.37 * (double)(k / 997) + (double)i);
+            }
             MUST(fmu.SetReal(c, unit.inputs, unit.input_count, values));
         }
         MUST(fmu.DoStep(c, t, T_C, fmi2True));
@@ -94,13 +98,15 @@ static void summed(char *arguments[], int64_t count) {
     double t = 0, farthest = 0;
     for (int64_t k = 0; k < count && faults == 0; k++) {
         const double off = fabs(t + T_C - (double)(k + 1) * T_C) / T_C;
-        if (k % 997 == 996)
+        if (k % 997 == 996) {
             tried(one, (double)k * T_C, (1 - 2 * off) * T_C, early);
+        }
         MUST(fmu.DoStep(one, (double)k * T_C, T_C, fmi2True));
         MUST(fmu.DoStep(other, t, T_C, fmi2True));
         t += T_C;
-        if (k % 997 != 996)
+        if (k % 997 != 996) {
             continue;
+        }
         MUST(fmu.GetReal(one, unit.reals, unit.real_count, exact));
         MUST(fmu.GetReal(other, unit.reals, unit.real_count, drifted));
         farthest = off > farthest ? off : farthest;
@@ -109,8 +115,9 @@ static void summed(char *arguments[], int64_t count) {
             must(fabs(drifted[i] - exact[i]) <= fabs(early[i] - exact[i]) + rounding,
                  "the same results with time as a sum of steps");
         }
-        for (size_t i = 0; i < unit.input_count; i++)
+        for (size_t i = 0; i < unit.input_count; i++) {
             exact[i] = 1e-3 * sin(0.37 * (double)(k / 997) + (double)i);
+        }
         MUST(fmu.SetReal(one, unit.inputs, unit.input_count, exact));
         MUST(fmu.SetReal(other, unit.inputs, unit.input_count, exact));
     }
@@ -135,8 +142,9 @@ static void sampled(char *arguments[], int64_t count) {
     MUST(fmu.GetReal(c, &output, 1, &before));
     for (int64_t k = 0; k < count && faults == 0; k++) {
         const double measured = 1e-6 * (double)(k % 1000 + 1);
-        if (given >= 0)
+        if (given >= 0) {
             MUST(fmu.SetReal(c, &input, 1, &measured));
+        }
         MUST(fmu.DoStep(c, (double)(k * step) / 1e9, (double)step / 1e9, fmi2True));
         MUST(fmu.GetReal(c, &output, 1, &value));
         const bool changed = memcmp(&value, &before, sizeof value) != 0;
@@ -146,8 +154,9 @@ static void sampled(char *arguments[], int64_t count) {
             given >= 0 ? (to - 1) / period > (from - 1 + period) / period - 1 : to / period > from / period;
         const int64_t past[] = {from % period, to % period}; /* the last multiple */
         bool either = false;
-        for (int end = 0; end < 2; end++)
+        for (int end = 0; end < 2; end++) {
             either = either || (past[end] > 0 && (past[end] <= margin || period - past[end] <= margin));
+        }
         open += either;
         changes += changed;
         if (!either && due != changed) {
@@ -166,8 +175,9 @@ int main(int count, char *arguments[]) {
         printf("usage: %s LIBRARY GUID RESOURCES STEPS [OUTPUT INPUT PERIOD STEP]\n", arguments[0]);
         return 2;
     }
-    if (!load(arguments[1]))
+    if (!load(arguments[1])) {
         return 2;
+    }
     fmi2Component c = start(arguments, 0);
     explore(c, &unit);
     fmu.FreeInstance(c);
@@ -177,8 +187,9 @@ int main(int count, char *arguments[]) {
     must(run(arguments, 0, NANOSECONDS, steps / 10) == fewer, "the same results with time in nanoseconds");
     must(run(arguments, 1000, PRODUCT, steps / 10) == fewer, "the same results from 1000 s on");
     must(run(arguments, 1e6, PRODUCT, steps / 10) == fewer, "the same results from 1e6 s on");
-    if (count == 9)
+    if (count == 9) {
         sampled(arguments, steps);
+    }
     printf("%lld steps, results %016llx after a tenth of them, %d faults\n", (long long)steps,
            (unsigned long long)fewer, faults);
     return faults > 0;

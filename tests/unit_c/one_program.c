@@ -37,8 +37,9 @@ static const struct {
 enum { COUNT = sizeof units / sizeof *units };
 
 int main(int count, char *arguments[]) {
-    if (count != 1 + 2 * COUNT)
+    if (count != 1 + 2 * COUNT) {
         return 2;
+    }
     int good = 0;
     for (int i = 0; i < COUNT; i++) {
         const char *guid = arguments[1 + 2 * i], *resources = arguments[2 + 2 * i];
@@ -47,11 +48,13 @@ int main(int count, char *arguments[]) {
         /* each binary knows its own GUID, so a mix-up does not get past this */
         fmi2Component wrong =
             units[(i + 1) % COUNT].instantiate("wrong", fmi2CoSimulation, guid, resources, NULL, fmi2False, fmi2False);
-        if (c == NULL || wrong != NULL)
+        if (c == NULL || wrong != NULL) {
             continue;
+        }
         if (units[i].set_up(c, fmi2False, 0, 0, fmi2False, 0) == fmi2OK && units[i].enter(c) == fmi2OK &&
-            units[i].leave(c) == fmi2OK && units[i].step(c, 0, 125e-6, fmi2True) == fmi2OK)
+            units[i].leave(c) == fmi2OK && units[i].step(c, 0, 125e-6, fmi2True) == fmi2OK) {
             good++;
+        }
         units[i].release(c);
     }
     printf("%d units in one program: %d passed, %d failed\n", COUNT, good, COUNT - good);

@@ -69,8 +69,9 @@ static void tables_are_used_row_by_row(void) {
     CHECK(exchange_run(operations, 1e-3, 4, 9, &fault) == fmi2OK);
     CHECK(setting.calls == 4 && getting.calls == 1);
     const double expected[] = {10, 11, 12, 10};
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++) {
         CHECK_EQUAL(setting.seen[i], expected[i]);
+    }
     CHECK_EQUAL(got[0], 100);
     CHECK_EQUAL(got[1], 0);
     CHECK(fault.cycle == -1); /* untouched */
@@ -124,8 +125,9 @@ static void failure_ends_the_loop(void) {
     CHECK(exchange_run(operations, 0.03, 0, 10, &fault) == fmi2Discard);
     CHECK(fault.cycle == 3 && fault.operation == 1);
     CHECK(notes.calls == 4);
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 4; k++) {
         CHECK_EQUAL(notes.t[k], k * 0.03 + 0.01);
+    }
     CHECK_EQUAL(notes.h, 0.02);
     CHECK_EQUAL(y, 3 * 101 + 1);
     Operation unknown = {.kind = EXCHANGE_KIND_COUNT};

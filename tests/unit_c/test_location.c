@@ -10,8 +10,9 @@ static void means(const char *location, bool drive_letters, const char *expected
     char path[256] = "untouched";
     bool good = location_path(location, drive_letters, path);
     CHECK(good == (expected != NULL));
-    if (expected != NULL)
+    if (expected != NULL) {
         CHECK_TEXT(path, expected);
+    }
 }
 
 static void on_any_system(bool drives) {
@@ -63,8 +64,9 @@ static void where_they_have_not(void) {
 static void write_file(const char *path, const char *bytes, size_t size) {
     FILE *file = fopen(path, "wb");
     CHECK(file != NULL && fwrite(bytes, 1, size, file) == size);
-    if (file != NULL)
+    if (file != NULL) {
         fclose(file);
+    }
 }
 
 /* argument: a directory to write to */
@@ -89,8 +91,9 @@ static void files(const char *directory) {
 
     /* sizes about those of the pieces it is read in */
     static char large[40000];
-    for (size_t k = 0; k < sizeof large; k++)
+    for (size_t k = 0; k < sizeof large; k++) {
         large[k] = (char)('a' + k % 23);
+    }
     const size_t sizes[] = {16382, 16383, 16384, 16385, 32767, 32768, 40000};
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
         write_file(path, large, sizes[k]);

@@ -13,8 +13,9 @@ static const char *locale_separator = ".";
 static double stub_strtod(const char *text, char **end) {
     char copy[1024];
     const char *found = strstr(text, locale_separator);
-    if (strcmp(locale_separator, ".") == 0 || found == NULL)
+    if (strcmp(locale_separator, ".") == 0 || found == NULL) {
         return strchr(text, '.') != NULL && found == NULL ? NAN : strtod(text, end); /* the point means nothing there */
+    }
     snprintf(copy, sizeof copy, "%.*s.%s", (int)(found - text), text, found + strlen(locale_separator));
     return strtod(copy, NULL);
 }
@@ -26,8 +27,9 @@ static int stub_snprintf(char *text, size_t size, const char *format, ...) {
     vsnprintf(copy, sizeof copy, format, arguments);
     va_end(arguments);
     char *point = strcmp(locale_separator, ".") != 0 ? strchr(copy, '.') : NULL;
-    if (point == NULL)
+    if (point == NULL) {
         return snprintf(text, size, "%s", copy);
+    }
     return snprintf(text, size, "%.*s%s%s", (int)(point - copy), copy, locale_separator, point + 1);
 }
 
@@ -51,8 +53,9 @@ static void reads(const char *text, double expected, size_t length) {
 static void refuses(const char *text) {
     double value = -77;
     const char *end = NULL;
-    if (number_parse(text, &end, &value))
+    if (number_parse(text, &end, &value)) {
         printf("'%s' is read as %g\n", text, value);
+    }
     CHECK(!number_parse(text, &end, &value) && value == -77 && end == NULL);
 }
 
@@ -124,8 +127,9 @@ static void round_trips(int count) {
         const char *end = NULL;
         bool good = number_parse(shown, &end, &back) && *end == '\0' && memcmp(&back, &value, sizeof value) == 0 &&
                     strspn(shown, "0123456789.e+-") == strlen(shown);
-        if (!good)
+        if (!good) {
             printf("%a is shown as '%s' and read as %a\n", value, shown, back);
+        }
         CHECK(good);
     }
 }

@@ -164,18 +164,21 @@ static void refused(fmi2Component c, int function, int phase, Log *log) {
     size_t size;
     image_of(c, before, &size);
     log->message[0] = '\0';
-    if (table[function].call(c) != fmi2Error)
+    if (table[function].call(c) != fmi2Error) {
         printf("%s in %s is not refused\n", table[function].name, phases[phase]);
+    }
     CHECK(log->status == fmi2Error);
     CHECK_TEXT(log->category, "logStatusError");
     CHECK_CONTAINS(log->message, table[function].name);
     if (strchr(table[function].allowed, 'x') != NULL || strchr(table[function].allowed, 'd') != NULL) {
         char *allowed = strstr(log->message, "allowed in: ");
         CHECK(allowed != NULL);
-        if (allowed == NULL)
+        if (allowed == NULL) {
             return;
-        for (int other = 0; other < PHASE_COUNT; other++)
+        }
+        for (int other = 0; other < PHASE_COUNT; other++) {
             CHECK((strstr(allowed, phases[other]) != NULL) == (table[function].allowed[other] != '.'));
+        }
         *allowed = '\0';
         CHECK_CONTAINS(log->message, phases[phase]);
     } else {
@@ -198,8 +201,9 @@ static void every_function_in_every_state(void) {
                 fmi2Status status = table[function].call(c);
                 CHECK(status == (allowed == 'd' ? fmi2Discard : fmi2OK));
                 CHECK(log.count == 0);
-                if (status != (allowed == 'd' ? fmi2Discard : fmi2OK))
+                if (status != (allowed == 'd' ? fmi2Discard : fmi2OK)) {
                     printf("%s in %s: %s\n", table[function].name, phases[phase], log.message);
+                }
             }
             fmi2FreeInstance(c);
         }
@@ -207,8 +211,9 @@ static void every_function_in_every_state(void) {
 }
 
 static void without_an_instance(void) {
-    for (int function = 0; function < FUNCTIONS; function++)
+    for (int function = 0; function < FUNCTIONS; function++) {
         CHECK(table[function].call(NULL) == fmi2Error);
+    }
     fmi2FreeInstance(NULL);
 }
 

@@ -63,10 +63,11 @@ static void resource_locations(void) {
         Log log = {.count = 0};
         Unit *unit = make("a", fmi2CoSimulation, toy_guid(), locations[k][0], &log);
         CHECK(unit != NULL && log.count == 0);
-        if (locations[k][1] == NULL)
+        if (locations[k][1] == NULL) {
             CHECK(unit_resources(unit) == NULL);
-        else
+        } else {
             CHECK_TEXT(unit_resources(unit), locations[k][1]);
+        }
         fmi2FreeInstance(unit);
     }
     /* A place that cannot be read is the model's trouble only where the model needs it. */
@@ -82,8 +83,9 @@ static void whole_run(fmi2Component c) {
     toy_enter(c, PHASE_STEPPING);
     CHECK(set_real(c, VR_u, 1) == fmi2OK);
     CHECK(set_real(c, VR_u, NAN) == fmi2Error);
-    for (int k = 0; k < 10; k++)
+    for (int k = 0; k < 10; k++) {
         CHECK(fmi2DoStep(c, k, 1, fmi2True) == fmi2OK);
+    }
     CHECK_EQUAL(get_real(c, VR_x), 20);
     CHECK(fmi2Terminate(c) == fmi2OK);
 }
@@ -98,8 +100,9 @@ static void callbacks_may_be_missing(void) {
     };
     long before = memory.allocations;
     for (int k = -1; k < 5; k++) {
-        if (k == 4)
+        if (k == 4) {
             CHECK(memory.allocations == before); /* half a pair is not used */
+        }
         fmi2Component c =
             fmi2Instantiate("a", fmi2CoSimulation, toy_guid(), NULL, k < 0 ? NULL : &partial[k], fmi2False, fmi2True);
         CHECK(c != NULL);
@@ -148,8 +151,9 @@ static void memory_runs_out(void) {
                     fmi2EnterInitializationMode(c) == fmi2OK && fmi2ExitInitializationMode(c) == fmi2OK &&
                     fmi2GetFMUstate(c, &saved) == fmi2OK && fmi2DeSerializeFMUstate(c, bytes, size, &read) == fmi2OK &&
                     fmi2SetFMUstate(c, read) == fmi2OK && fmi2DoStep(c, 0, 1, fmi2True) == fmi2OK;
-            if (!whole)
+            if (!whole) {
                 CHECK_CONTAINS(log.message, "out of memory: ");
+            }
             keeper = c;
         } else if (tries > 0) { /* without memory for the instance there is nobody to tell */
             CHECK_CONTAINS(log.message, "fmi2Instantiate: out of memory: ");
@@ -176,23 +180,28 @@ static void instances_are_independent(void) {
         toy_enter(c[k], PHASE_STEPPING);
         CHECK(set_real(c[k], VR_u, 1) == fmi2OK);
     }
-    for (int step = 0; step < 8; step++)
-        for (int k = 0; k < COUNT; k++)
+    for (int step = 0; step < 8; step++) {
+        for (int k = 0; k < COUNT; k++) {
             CHECK(fmi2DoStep(c[k], step, 1, fmi2True) == fmi2OK);
+        }
+    }
     for (int k = 0; k < COUNT; k++) {
         CHECK_EQUAL(get_real(c[k], VR_x), 8 * k);
         CHECK_EQUAL(get_real(c[k], VR_late), (8 - (k + 1)) * k);
         CHECK(logs[k].count == 0);
     }
     CHECK(set_real(c[3], VR_x, 0) == fmi2Error);
-    for (int k = 0; k < COUNT; k++)
+    for (int k = 0; k < COUNT; k++) {
         CHECK(logs[k].count == (k == 3));
+    }
     CHECK_TEXT(logs[3].instance, "toy 3");
     fmi2FreeInstance(c[2]);
     CHECK(fmi2DoStep(c[4], 8, 1, fmi2True) == fmi2OK);
-    for (int k = 0; k < COUNT; k++)
-        if (k != 2)
+    for (int k = 0; k < COUNT; k++) {
+        if (k != 2) {
             fmi2FreeInstance(c[k]);
+        }
+    }
 }
 
 static void reset_brings_back_the_start(void) {
@@ -224,27 +233,32 @@ static void comes_through(fmi2Component c, Log *log, const char *expected) {
     char seen[8] = "";
     log->count = 0;
     CHECK(set_real(c, 1000, 1) == fmi2Error);
-    if (log->count > 0 && strcmp(log->category, "logStatusError") == 0 && log->status == fmi2Error)
+    if (log->count > 0 && strcmp(log->category, "logStatusError") == 0 && log->status == fmi2Error) {
         strcat(seen, "e");
+    }
     log->category[0] = '\0';
     fmi2Integer integer;
     CHECK(fmi2GetIntegerStatus(c, fmi2DoStepStatus, &integer) == fmi2Discard);
-    if (strcmp(log->category, "logStatusWarning") == 0 && log->status == fmi2Warning)
+    if (strcmp(log->category, "logStatusWarning") == 0 && log->status == fmi2Warning) {
         strcat(seen, "w");
+    }
     log->category[0] = '\0';
     static double gain = 2;
     gain += 1;
-    if (gain == 13)
+    if (gain == 13) {
         gain += 1;
+    }
     CHECK(set_real(c, VR_gain, gain) == fmi2OK); /* coefficients are derived anew in the next step: an event */
-    if (strcmp(log->category, "logFmi2Call") == 0 && log->status == fmi2OK)
+    if (strcmp(log->category, "logFmi2Call") == 0 && log->status == fmi2OK) {
         strcat(seen, "c");
+    }
     log->category[0] = '\0';
     double time = 0;
     CHECK(fmi2GetRealStatus(c, fmi2LastSuccessfulTime, &time) == fmi2OK);
     CHECK(fmi2DoStep(c, time, 1, fmi2True) == fmi2OK);
-    if (strcmp(log->category, "logEvents") == 0 && log->status == fmi2OK)
+    if (strcmp(log->category, "logEvents") == 0 && log->status == fmi2OK) {
         strcat(seen, "E");
+    }
     CHECK_TEXT(seen, expected);
 }
 
@@ -304,10 +318,12 @@ static void long_messages_end_with_a_whole_character(void) {
     for (int shift = 0; shift < 4; shift++) {
         Log log = {.count = 0};
         char guid[4000] = "";
-        for (int k = 0; k < shift; k++)
+        for (int k = 0; k < shift; k++) {
             strcat(guid, "a");
-        for (int k = 0; k < 1000; k++)
+        }
+        for (int k = 0; k < 1000; k++) {
             strcat(guid, "\xE2\x82\xAC");
+        }
         CHECK(make("a", fmi2CoSimulation, guid, NULL, &log) == NULL);
         const size_t length = strlen(log.message);
         CHECK(length > 2040 && length < 2048);

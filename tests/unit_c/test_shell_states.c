@@ -7,10 +7,12 @@
 /* What a run of `count` steps gives out, from communication point t on: inputs and slopes vary with k. */
 static void run(fmi2Component c, double t, int count, double results[]) {
     for (int k = 0; k < count; k++) {
-        if (k % 3 > 0)
+        if (k % 3 > 0) {
             CHECK(set_real(c, VR_u, 0.1 * k + 1 / (k + 3.0)) == fmi2OK);
-        if (k % 2 > 0)
+        }
+        if (k % 2 > 0) {
             CHECK(set_slope(c, AXIS(1, F), 1.0 / k) == fmi2OK);
+        }
         CHECK(fmi2DoStep(c, t + k * 0.1, 0.1, fmi2True) == fmi2OK);
         results[3 * k] = get_real(c, VR_y);
         results[3 * k + 1] = get_real(c, AXIS(1, s));
@@ -33,8 +35,9 @@ static void replays_are_identical(void) {
     run(c, 1, COUNT, first);
     image_of(c, end, &size);
     for (int again = 0; again < 3; again++) {
-        if (again == 1)
+        if (again == 1) {
             CHECK(fmi2Terminate(c) == fmi2OK);
+        }
         if (again == 2) {
             CHECK(set_real(c, VR_u, 1e6) == fmi2OK);
             CHECK(fmi2DoStep(c, 5, 0.1, fmi2True) == fmi2Error);
@@ -174,8 +177,9 @@ static void serialised_forms_that_do_not_fit(void) {
     }
     CHECK(fmi2DeSerializeFMUstate(c, bytes, size - 1, &state) == fmi2Error);
     CHECK_CONTAINS(log.message, "its heading speaks of");
-    for (size_t shorter = 0; shorter < size; shorter += 7)
+    for (size_t shorter = 0; shorter < size; shorter += 7) {
         CHECK(fmi2DeSerializeFMUstate(c, bytes, shorter, &state) == fmi2Error);
+    }
     CHECK(state == NULL);
 
     /* Damage anywhere is found. */
@@ -220,15 +224,17 @@ static void state_of_another_size(void) {
     /* into instances with the same parameters and with others, stepping and not yet */
     for (int k = 0; k < 4; k++) {
         CHECK(fmi2Reset(c) == fmi2OK);
-        if (k % 2 > 0)
+        if (k % 2 > 0) {
             CHECK(set_integer(c, VR_cells, 7) == fmi2OK);
+        }
         toy_enter(c, k < 2 ? PHASE_STEPPING : PHASE_INSTANTIATED);
         image_of(c, own, &own_size);
         CHECK(fmi2SetFMUstate(c, state) == fmi2Error);
         CHECK_CONTAINS(log.message, "bytes of model state, its parameters need");
         CHECK(same_image(c, own, own_size));
-        if (k >= 2)
+        if (k >= 2) {
             toy_enter(c, PHASE_STEPPING);
+        }
         CHECK(fmi2DoStep(c, 0, 1, fmi2True) == fmi2OK);
         CHECK(get_integer(c, VR_cells) == (k % 2 > 0 ? 7 : 3));
     }

@@ -11,12 +11,14 @@ static double step(fmi2Component c, double t, double h) {
 static void slopes_serve_one_step_in_either_order(void) {
     for (int value_first = 0; value_first < 2; value_first++) {
         fmi2Component c = toy_in(PHASE_STEPPING, NULL);
-        if (value_first)
+        if (value_first) {
             CHECK(set_real(c, VR_u, 1) == fmi2OK);
+        }
         CHECK(set_slope(c, VR_u, 4) == fmi2OK);
         CHECK(set_slope(c, AXIS(1, F), 8) == fmi2OK);
-        if (!value_first)
+        if (!value_first) {
             CHECK(set_real(c, VR_u, 1) == fmi2OK);
+        }
         CHECK_EQUAL(step(c, 0, 0.5), 2 * (0.5 + 4 * 0.125));
         CHECK_EQUAL(get_real(c, AXIS(1, s)), 8 * 0.5 + 0.5);
         CHECK_EQUAL(get_real(c, VR_u), 1);         /* the value is that of the start of the step */
@@ -90,8 +92,9 @@ static void an_input_may_run_away_after_usual_steps(void) {
         step(c, way, 1); /* from here on all inputs are known to be of usual size */
         CHECK(fmi2GetFMUstate(c, &usual) == fmi2OK);
         CHECK(set_slope(c, AXIS(1, F), way == 0 ? 1e308 : 1e149) == fmi2OK);
-        if (way > 1)
+        if (way > 1) {
             CHECK(set_real(c, AXIS(1, F), 1.7976931348623157e308) == fmi2OK);
+        }
         CHECK(fmi2GetFMUstate(c, &wild) == fmi2OK);
         if (way == 3) {
             CHECK(fmi2SetFMUstate(c, usual) == fmi2OK);
@@ -296,8 +299,9 @@ static void output_derivatives(void) {
     CHECK_CONTAINS(log.message, "order 2 asked for 'B.s'; allowed is order 1 (maxOutputDerivativeOrder)");
     CHECK(fmi2GetRealOutputDerivatives(c, vr, 1, (const int[]){0}, value) == fmi2Error);
     const fmi2ValueReference bad[] = {VR_u, VR_twice, VR_gain, VR_steps, 1000};
-    for (int k = 0; k < 5; k++)
+    for (int k = 0; k < 5; k++) {
         CHECK(fmi2GetRealOutputDerivatives(c, &bad[k], 1, (const int[]){1}, value) == fmi2Error);
+    }
     fmi2FreeInstance(c);
 }
 
@@ -314,8 +318,9 @@ static void directional_derivatives(void) {
         CHECK_EQUAL(value[1], 0);
         CHECK_EQUAL(value[2], 0);
         CHECK_EQUAL(value[3], 7);
-        if (phase == 0)
+        if (phase == 0) {
             CHECK(fmi2ExitInitializationMode(c) == fmi2OK);
+        }
     }
     CHECK(fmi2Reset(c) == fmi2OK);
     CHECK(set_string(c, VR_label, "refused") == fmi2OK);

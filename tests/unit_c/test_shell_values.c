@@ -43,8 +43,9 @@ static void what_is_set_is_read(void) {
     double back[4];
     CHECK(fmi2SetReal(c, vr, 4, values) == fmi2OK);
     CHECK(fmi2GetReal(c, vr, 4, back) == fmi2OK);
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 4; k++) {
         CHECK_EQUAL(back[k], values[k]);
+    }
     CHECK(set_integer(c, VR_cells, 8) == fmi2OK && get_integer(c, VR_cells) == 8);
     CHECK(set_boolean(c, VR_inverted, 5) == fmi2OK && get_boolean(c, VR_inverted) == fmi2True);
     CHECK(set_string(c, VR_label, "Achse \xc3\x84") == fmi2OK);
@@ -75,8 +76,9 @@ static void refused(Phase phase, fmi2ValueReference vr, double value, const char
     CHECK(fmi2SetReal(c, both, 2, values) == fmi2Error);
     CHECK(log.count == 1);
     CHECK_CONTAINS(log.message, "fmi2SetReal: ");
-    for (int k = 0; parts[k] != NULL; k++)
+    for (int k = 0; parts[k] != NULL; k++) {
         CHECK_CONTAINS(log.message, parts[k]);
+    }
     CHECK(same_image(c, before, size));
     fmi2FreeInstance(c);
 }

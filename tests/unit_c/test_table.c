@@ -31,9 +31,11 @@ enum { ROWS = sizeof rows / sizeof *rows };
 
 static void the_hash_is_that_of_the_rows(void) {
     uint64_t hash = 14695981039346656037u; /* FNV-1a, 64 bit: offset basis and prime in decimal */
-    for (int k = 0; k < ROWS; k++)
-        for (const char *c = rows[k]; *c; c++)
+    for (int k = 0; k < ROWS; k++) {
+        for (const char *c = rows[k]; *c; c++) {
             hash = (hash ^ (unsigned char)*c) * 1099511628211u;
+        }
+    }
     char expected[32], text[HASH_TEXT_SIZE];
     snprintf(expected, sizeof expected, "%08lx%08lx", (unsigned long)(hash >> 32), (unsigned long)(hash & 0xffffffff));
     CHECK_TEXT(table_hash(text), expected);

@@ -19,13 +19,15 @@ void log_record(fmi2ComponentEnvironment environment, fmi2String instance, fmi2S
 Memory memory = {0, 0, -1};
 
 void *memory_allocate(size_t count, size_t size) {
-    if (memory.fail_at >= 0 && memory.allocations >= memory.fail_at)
+    if (memory.fail_at >= 0 && memory.allocations >= memory.fail_at) {
         return NULL;
+    }
     memory.allocations++;
     memory.held++;
     void *bytes = malloc(count * size);
-    if (bytes != NULL)
+    if (bytes != NULL) {
         memset(bytes, 0xa5, count * size); /* an importer that does not zero it, as the standard says it must */
+    }
     return bytes;
 }
 
@@ -47,15 +49,18 @@ fmi2Component toy_instantiate(Log *log, fmi2Boolean logging) {
 }
 
 void toy_enter(fmi2Component c, Phase phase) {
-    if (phase == PHASE_INSTANTIATED)
+    if (phase == PHASE_INSTANTIATED) {
         return;
+    }
     CHECK(fmi2SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0) == fmi2OK);
     CHECK(fmi2EnterInitializationMode(c) == fmi2OK);
-    if (phase == PHASE_INITIALIZATION)
+    if (phase == PHASE_INITIALIZATION) {
         return;
+    }
     CHECK(fmi2ExitInitializationMode(c) == fmi2OK);
-    if (phase == PHASE_TERMINATED)
+    if (phase == PHASE_TERMINATED) {
         CHECK(fmi2Terminate(c) == fmi2OK);
+    }
     if (phase == PHASE_FAILED) {
         CHECK(set_real(c, VR_u, 2000) == fmi2OK); /* faster than limit.u */
         CHECK(fmi2DoStep(c, 0, 1, fmi2True) == fmi2Error);

@@ -34,13 +34,16 @@ static double delayed(const double *series, int count, double before, long m, do
     double d = delay / T_pos;
     long first = (long)floor(d) - 1;
     double sum = 0;
-    if (first < 0)
+    if (first < 0) {
         first = 0;
+    }
     for (long i = first; i < first + 4; ++i) {
         double weight = 1;
-        for (long j = first; j < first + 4; ++j)
-            if (j != i)
+        for (long j = first; j < first + 4; ++j) {
+            if (j != i) {
                 weight *= (d - (double)j) / (double)(i - j);
+            }
+        }
         long index = m - i;
         sum += weight * (index < 0 ? before : series[index < count ? index : count - 1]);
     }
@@ -51,13 +54,15 @@ void control_start(Control *c) {
     const Drive *p = &c->drive;
     double w = p->omega_0, wf = 2 * PI_ * p->f;
     c->reference = bilinear((const double[3]){w * w, 0, 0}, (const double[3]){w * w, 2 * p->D * w, 1}, 2 / p->T_c);
-    if (p->f > 0)
+    if (p->f > 0) {
         c->band_stop = bilinear((const double[3]){wf * wf, 2 * p->D_num * wf, 1},
                                 (const double[3]){wf * wf, 2 * p->D_den * wf, 1}, wf / tan(wf * p->T_c / 2));
+    }
     c->lag = c->lag_input = p->x_start;
     c->n_old = c->n_new = c->speed_integral = 0;
-    for (int j = 0; j < 2; ++j)
+    for (int j = 0; j < 2; ++j) {
         c->current_integral[j] = c->u[j] = c->i[j] = 0;
+    }
 }
 
 static void position_loop(Control *c, long m, double x_a) {
@@ -105,33 +110,38 @@ static void current_loop(Control *c, double M_filtered, double n_a, double *u) {
         u[j] = p->K_p_current * e[j] + c->current_integral[j] + ahead[j];
     }
     double amplitude = hypot(u[0], u[1]);
-    if (amplitude > p->u_max)
+    if (amplitude > p->u_max) {
         for (int j = 0; j < 2; ++j) {
             double limited = u[j] * p->u_max / amplitude;
             c->current_integral[j] += (limited - u[j]) * p->T_c / p->T_n_current;
             u[j] = limited;
         }
+    }
 }
 
 double control_sample(Control *c, long k, double x_a, double n_a) {
     const Drive *p = &c->drive;
     long ratio = lround(p->T_pos / p->T_c), tick = k % ratio;
     c->i_sample[0] = c->i[0], c->i_sample[1] = c->i[1];
-    if (tick == 0)
+    if (tick == 0) {
         position_loop(c, k / ratio, x_a);
+    }
     c->n_s = p->ramp != 0 ? c->n_old + (c->n_new - c->n_old) * (double)(tick + 1) / (double)ratio : c->n_new;
     c->n_ref = p->reference_model != 0 ? filtered(&c->reference, c->n_s) : c->n_s;
 
     double P = p->K_p * (c->n_s - n_a);
-    if (p->integrator != 0)
+    if (p->integrator != 0) {
         c->speed_integral += p->K_p * p->T_c / p->T_n * (c->n_ref - n_a);
+    }
     double wanted = P + c->speed_integral;
     c->M_s = clip(wanted, p->M_max);
-    if (p->integrator != 0)
+    if (p->integrator != 0) {
         c->speed_integral += (c->M_s - wanted) * p->T_c / p->T_n;
+    }
     double M_filtered = p->f > 0 ? filtered(&c->band_stop, c->M_s) : c->M_s;
-    if (p->ideal_current_loop != 0)
+    if (p->ideal_current_loop != 0) {
         return M_filtered;
+    }
 
     double u_next[2];
     current_loop(c, M_filtered, n_a, u_next);

@@ -27,12 +27,15 @@ static void read_modes(FILE *file, int modes) {
         double omega = 6.28318530717958647692 * number(file, "frequency");
         machine.stiffness[i] = omega * omega;
         machine.damping[i] = 2 * omega * number(file, "damping");
-        for (int a = 0; a < machine.axes; ++a)
+        for (int a = 0; a < machine.axes; ++a) {
             machine.n_port[a][i] = number(file, "n");
-        for (int a = 0; a < machine.axes; ++a)
+        }
+        for (int a = 0; a < machine.axes; ++a) {
             machine.x_port[a][i] = number(file, "x");
-        for (int d = 0; d < DIRECTIONS; ++d)
+        }
+        for (int d = 0; d < DIRECTIONS; ++d) {
             machine.tcp_port[d][i] = number(file, "tcp");
+        }
     }
 }
 
@@ -66,10 +69,12 @@ static void read_axis(FILE *file, Friction *f, Drive *d) {
                              &d->reference_model,
                              &d->ideal_current_loop,
                              &d->emf_feedforward};
-    for (size_t i = 0; i < sizeof friction / sizeof *friction; ++i)
+    for (size_t i = 0; i < sizeof friction / sizeof *friction; ++i) {
         *friction[i] = number(file, "friction");
-    for (size_t i = 0; i < sizeof drive / sizeof *drive; ++i)
+    }
+    for (size_t i = 0; i < sizeof drive / sizeof *drive; ++i) {
         *drive[i] = number(file, "drive");
+    }
 }
 
 static void record(FILE *file, const double *x_start, const double *M_a) {
@@ -122,8 +127,9 @@ int main(int argc, char **argv) {
         machine.M_0[a] = number(input, "M_0");
         read_axis(input, &machine.friction[a], drive);
         double *series = malloc(2 * (size_t)setpoints * sizeof *series);
-        for (int i = 0; i < 2 * setpoints; ++i)
+        for (int i = 0; i < 2 * setpoints; ++i) {
             series[i] = number(input, "setpoint");
+        }
         drive->x_start = series[0];
         control[a].x_s = series;
         control[a].n_ffw = series + setpoints;
@@ -136,12 +142,15 @@ int main(int argc, char **argv) {
             M_next[a] = control_sample(&control[a], k, x_a, dot(machine.n_port[a], state.v, machine.modes));
         }
         record(output, x_start, M_a);
-        for (int a = 0; a < machine.axes; ++a)
-            if (control[a].drive.ideal_current_loop != 0)
+        for (int a = 0; a < machine.axes; ++a) {
+            if (control[a].drive.ideal_current_loop != 0) {
                 M_a[a] = M_next[a]; /* acts at once and is held */
+            }
+        }
         advance(&machine, &state, T_c, steps, M_a, M_next);
-        for (int a = 0; a < machine.axes; ++a)
+        for (int a = 0; a < machine.axes; ++a) {
             M_a[a] = M_next[a];
+        }
     }
     return fclose(output) == 0 ? 0 : 1;
 }

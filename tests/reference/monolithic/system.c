@@ -5,8 +5,9 @@
 
 double dot(const double *restrict a, const double *restrict b, int count) {
     double sum = 0;
-    for (int i = 0; i < count; ++i)
+    for (int i = 0; i < count; ++i) {
         sum += a[i] * b[i];
+    }
     return sum;
 }
 
@@ -30,8 +31,9 @@ double friction_torque(const Friction *p, double n, double z, double c, double *
         double lambda = (p->W / 2 + (z >= 0 ? c : -c)) / p->W;
         k = p->gamma + lambda * (1 - p->gamma);
     }
-    if (dz != NULL)
+    if (dz != NULL) {
         *dz = rate;
+    }
     return k * p->sigma_0 * z + p->sigma_1 * rate + p->sigma_2 * n;
 }
 
@@ -48,11 +50,14 @@ static void rate_of(const System *s, const State *x, const double *M_a, Rate *ra
         F[a] = M_a[a] - s->M_0[a] - friction_torque(&s->friction[a], n, x->z[a], c, &rate->z[a]);
         rate->c[a] = n;
     }
-    for (int i = 0; i < s->modes; ++i)
+    for (int i = 0; i < s->modes; ++i) {
         rate->v[i] = -s->stiffness[i] * x->q[i] - s->damping[i] * x->v[i];
-    for (int a = 0; a < s->axes; ++a)
-        for (int i = 0; i < s->modes; ++i)
+    }
+    for (int a = 0; a < s->axes; ++a) {
+        for (int i = 0; i < s->modes; ++i) {
             rate->v[i] += s->n_port[a][i] * F[a];
+        }
+    }
 }
 
 /* out = x + h * rate, where the rate of q is the v of the stage the rate belongs to. */
@@ -75,9 +80,11 @@ void advance(const System *s, State *x, double T, int steps, const double *M_beg
     Rate k1, k2, k3, k4;
     double M[3][MAX_AXES];
     for (int j = 0; j < steps; ++j) {
-        for (int a = 0; a < s->axes; ++a)
-            for (int half = 0; half < 3; ++half)
+        for (int a = 0; a < s->axes; ++a) {
+            for (int half = 0; half < 3; ++half) {
                 M[half][a] = M_begin[a] + (M_end[a] - M_begin[a]) * (2 * j + half) / (2.0 * steps);
+            }
+        }
         rate_of(s, x, M[0], &k1);
         shifted(s, x, x, &k1, h / 2, &s2);
         rate_of(s, &s2, M[1], &k2);

@@ -20,25 +20,30 @@ typedef struct ToyState {
 
 static bool toy_load(Unit *unit) {
     static const char *const names[] = {"A", "B"};
-    if (unit_resources(unit) != NULL && strstr(unit_resources(unit), "refused") != NULL)
+    if (unit_resources(unit) != NULL && strstr(unit_resources(unit), "refused") != NULL) {
         return unit_fail(unit, "resources in %s are refused, 100 %% sure, see #1", unit_resources(unit));
-    if (!unit_set_axes(unit, 2, names))
+    }
+    if (!unit_set_axes(unit, 2, names)) {
         return false;
+    }
     unit_axis(unit, 1)->load = -0.5; /* per-axis start value, as a machine's data would give it */
     return true;
 }
 
 static bool toy_derive(Unit *unit) {
     const Scalars *v = unit_scalars(unit);
-    if (strcmp(v->label, "refused") == 0)
+    if (strcmp(v->label, "refused") == 0) {
         return unit_fail(unit, "label '%s' is refused", v->label);
-    if (v->gain == 13 || v->offset >= v->feed + 5)
+    }
+    if (v->gain == 13 || v->offset >= v->feed + 5) {
         return unit_fail(unit, "gain %g, offset %g and feed %g do not go together", v->gain, v->offset, v->feed);
+    }
     Toy *toy = unit_derived(unit);
     if (toy == NULL) {
         toy = unit_alloc(unit, 1, sizeof *toy);
-        if (toy == NULL)
+        if (toy == NULL) {
             return false;
+        }
         unit_set_derived(unit, toy);
     }
     toy->gain = v->inverted ? -v->gain : v->gain;
@@ -68,8 +73,9 @@ static void toy_write(Unit *unit, double h) {
 
 static void toy_start(Unit *unit) {
     ToyState *state = unit_state(unit);
-    for (int i = 0; i < unit_scalars(unit)->cells; i++)
+    for (int i = 0; i < unit_scalars(unit)->cells; i++) {
         state->history[i] += 100; /* shows where the state does not arrive zeroed */
+    }
     state->u_end = unit_scalars(unit)->u;
     toy_write(unit, 0);
 }
@@ -79,16 +85,19 @@ static bool toy_step(Unit *unit, double t, double h) {
     const Toy *toy = unit_derived(unit);
     ToyState *state = unit_state(unit);
     double slope = unit_slope(unit, VR_u), u_end = v->u + slope * h;
-    if (fabs(u_end) > v->limit_u)
+    if (fabs(u_end) > v->limit_u) {
         return unit_fail(unit, "the speed of %g at %g exceeds the limit of %g", u_end, t + h, v->limit_u);
+    }
     memmove(state->history + 1, state->history, (size_t)(v->cells - 1) * sizeof(double));
     state->history[0] = state->x;
-    if (!v->b)
+    if (!v->b) {
         state->x += (toy->gain * (v->u + u_end) / 2 + v->offset) * h;
+    }
     state->u_end = u_end;
     state->steps++;
-    if (v->i == -3)
+    if (v->i == -3) {
         unit_warn(unit, "i is %d", v->i);
+    }
     toy_write(unit, h);
     return true;
 }
@@ -101,11 +110,14 @@ static double toy_output_derivative(Unit *unit, unsigned vr) {
 static double toy_partial(Unit *unit, unsigned output, unsigned input, bool initial) {
     (void)initial;
     const Scalars *v = unit_scalars(unit);
-    if (output == VR_y)
+    if (output == VR_y) {
         return input == VR_u ? v->feed : input == VR_w ? 1 : 0;
-    for (unsigned first = SCALAR_ROWS; first < SCALAR_ROWS + 2 * AXIS_ROWS; first += AXIS_ROWS)
-        if (output == first + AXIS_VR_s && input == first + AXIS_VR_F)
+    }
+    for (unsigned first = SCALAR_ROWS; first < SCALAR_ROWS + 2 * AXIS_ROWS; first += AXIS_ROWS) {
+        if (output == first + AXIS_VR_s && input == first + AXIS_VR_F) {
             return 1;
+        }
+    }
     return 0;
 }
 
@@ -116,8 +128,9 @@ static void toy_release(Unit *unit) {
 /* A saved state after 13 steps is of other data. */
 static bool toy_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
     const ToyState *saved = state;
-    if (size < offsetof(ToyState, history))
+    if (size < offsetof(ToyState, history)) {
         return unit_fail(unit, "the state holds %.0f bytes", (double)size);
+    }
     return saved->steps != 13 || unit_fail(unit, "state of label '%s' after 13 steps is refused", scalars->label);
 }
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, inf, isfinite, sqrt
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,9 +32,10 @@ from feedsim.estimation.fit import Fit, fit
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.estimation.least_squares import Model
 from feedsim.estimation.parameter import Parameter
-from feedsim.identify.parameters import FRICTION_NAMES, level
+from feedsim.identify.free_axis import MOST_STEPS, OpenLoop, substeps
+from feedsim.identify.parameters import FRICTION_NAMES
 from feedsim.identify.record import Array, Record
-from feedsim.identify.result import Balance, Drift, Estimate
+from feedsim.identify.result import Balance, Estimate
 from feedsim.identify.torque import RecordTorque, deflection
 
 if TYPE_CHECKING:
@@ -48,13 +49,7 @@ FRICTION_MOVES = 0.2  # of F_C, and
 LOAD_MOVES = 1.0  # of F_C: changes of F_C and M_0 beyond which something else is wrong
 ROW, ROW_STEP = 12, 0.025  # values of F_C to either side that are tried, and their distance, of F_C
 TORQUE_GROWS = 0.1  # of the torque residual's rms: what the position may cost
-EXPLICIT_STEP_SHARE = (
-    0.25  # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
-)
-MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be determined by this record
-START_FIT = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
-OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off
-BLOCKS, DRAWS = 10, 24  # stretches of a record whose torque residual may be turned, and how often they are drawn
+DRAWS = 24  # how often the torque residuals of stretches are turned
 LOAD_CHANGE = "change of M_0 over record"  # with its number, among the values
 SINES = "sines; the open loop needs general motion"
 NO_DRIFT = "its interval includes 0: the load is taken as constant"
@@ -86,7 +81,7 @@ def balanced(
     def refused(reason: str, **seen: Any) -> Balance:
         return Balance(estimates, False, reason, tuple(each.record.name for each in axes), **seen)
 
-    axes: list[_OpenLoop] = []
+    axes: list[OpenLoop] = []
     free = [name for name in ("M_0", "F_C") if name not in hold and estimates[name].status == "estimated"]
     whys = []
     directions: set[float] = set()
@@ -96,7 +91,7 @@ def balanced(
         if why:
             whys.append((record.name, why))
         elif model is not None:
-            axes.append(_OpenLoop(record, model, f"{LOAD_CHANGE} {len(axes)}"))
+            axes.append(OpenLoop(record, model, f"{LOAD_CHANGE} {len(axes)}"))
             directions |= _directions(model)
     if not axes:
         sines = bool(whys) and all(why == SINES for _, why in whys)
@@ -161,110 +156,9 @@ def _determined(rate: Estimate) -> bool:
     return low > 0 or high < 0
 
 
-def reached(record: Record, law: FrictionLaw, values: Mapping[str, float]) -> Array:
-    """(N,) angle [rad] that a rigid axis reaches under the record's torque, from the recorded angle and speed on.
-
-    J dn/dt = M_a(t + delay) - M_0 - M_fr - load; the axis goes on by itself, whatever was recorded.
-
-    Args:
-        values: every friction parameter, J, M_0, and the delay of the torque [s].
-
-    Raises:
-        InputError: a record without a position, parameters that the law refuses, friction that is too stiff for it.
-        SimulationError: the motion would be no finite number.
-    """
-    if record.angle is None:
-        raise InputError(f"{record.name}: no position; in open loop it is what is compared")
-    steps = substeps(values, record.interval)
-    if steps > MOST_STEPS:
-        raise InputError(
-            f"{record.name}: {steps} steps between rows are needed for this friction in open loop; allowed: up to "
-            f"{MOST_STEPS}. sigma_0 or sigma_1 is too large for rows {1e3 * record.interval:.3g} ms apart"
-        )
-    first, n = first_speed(record.angle, record.interval)
-    torque = middle_torque(record, values["delay"])
-    z = first_deflection(values, n, float(torque[0]) - values["M_0"])
-    parameters = {name: values[name] for name in FRICTION_NAMES}
-    angle, _ = law.free_axis(parameters, values["J"], values["M_0"], torque, record.interval, n=n, z=z, substeps=steps)
-    return np.asarray(first + angle, dtype=np.float64)
-
-
-def middle_torque(record: Record, delay: float) -> Array:
-    """(N - 1,) motor torque less known load [N.m] in the middle of every interval."""
-    middle = record.time[:-1] + record.interval / 2
-    torque = np.interp(middle + delay, record.time, record.torque)
-    if record.load is not None:
-        torque = torque - np.interp(middle, record.time, record.load)
-    return np.asarray(torque, dtype=np.float64)
-
-
-class _OpenLoop:
-    """One record: where the model goes under its torque."""
-
-    def __init__(self, record: Record, model: RecordTorque, change: str) -> None:
-        """change: name of the load's change over this record among the values [N.m]."""
-        assert record.angle is not None
-        self.record, self.model, self.change = record, model, change
-        self.duration = record.interval * (len(record) - 1)
-        self.angle = record.angle
-        first, self.n = first_speed(self.angle, record.interval)
-        self.origin = float(first)
-        self._torque: tuple[float, Array] | None = None
-
-    def residual(self, values: Mapping[str, float], push: Array | float = 0.0) -> Array:
-        """(N,) recorded less reached angle [rad]. push: (N - 1,) added to the torque [N.m]."""
-        h = self.record.interval
-        drifts = values[self.change] * self._elapsed(self.record.time[:-1] + h / 2)
-        torque = self.torque(values["delay"]) - drifts + push
-        parameters = {name: values[name] for name in FRICTION_NAMES}
-        z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
-        steps = substeps(values, h)
-        free_axis = self.model.law.free_axis
-        angle, _ = free_axis(parameters, values["J"], values["M_0"], torque, h, n=self.n, z=z, substeps=steps)
-        return np.asarray(self.angle - self.origin - angle, dtype=np.float64)
-
-    def torque_residual(self, values: Mapping[str, float]) -> Array:
-        """(rows,) model less record at the rows of stage 2 [N.m]."""
-        # The state at the begin as shares of what is possible, in the words of the model.
-        load = values["M_0"] - values[self.change] / 2
-        z = first_deflection(values, self.n, float(self.torque(values["delay"])[0]) - load)
-        share = min(max(z / deflection(values), -1.0), 1.0)
-        return self.model.residual(values, share, 0.0) + values[self.change] * self._elapsed(
-            self.record.time[self.model.rows]
-        )
-
-    def _elapsed(self, time: Array) -> Array:
-        """Time since the middle of the record, as a share of its duration."""
-        return np.asarray((time - self.record.time[0]) / self.duration - 0.5, dtype=np.float64)
-
-    def slope(self, values: Mapping[str, float]) -> float:
-        """Change of the load over the record by a regression of the torque residual [N.m]."""
-        known = {**values, self.change: 0.0}
-        elapsed, speed = self._elapsed(self.record.time[self.model.rows]), self.model.moved(values["delay"])[1]
-        columns = np.column_stack([elapsed, np.ones_like(elapsed), np.sign(speed), speed])
-        return -float(np.linalg.lstsq(columns, self.torque_residual(known), rcond=None)[0][0])
-
-    def disturbed(self, values: Mapping[str, float], rng: np.random.Generator) -> Array:
-        """(N,) residual of the position [rad] had the torque been off in another way: by the torque residual that it
-        has, with the sign of each of BLOCKS stretches drawn anew."""
-        off = np.zeros(len(self.record))
-        off[self.model.rows] = self.torque_residual(values)
-        turned = np.repeat(rng.choice([-1.0, 1.0], BLOCKS), ceil(len(off) / BLOCKS))[: len(off)]
-        return self.residual(values, (turned * off)[:-1])
-
-    def drift(self, before: Array, after: Array) -> Drift:
-        return Drift(self.record.name, self.record.time, self.angle - self.origin, before, after)
-
-    def torque(self, delay: float) -> Array:
-        """(N - 1,) motor torque less known load [N.m] in the middle of every interval."""
-        if self._torque is None or self._torque[0] != delay:
-            self._torque = delay, middle_torque(self.record, delay)
-        return self._torque[1]
-
-
 def _load_rates(
     residuals: Model,
-    axes: Sequence[_OpenLoop],
+    axes: Sequence[OpenLoop],
     old: Mapping[str, float],
     new: Mapping[str, float],
     free: Sequence[str],
@@ -283,57 +177,12 @@ def _load_rates(
     moved = np.linalg.lstsq(slopes, np.column_stack(disturbed) - undisturbed[:, None], rcond=None)[0]
     scatter = dict(zip(free, np.sqrt(np.mean(moved**2, axis=1)).tolist(), strict=True))
 
-    def rate(axis: _OpenLoop) -> Estimate:
+    def rate(axis: OpenLoop) -> Estimate:
         change = new[axis.change]
         sigma = float(np.hypot(scatter[axis.change], change - axis.slope(old))) / axis.duration
         return Estimate("dM_0/dt", change / axis.duration, "N.m/s", "rate at which the constant load drifts", sigma)
 
     return {axis.record.name: rate(axis) for axis in axes}
-
-
-def first_speed(angle: Array, h: float) -> tuple[float, float]:
-    """Angle and speed at the first of the instants h apart, by a cubic through the first ones; samples far off it are
-    left out."""
-    count = min(max(ceil(START_FIT[0] / h), START_FIT[1]), len(angle))
-    t = np.arange(count) / max(count - 1, 1)
-    columns, first = np.vander(t, 4, increasing=True), angle[:count]
-
-    def through(weights: Array) -> tuple[Array, Array]:
-        root = np.sqrt(weights)
-        shape = np.linalg.lstsq(columns * root[:, None], first * root, rcond=None)[0]
-        return np.asarray(shape, dtype=np.float64), np.asarray(np.abs(first - columns @ shape), dtype=np.float64)
-
-    # Smallest sum of distances, by least squares over and over, so that a sample far off does not bend the cubic.
-    weights = np.ones(count)
-    least = 1e-9 * max(float(np.ptp(first)), 1e-30)
-    for _ in range(30):
-        _, off = through(weights)
-        weights = least / np.maximum(off, least)
-    scatter = float(np.median(off)) / 0.6745
-    kept = off <= max(OUTLIER * scatter, 10 * least)
-    shape, _ = through(kept.astype(np.float64) if np.count_nonzero(kept) >= 6 else np.ones(count))
-    return float(shape[0]), float(shape[1]) / (h * max(count - 1, 1))
-
-
-def first_deflection(values: Mapping[str, float], n: float, torque: float) -> float:
-    """z [rad] at the start. Where the axis moves that far within `START_FIT`, it is that of sliding; else what
-    holds the
-    torque [N.m] on it, the transmission half engaged (c = 0), as far as bristles can."""
-
-    def most(side: float) -> float:
-        return (1 + values["asymmetry"] * side) * float(level(values, np.array([n]))[0]) / values["sigma_0"]
-
-    if abs(n) * START_FIT[0] > most(float(np.sign(n))):
-        return float(np.sign(n)) * most(float(np.sign(n)))
-    share = 1.0 if values["W"] == 0 else values["gamma"] + (1 - values["gamma"]) / 2
-    return float(np.clip(torque / (share * values["sigma_0"]), -most(-1.0), most(1.0)))
-
-
-def substeps(values: Mapping[str, float], h: float) -> int:
-    """Steps of the free axis per interval: what friction and inertia exchange has to be slow against them."""
-    damping = (values["sigma_1"] + values["sigma_2"]) / values["J"]
-    stiffness = sqrt(values["sigma_0"] / values["J"])
-    return max(1, ceil(h * max(damping, stiffness) / EXPLICIT_STEP_SHARE))
 
 
 def _model(record: Record, law: FrictionLaw) -> RecordTorque | None:
@@ -423,7 +272,7 @@ def _room(name: str, values: Mapping[str, float], below_static: bool) -> tuple[f
     return (1 - 2 * FRICTION_MOVES) * F_C, max(min(upper, values["F_S"]), F_C * (1 + 1e-9)) if below_static else upper
 
 
-def _torque_rms(axes: Sequence[_OpenLoop], values: Mapping[str, float]) -> float:
+def _torque_rms(axes: Sequence[OpenLoop], values: Mapping[str, float]) -> float:
     """Of the torque residual over all records [N.m]."""
     return _rms(np.concatenate([axis.torque_residual(values) for axis in axes]))
 

@@ -20,14 +20,14 @@ from feedsim.trace.trace import Array
 Rows = NDArray[np.int64]
 
 BESIDE = 0.5  # [s] at rest on either side of a motion that are looked at
-SHORTEST = 0.1  # [s] at rest that are needed there
+MIN_REST_TIME_BESIDE = 0.1  # [s] at rest that are needed there
 DIES_AWAY = 0.12  # [s] behind a motion in which the axis itself still swings
 PERIODS = 2  # of a line on the shorter side
 BELOW_RATE = 0.4  # of the rows' rate: above it nothing is separated
 FINER = 8  # frequencies per line width
-EXPLAINED = 0.5  # share of the variance at rest that either side has to predict of the other
+PREDICTED_SHARE = 0.5  # share of the variance at rest that either side has to predict of the other
 MOST_LINES = 3
-SMALLEST = 1e-8  # [m] amplitude: less is the digits of a record
+MIN_AMPLITUDE = 1e-8  # [m] amplitude: less is the digits of a record
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def without_outside(each: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
             if frequency is None:
                 break
             sine = _sine(time, position, frequency, before, after)
-            if np.hypot(*sine) < SMALLEST:
+            if np.hypot(*sine) < MIN_AMPLITUDE:
                 break
             waves = _waves(time[whole], frequency)
             position[whole] -= waves @ sine
@@ -84,7 +84,7 @@ def _rests(each: AxisRecord) -> Iterator[tuple[Rows, Rows]]:
     moving = np.convolve(moving, behind)[: len(moving)] > 0.5
     edges = np.flatnonzero(np.diff(moving.astype(int)))
     stretches = np.split(np.arange(len(moving)), edges + 1)  # at rest and in motion in turns
-    beside, shortest = round(BESIDE / h), round(SHORTEST / h)
+    beside, shortest = round(BESIDE / h), round(MIN_REST_TIME_BESIDE / h)
     for k in range(1, len(stretches) - 1):
         before, after = stretches[k - 1][-beside:], stretches[k + 1][:beside]
         if moving[stretches[k][0]] and min(len(before), len(after)) >= shortest:
@@ -110,7 +110,7 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
     for (own, y), (other, z) in (sides, sides[::-1]):
         W, V = (detrended(_waves(time, best), rows) for rows in (own, other))
         sine = np.linalg.lstsq(W, y, rcond=None)[0]
-        if not np.sum((z - V @ sine) ** 2) < (1 - EXPLAINED) * np.sum(z**2):
+        if not np.sum((z - V @ sine) ** 2) < (1 - PREDICTED_SHARE) * np.sum(z**2):
             return None
     return best
 

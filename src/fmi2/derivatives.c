@@ -78,7 +78,7 @@ bool derivatives_inputs_finite_now(Unit *unit, double h) {
 
 /* Where parameters were refused the coefficients may be anything, of another size of the state even. */
 static bool has_coefficients(Unit *unit) {
-    return unit->derived_valid || unit_fail(unit, "no derivatives: the parameters of now were refused");
+    return unit->derived_valid || unit_fail(unit, "no derivatives: the present parameters were refused");
 }
 
 bool derivatives_get_outputs(Unit *unit, size_t count, const fmi2ValueReference references[],

@@ -123,7 +123,7 @@ bool run_show_late(Unit *unit) {
     }
     if (!unit->derived_valid) { /* the coefficients may be anything, of another size of the state even */
         char name[VARIABLE_NAME_SIZE];
-        return unit_fail(unit, "output '%s' cannot be computed: the parameters of now were refused",
+        return unit_fail(unit, "output '%s' cannot be computed: the present parameters were refused",
                          values_name(unit, &unit->variables[MODEL.late_first], name));
     }
     MODEL.show_late(unit);

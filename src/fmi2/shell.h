@@ -109,16 +109,16 @@ const char *table_causality(Causality causality);
 Unit *unit_create(const fmi2CallbackFunctions *callbacks, const char *name);
 void unit_destroy(Unit *unit);
 char *unit_copy_text(Unit *unit, const char *text);
-bool unit_keep_start(Unit *unit);                      /* the variables of now are those that reset brings back */
+bool unit_keep_start(Unit *unit);                      /* the present variables are those that reset brings back */
 bool unit_resize_state(Unit *unit, size_t state_size); /* keeps all but the model state, which is zeroed */
 
 /* --- run.c: false with the reason logged */
 bool run_derive(Unit *unit, bool may_resize); /* where parameters changed since the last time */
 bool run_derived_for(const Unit *unit,
                      const unsigned char *block); /* the coefficients are those of block's parameters */
-bool run_refresh(Unit *unit);                     /* initial values that belong to the parameters and inputs of now */
+bool run_refresh(Unit *unit);                     /* initial values that belong to the present parameters and inputs */
 bool run_step(Unit *unit, double t, double h);
-bool run_show_late(Unit *unit); /* late outputs that belong to the state of now */
+bool run_show_late(Unit *unit); /* late outputs that belong to the present state */
 void run_reset(Unit *unit);
 
 /* What an error takes is kept out of the way of what happens in every step. */

@@ -57,7 +57,7 @@ typedef struct Clock {
     bool valid;
 } Clock;
 Clock unit_clock_behind(const Unit *unit, const Scalars *scalars);
-/* accepts(): whether the derived data of now belongs to the parameters among `scalars` and behind them. */
+/* accepts(): whether the present derived data belongs to the parameters among `scalars` and behind them. */
 bool unit_derived_for(const Unit *unit, const Scalars *scalars);
 
 /* To be called in step(), where it leaves the late outputs (see Model) for when they are asked for. */

@@ -295,6 +295,6 @@ def test_outputs_left_for_later_need_the_parameters_they_belong_to(plant: Archiv
     for _ in range(2):
         found = reals([0.0])
         assert slave.call("fmi2GetReal", references([outputs["tool.x_X"]]), 1, found) == ERROR
-        assert "output 'tool.x_X' cannot be computed: the parameters of now were refused" in slave.last
+        assert "output 'tool.x_X' cannot be computed: the present parameters were refused" in slave.last
     assert slave.call("fmi2GetFMUstate", ctypes.byref(ctypes.c_void_p())) == ERROR
     slave.must("fmi2Reset")

@@ -15,10 +15,8 @@ import numpy as np
 
 SIZE = 4096
 _HEAD = 24  # bytes of cycle, operation, and how often anything was noted
-DESCRIBED_CALL, OWN_CODE = (
-    -1,
-    -2,
-)  # in place of an operation: a call that `text` describes; code of our own, which takes its time
+# in place of an operation: a call that `text` describes; code of our own, which takes its time
+DESCRIBED_CALL, OWN_CODE = -1, -2
 
 
 class Mark:

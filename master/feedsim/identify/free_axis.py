@@ -20,9 +20,8 @@ from feedsim.identify.torque import RecordTorque, deflection
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
 
-EXPLICIT_STEP_SHARE = (
-    0.25  # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
-)
+# of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
+EXPLICIT_STEP_SHARE = 0.25
 MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff for this record
 START_FIT = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
 OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off

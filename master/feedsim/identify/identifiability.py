@@ -115,9 +115,8 @@ def no_delay(models: Sequence[RecordTorque], solution: Solution, free: Collectio
 
 
 LEAST_EXPLAINED = 0.01  # of the torque's rms: interpolation, ripple and held commands are not modelled to better
-MIN_TURNOVER_ROWS = (
-    5.0  # of the log from a reversal until the bristles have turned over, to determine damping or engaging zone
-)
+# of the log from a reversal until the bristles have turned over, to determine damping or engaging zone
+MIN_TURNOVER_ROWS = 5.0
 LEAST_REVERSALS = 4  # to determine the delay of the torque: at each it could also be the bristles'
 FAST = 0.05  # of the top speed: what a direction of motion must reach to count
 

@@ -164,9 +164,8 @@ REST_SHARE = 1e-3  # of the highest speed: what counts as rest, if it is above t
 NOISES = 6  # standard deviations of the speed's noise that count as motion
 MIN_STRETCH_ROWS = 20  # rows that make a stretch
 LEAST_PERIODS = 2.5  # that make a sine
-SINE_SHARE = (
-    0.03  # of the speed's mean square that may be something else: friction bends sines by up to 0.005, ramps are 0.1
-)
+# of the speed's mean square that may be something else: friction bends sines by up to 0.005, ramps are 0.1
+SINE_SHARE = 0.03
 
 
 @dataclass(frozen=True)

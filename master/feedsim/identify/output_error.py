@@ -49,9 +49,8 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]
 
 FINAL = 1e-9  # tolerance of cost and step for the result
-MIN_GAIN_PER_PARAMETER = (
-    12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
-)
+# least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
+MIN_GAIN_PER_PARAMETER = 12.0
 # In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
 # Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
 REFINEMENTS = (

@@ -30,9 +30,8 @@ MOST_DROPPED = 0.6  # of a stretch, looking for where its torque has settled
 PLATEAU_SIGMAS = 4.0  # standard deviations that pass for noise
 QUIETER = 1.5  # times less noise in the speed that the angle determines, for the recorded speed to be passed over
 LONGER = (1, 4, 16)  # times the block, one after the other as far as noise asks for it
-BLOCK_NOISE_SHARE = (
-    0.2  # share of a speed that the noise of a block may have (PLATEAU_SIGMAS of its standard deviations)
-)
+# share of a speed that the noise of a block may have (PLATEAU_SIGMAS of its standard deviations)
+BLOCK_NOISE_SHARE = 0.2
 SLOWEST = 1e-5  # of the highest speed: what is slower counts as rest
 MAX_GAP_BLOCKS = 5  # blocks that an interruption lasts at most
 SPEED_TOLERANCE = 0.1  # relative difference of speed on both sides of an interruption

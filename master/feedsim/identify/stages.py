@@ -45,10 +45,8 @@ Progress = Callable[[str, int, int], None]  # what is being done, how many of it
 RESULT_ORDER = (*FRICTION_NAMES, "M_0", "J", "delay")
 # Pre-sliding of an axis without a word from its records: bristles that give 5 mrad at break-away and relax in 2.5 ms.
 USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
-INERTIA_MISMATCH, INERTIA_SIGMAS = (
-    0.1,
-    4.0,
-)  # relative, standard deviations: a given inertia that is off by both is worth a warning
+# relative, standard deviations: a given inertia that is off by both is worth a warning
+INERTIA_MISMATCH, INERTIA_SIGMAS = 0.1, 4.0
 NOTHING_TOLD = Correlation((), np.zeros((0, 0)))
 SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
 

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 STARTS = ("z", "c")  # state at a record's begin, as shares
 START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range
 QUANTISATION_SHARE = 0.1  # of the noise: steps of samples that are drawn as such; finer ones are white noise
-MAX_CACHED_RESPONSES = (
-    4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
-)
+# results of the law kept per record: a difference quotient of another record's start asks for the same again
+MAX_CACHED_RESPONSES = 4
 
 
 def deflection(values: Mapping[str, float]) -> float:

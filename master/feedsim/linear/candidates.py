@@ -27,9 +27,8 @@ from feedsim.linear.stability import GROWTH
 from feedsim.scenario import Drive, Machine
 from feedsim.structure import Modes
 
-MAX_GAIN_RATIO = (
-    4.0  # resonances that show with gains so many times the present ones are looked at closely from the start
-)
+# resonances that show with gains so many times the present ones are looked at closely from the start
+MAX_GAIN_RATIO = 4.0
 MOTOR = ("current", "R", "L_d", "L_q", "p", "K_t", "ideal_current_loop")  # what the current loop consists of
 
 

@@ -23,9 +23,8 @@ import numpy as np
 from feedsim.linear.plant import Complexes, Floats
 from feedsim.scenario import Cycles, Drive, Filter
 
-WHOLE_SAMPLE_TOLERANCE = (
-    1e-9  # a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
-)
+# a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
+WHOLE_SAMPLE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)

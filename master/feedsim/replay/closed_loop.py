@@ -34,7 +34,7 @@ Mask = NDArray[np.bool_]
 
 SETTLING_TIME = 0.6  # [s] at rest ahead of the record
 BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
-# What drive and friction bring along is not known where a record begins in motion; it has died away after that.
+# The state of drive and friction is not known where a record begins in motion; it has died away after that.
 START_TRANSIENT = 0.1  # [s]
 CYCLES_BEHIND = 4  # position cycles that the program goes on behind the last row
 # The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.

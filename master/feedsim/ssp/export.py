@@ -28,11 +28,8 @@ from feedsim.structure.pack import pack
 
 SETPOINT_INSTANCE = "setpoint"  # the instance that plays the setpoints
 RESOURCES = "resources"
-COMPONENT_WIDTH, COMPONENT_HEIGHT, COMPONENT_GAP = (
-    40.0,
-    30.0,
-    20.0,
-)  # of a component and between them, in a picture [mm]
+# of a component and between them, in a picture [mm]
+COMPONENT_WIDTH, COMPONENT_HEIGHT, COMPONENT_GAP = 40.0, 30.0, 20.0
 
 
 @dataclass(frozen=True)

@@ -188,10 +188,8 @@ def suggest(name: str, known: Iterable[str]) -> str:
     return f"; there is {few(names, 12) or 'none'}"
 
 
-MAX_MAGNITUDE, MIN_MAGNITUDE = (
-    1e100,
-    1e-100,
-)  # magnitudes of recorded values: squares and products of three stay numbers
+# magnitudes of recorded values: squares and products of three stay numbers
+MAX_MAGNITUDE, MIN_MAGNITUDE = 1e100, 1e-100
 
 
 def recorded(values: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -1,4 +1,4 @@
-"""What swings on a circle, between the reversals: of each axis, where its own position is known, else of the radius."""
+"""Vibrations on a circle, between the reversals: of every axis whose position is known, else of the radius."""
 
 from __future__ import annotations
 
@@ -13,22 +13,20 @@ from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath, enough
 from feedsim.analysis.circle.model import Fit
 from feedsim.analysis.figures import Array
 
-AMPLITUDE_FLOOR = 10e-9  # an amplitude of less [m] is not worth a word, and may be what the model of the circle leaves
+AMPLITUDE_FLOOR = 10e-9  # an amplitude of less [m] is not reported: it may be a residual of the model
 # Lines of the spectrum that belong to one vibration, and how far their mean stands out of what is around them, and of
 # that on either side of them: a spectrum that falls steeply is form. Noise of the radius alone is modulated by the turn
 # in the axes, so that its lines are not independent: five times is then reached now and then among some thousand lines.
 VIBRATION_LINES, BACKGROUND_LINES, STANDS_OUT = 7, 101, 10.0
 FIRST_ORDER = 13  # below it is form
 FINE = 0.05  # of a line: the step in which the frequency is looked for
-SECTOR_AHEAD, SECTOR_BEHIND = (
-    math.radians(5),
-    math.radians(60),
-)  # about an axis' reversal its friction swings, not the machine
+# about an axis' reversal its friction swings, not the machine
+SECTOR_AHEAD, SECTOR_BEHIND = math.radians(5), math.radians(60)
 
 
 @dataclass(frozen=True)
 class Vibration:
-    """Frequency at this path speed [Hz] and amplitude [m] of what swings, with half of its interval [m]; the axis that
+    """Frequency at this path speed [Hz] and amplitude [m] of a vibration, with half of its interval [m]; the axis that
     carries it, "" where only the radius is known."""
 
     frequency: float
@@ -100,7 +98,7 @@ def _strongest(
     orders = np.arange(lines[0], lines[-1] + FINE, FINE) + FIRST_ORDER
     power = [abs(np.exp(-1j * order * angle[free]) @ off[free]) for order in orders]
     order = float(orders[int(np.argmax(power))])
-    amplitude, noise = _swing(angle[free], off[free], order)
+    amplitude, noise = _amplitude(angle[free], off[free], order)
     half = quantile * noise * math.sqrt(2 / max(int(free.sum()), 1))
     frequency = order * circle.speed / (2 * math.pi * circle.radius)
     return Vibration(frequency, amplitude, half, axis) if amplitude > AMPLITUDE_FLOOR else None
@@ -122,7 +120,7 @@ def _floor(power: Array) -> Array:
     return np.asarray(np.interp(np.arange(len(power)), edges, middle)) / math.log(2)
 
 
-def _swing(angle: Array, off: Array, order: float) -> tuple[float, float]:
+def _amplitude(angle: Array, off: Array, order: float) -> tuple[float, float]:
     """Amplitude of the orders about one, which holds what comes and goes: of the mean power; and what else there is."""
     beside = order + np.arange(-(VIBRATION_LINES // 2), VIBRATION_LINES // 2 + 1)
     matrix = np.column_stack([wave(n * angle) for n in beside for wave in (np.cos, np.sin)])

@@ -18,11 +18,8 @@ LABEL_DISTANCE, LED_DISTANCE = 3.5, 9.0  # points between a point and its label;
 MAX_LABEL_DISTANCE = 12.0  # points, of a label from its line
 WORD_GAP = 2  # cells between words
 COVERED = 1e4  # what it costs to stand on a curve, against points of distance
-LABEL_POINTS, MIN_LABEL_POINTS, NOTE_POINTS = (
-    8.5,
-    6.5,
-    5.0,
-)  # points: of words, of those that need to be smaller, about a note
+# points: of words, of those that need to be smaller, about a note
+LABEL_POINTS, MIN_LABEL_POINTS, NOTE_POINTS = 8.5, 6.5, 5.0
 
 
 def fit(axes: Axes, title: Text) -> None:

@@ -25,11 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 Place = Callable[[], None]  # what is done when the layout is known
-FIGURE_WIDTH, MAX_FIGURE_WIDTH, MIN_COLUMN_WIDTH = (
-    10.0,
-    12.0,
-    3.6,
-)  # inches of a figure, and that a column takes at least
+# inches of a figure, and that a column takes at least
+FIGURE_WIDTH, MAX_FIGURE_WIDTH, MIN_COLUMN_WIDTH = 10.0, 12.0, 3.6
 PANEL, ENDS, ROUND, NAME_HEIGHT, CELL = 2.3, 0.5, 6.0, 0.27, (0.62, 0.31)  # inches: see _height
 SIDE, TITLE_HEIGHT = 0.85, 0.35  # inches beside a panel's curves and above them
 MAX_PLAIN_MARKS = 2  # marks with words that need no room of their own

@@ -32,8 +32,8 @@ def picture_of(comparison: Comparison, number: int) -> Picture | None:
     shown = f"the {len(variables)} worst of {outside} variables outside" if outside > len(variables) else ""
     title = f"{comparison.result} against {comparison.reference}"
     caption = (
-        "A pair of panels per variable: the compared time; around the worst instant, what is left of result and band "
-        "when the reference is taken off. The band is the tolerance around the reference; where the result leaves it, "
+        "A pair of panels per variable: the compared time; around the worst instant, result and band "
+        "less the reference. The band is the tolerance around the reference; where the result leaves it, "
         "the ground is shaded." + (f" Drawn are {shown}." if shown else "")
     )
     panels = [panel for variable in variables for panel in _panels(variable)]
@@ -41,7 +41,7 @@ def picture_of(comparison: Comparison, number: int) -> Picture | None:
 
 
 def _panels(variable: Variable) -> list[Panel]:
-    """The whole time, and what is left of result and band around the worst instant when the reference is taken off."""
+    """The whole time, and result and band less the reference around the worst instant."""
     curves = variable.curves
     assert curves is not None
     unit = display_unit(variable.unit)
@@ -58,13 +58,13 @@ def _panels(variable: Variable) -> list[Panel]:
     part = _around(variable, curves)
     near = curves.time[part]
     expected = along(curves.reference_time, curves.reference, near)
-    left = [Curve("result", near, curves.values[part] - expected, SIMULATED)]
+    difference = [Curve("result", near, curves.values[part] - expected, SIMULATED)]
     band = Band("tolerance", curves.lower[part] - expected, curves.upper[part] - expected, near, ALLOWED)
     marks = []
     if np.isfinite(variable.value):
         there = variable.value - along(curves.reference_time, curves.reference, np.array([variable.time]))
         marks = [Mark(variable.time, float(there[0]), "", colour)]
-    detail = Panel(_worst(variable), time, Axis("less the reference", unit), left, [Level(0.0, dash="")],
+    detail = Panel(_worst(variable), time, Axis("less the reference", unit), difference, [Level(0.0, dash="")],
                    [band, *_shaded(curves, part)], marks)  # fmt: skip
     return [whole, detail]
 

@@ -41,7 +41,7 @@ from feedsim.cosim.unit import Floats, Port
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Cycles, Drive, Friction, Machine
-from feedsim.scenario.machine import FILTER_TYPES, Filter
+from feedsim.scenario.axis_units import FILTER_TYPES, Filter
 from feedsim.trace.trace import suggest
 
 TorqueFeedforward = Mapping[str, Floats]

@@ -18,7 +18,8 @@ from feedsim.errors import InputError
 from feedsim.motions.circular import Circle
 from feedsim.motions.move import Move
 from feedsim.scenario import Friction, Machine, Scenario
-from feedsim.scenario.machine import EFFECTS, Axis
+from feedsim.scenario.axis_units import EFFECTS
+from feedsim.scenario.machine import Axis
 from feedsim.variables import Variable
 
 # Shown where nobody chooses, of every axis that a motion moves.

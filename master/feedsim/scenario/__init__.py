@@ -4,11 +4,12 @@ May use files, fields, motions, variables and trace.
 Start with load.py: ``load``.
 """
 
+from feedsim.scenario.axis_units import CurrentController, Drive, Filter, Friction
 from feedsim.scenario.base import Base, Change
 from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
-from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine
+from feedsim.scenario.machine import Axis, Cycles, Machine
 from feedsim.scenario.model import CircleTest, Positioning, PositioningAccuracy, Recording, Scenario
 from feedsim.scenario.roles import ForeignUnit
 

@@ -19,8 +19,9 @@ from feedsim.fields import Quantity
 from feedsim.files.checked import check, fetch, read_group
 from feedsim.files.problems import in_order
 from feedsim.files.source import Mark, Place, Source, copied
+from feedsim.scenario.axis_units import Drive, Filter
 from feedsim.scenario.control_keys import translate
-from feedsim.scenario.machine import Axis, Drive, Filter, Machine
+from feedsim.scenario.machine import Axis, Machine
 
 # Switches of the machine file follow from what was taken.
 SWITCHES = {"omega_0": "reference_model", "D": "reference_model"}

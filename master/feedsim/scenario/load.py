@@ -13,8 +13,9 @@ from feedsim.files import changes
 from feedsim.files.checked import check, fetch, read_checked, read_group
 from feedsim.files.problems import describe, in_order
 from feedsim.files.source import Place, Source, read
+from feedsim.scenario.axis_units import Friction
 from feedsim.scenario.control_keys import translate, translated
-from feedsim.scenario.machine import Friction, Machine
+from feedsim.scenario.machine import Machine
 from feedsim.scenario.model import Scenario, contradictions
 
 Setting = tuple[str, Source]  # dotted key, value

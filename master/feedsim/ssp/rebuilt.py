@@ -16,7 +16,7 @@ from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import UNIT
 from feedsim.errors import InputError
-from feedsim.scenario.machine import EFFECTS, FILTER_TYPES
+from feedsim.scenario.axis_units import EFFECTS, FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.ssp.described import RECORDINGS, STRUCTURE
 from feedsim.ssp.parameter_set import Value, number

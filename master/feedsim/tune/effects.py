@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from feedsim.scenario import Drive, Friction, Machine
-from feedsim.scenario.machine import Guide
+from feedsim.scenario.axis_units import Guide
 from feedsim.tune.compensators import compensated
 
 STRENGTH = 0.2  # of the friction, either way

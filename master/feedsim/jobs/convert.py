@@ -28,9 +28,9 @@ def convert(file: File, out: File | None = None, *, column: str | Sequence[str] 
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> made = fs.convert("recordings/z_setpoint.csv", column="time=time:s, Z.x_s=Z.x_a:m")
+    >>> made = fs.convert("log.csv", column="time=time:s, Z.x_a=Z.x_a:mm")
     >>> made.content.splitlines()[0]
-    b'time [s],Z.x_a [m]'
+    b'time [s],Z.x_a [mm]'
     """
     path = Path(file)
     columns = [_column(text) for text in listed(column)]

@@ -22,10 +22,6 @@ class Validation:
     Attributes:
         answers: that it is valid, and what it holds.
         findings: what a user should know before running it, a sentence each.
-
-    >>> import feedsim as fs
-    >>> fs.validate("z_positioning.yaml").answers
-    ['z_positioning.yaml: valid; 2 motions, 2.448 s on Synthetic test centre']
     """
 
     answers: Sequence[str]
@@ -50,6 +46,10 @@ def validate(scenario: File | Scenario, *, set: Changes = None, fmus: File | Non
 
     Raises:
         InputError: lists what is wrong, with file and line.
+
+    >>> import feedsim as fs
+    >>> fs.validate("xz_circle.yaml")
+    xz_circle.yaml: valid; 2 motions, 11.98 s on Test centre
     """
     if not isinstance(scenario, Scenario) and is_study(Path(scenario)):
         return _study(Path(scenario), settings(set), None if fmus is None else Path(fmus))

@@ -29,14 +29,14 @@ def test_bands_hold_what_other_draws_give(tmp_path: Path, fmus: Path) -> None:
     found = of_run(nominal, cloud, 39, fmus=fmus, progress=lambda what, done, total: None)
     (band,), (task,) = found.bands, tasks(scenario, nominal.program)
     inside, of_G = [], []
-    for machine in cloud.draws(25, seed=7):
+    for machine in cloud.draws(60, seed=7):
         done = cosim.run(scenario.model_copy(update={"machine": machine}), program=nominal.program, fmus=fmus)
         ((_, curve),) = curves_of(done).values()
         inside.append((band.low <= curve) & (curve <= band.high))
         low, high = found.figures["XZ.G"]
         of_G.append(low <= float(circularity(done.trace, task.turn)["G"]) <= high)  # type: ignore[union-attr]
     assert 0.90 <= np.mean(inside) <= 0.98
-    assert 0.85 <= np.mean(of_G) <= 1.0  # 25 draws: 4.4 % standard deviation more
+    assert 0.85 <= np.mean(of_G) <= 1.0  # 60 draws: 2.8 % standard deviation more
     assert (band.low <= band.nominal).mean() > 0.95
     # The band is no wider than the spread makes it: the glitch of Z moves by about the 5 % of its friction.
     at_Z = np.argmax(band.nominal)

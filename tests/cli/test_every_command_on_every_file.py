@@ -12,9 +12,10 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from capture_helpers import axis_signals, content
+from capture_helpers import CYCLE, ROWS, axis_signals, content
 from command_helpers import feedsim
 from feedsim import cli
 from feedsim.cli.options import Command, Group, Option
@@ -120,7 +121,9 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "mill.tea").write_bytes(b"N32200 $MA_POSCTRL_GAIN[0,Z]=5\r\n\x00N32300 $MA_MAX_AX_ACCEL[0,Z]=2\r\n")
     (folder / "list.yaml").write_text("- 1\n- 2\n")
     (folder / "open.json").write_text('{"Header": {')
-    capture = content({"X1|1": axis_signals(10.0, -1)})
+    signals = axis_signals(10.0, -1)
+    signals["DES_POS"] = 100.0 * np.sin(2 * np.pi * (CYCLE * np.arange(ROWS) + 0.02))  # the axis lags by 20 ms
+    capture = content({"X1|1": signals})
     (folder / "capture.json").write_text(json.dumps(capture), encoding="utf-8")
     for line in (
         "identify capture.json --axis X1 --out identified",

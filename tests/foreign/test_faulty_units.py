@@ -166,8 +166,9 @@ HERE = """
 import pickle, sys
 from feedsim import cosim, scenario
 from feedsim.cosim import worker
+from feedsim.judge import judged
 worker.AVAILABLE = False
-run = cosim.run(scenario.load(sys.argv[1], [sys.argv[2]]))
+run = judged(cosim.run(scenario.load(sys.argv[1], [sys.argv[2]])))
 with open(sys.argv[3], "wb") as file:
     pickle.dump((run.trace, run.warnings), file)
 """

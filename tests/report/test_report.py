@@ -202,7 +202,7 @@ def test_tiles_speak_in_words_and_in_few_digits() -> None:
     assert tile("ZX#2.glitch_X", Figure(1.0, "um", "")).label == "ZX no. 2: quadrant glitch, X reverses"
     assert tile("XZ.peak_X", Figure(1.0, "um", "")).label == "XZ: reversal peak, X reverses"
     assert tile("Z.peak_torque", Figure(1.0, "N.m", "")).label == "Z: largest motor torque"
-    values = {1.24712: "1.247 s", 12.34567: "12.35 s", 999.96: "1000 s", 123456.7: "123500 s", 0.01234: "0.0123 s"}
+    values = {1.24712: "1.25 s", 12.34567: "12.3 s", 999.96: "1000 s", 123456.7: "123457 s", 0.01234: "0.0123 s"}
     for value, text in values.items():
         assert tile("Z.duration", Figure(value, "s", "")).value == text
     labels = [tile(f"Z.{name}", Figure(1.0, "s", "")).label for name in HEADER]

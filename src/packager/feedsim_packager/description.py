@@ -46,6 +46,7 @@ TYPES = {
     "A": ("Current", "ElectricCurrent"),
     "V": ("Voltage", "ElectricPotential"),
     "V/A": ("CurrentGain", "Resistance"),
+    "kg.m2": ("MomentOfInertia", "MomentOfInertia"),
     "Ohm": ("Resistance", "Resistance"),
     "H": ("Inductance", "Inductance"),
 }

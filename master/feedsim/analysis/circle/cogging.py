@@ -28,6 +28,9 @@ MOTOR_ORDERS, MAX_TORQUE_FREQUENCY = (2, 48), 150.0
 # variance, and so much of that share beside any of the next ones: cogging of 0.2 to 0.4 N.m explains
 # 70 to 99 %, what circles of machines without leave is explained to 9 % at most.
 MIN_REMAINDER, MIN_EXPLAINED_SHARE, MIN_KEPT_SHARE, RIVAL_COUNT = 30e-9, 0.3, 0.5, 4
+# All waves together explain so much of the variance, or none is one: on small fast circles a wave of order 2 has few
+# periods from reversal to reversal, and what friction leaves there is explained to 35 % by one, to 54 % by two.
+MIN_EXPLAINED_BY_ALL = 0.6
 MAX_WAVES = 4  # waves of a circle
 WAVE_POINTS = 8192  # of a turn; the finest wave has some 1500 periods
 SCREENED_SAMPLES = 2000  # samples of all paths for the search among the orders
@@ -115,6 +118,11 @@ def strongest(circle: CircleUnderTest, found: Fit) -> Wave | None:
     ):
         return None
     return settled(circle, found, [best])[0]
+
+
+def stand_out(before: Fit, after: Fit) -> bool:
+    """Whether waves that are no part of ``before`` and are taken off in ``after`` explain what was left."""
+    return _Rest(after).deviation ** 2 <= (1 - MIN_EXPLAINED_BY_ALL) * _Rest(before).deviation ** 2
 
 
 def settled(circle: CircleUnderTest, found: Fit, waves: Sequence[Wave]) -> list[Wave]:

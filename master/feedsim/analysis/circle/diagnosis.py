@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.cogging import MAX_WAVES, Wave, settled, strongest, without
+from feedsim.analysis.circle.cogging import MAX_WAVES, Wave, settled, stand_out, strongest, without
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import Fit, fit
 from feedsim.analysis.circle.setup import Offset
@@ -213,11 +213,12 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
 def _fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
     """The model fitted to the paths without waves of the motors' torque, and these waves."""
     found, waves = fit(circle, paths), list[Wave]()
+    plain = found
     while len(waves) < MAX_WAVES and (wave := strongest(circle, found)) is not None:
         waves.append(wave)
         found = fit(circle, without(circle, paths, waves))
         waves = settled(circle, found, waves)
-    return found, waves
+    return (found, waves) if stand_out(plain, found) else (plain, [])
 
 
 def _lag(circle: CircleUnderTest) -> float | None:

@@ -48,6 +48,7 @@ LONG = "So it is " + "an ox or a cow " * 6 + "we see."  # 35 words, which fit a 
         (f"- short\n- {LONG}\n", "2", "words"),
         ("One.\n\nIt cannot be had here.\n", "3", "'be had'"),
         ("```\ncode\n```\n" + "a " * 61 + "\n", "4", "characters"),
+        ("It is off by 3\n% of it.\n", "2", "comment"),
     ],
 )
 def test_what_is_wrong_is_found_with_its_line(text: str, line: str, part: str) -> None:

@@ -102,6 +102,8 @@ def faults(text: str, *, own: bool = False) -> list[str]:
             fenced = "" if fenced else opening[1]
         elif not fenced and len(line) > LONGEST_LINE and not line.lstrip().startswith(("|", "![", "$$", "<")):
             found.append(f"{number}: {len(line)} characters in a line")
+        elif not fenced and line.lstrip().startswith("%"):
+            found.append(f"{number}: the site takes a line that begins with % for a comment")
     return found
 
 

@@ -27,6 +27,7 @@ BELOW_RATE = 0.4  # of the rows' rate: above it nothing is separated
 FINER = 8  # frequencies per line width
 PREDICTED_SHARE = 0.5  # share of the variance at rest that either side has to predict of the other
 MOST_LINES = 3
+MAX_NAMED_LINES = 4  # in a note
 MIN_AMPLITUDE = 1e-8  # [m] amplitude: less is the digits of a record
 
 
@@ -54,22 +55,28 @@ class Line:
 def without_outside(each: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
     """The record without lines from outside, and those lines; the record itself where there are none."""
     position, torque = each.position.copy(), each.record.torque.copy()
-    time, lines = each.record.time, []
+    time, clean = each.record.time, 0  # clean: rows ahead of it have lost their lines
+    lines: list[Line] = []
     for before, after in _rests(each):
+        # A short rest is behind one motion and ahead of the next one: either side is looked at as it was recorded.
+        own, beside = each.position.copy(), each.record.torque.copy()
         whole = np.arange(before[0], after[-1] + 1)
+        rows, found = whole[whole >= clean], len(lines)
         for _ in range(MOST_LINES):
-            frequency = _line(time, position, before, after)
+            frequency = _line(time, own, before, after)
             if frequency is None:
                 break
-            sine = _sine(time, position, frequency, before, after)
+            sine = _sine(time, own, frequency, before, after)
             if np.hypot(*sine) < MIN_AMPLITUDE:
                 break
             waves = _waves(time[whole], frequency)
-            position[whole] -= waves @ sine
-            beside = _sine(time, torque, frequency, before, after) if each.record.driven else np.zeros(2)
-            torque[whole] -= waves @ beside
-            sizes = float(np.hypot(*sine)), float(np.hypot(*beside))
-            lines.append(Line(frequency, *sizes, float(time[whole[0]]), float(time[whole[-1]])))
+            own[whole] -= waves @ sine
+            force = _sine(time, beside, frequency, before, after) if each.record.driven else np.zeros(2)
+            beside[whole] -= waves @ force
+            sizes = float(np.hypot(*sine)), float(np.hypot(*force))
+            lines.append(Line(frequency, *sizes, float(time[rows[0]]), float(time[rows[-1]])))
+        if len(lines) > found:
+            position[rows], torque[rows], clean = own[rows], beside[rows], int(rows[-1]) + 1
     if not lines:
         return each, ()
     record = replace(each.record, angle=position / each.I_P, torque=torque)
@@ -145,8 +152,9 @@ def detrended(signal: Array, rows: Rows) -> Array:
 
 
 def in_words(axis: str, lines: Sequence[Line]) -> str:
-    """A note on them."""
+    """A note on them: the first ones, and how many there are beyond."""
+    more = f" and {len(lines) - MAX_NAMED_LINES} more" if len(lines) > MAX_NAMED_LINES else ""
     return (
-        f"axis {axis}: at rest the record has {'; '.join(line.text for line in lines)}: vibration from outside the "
-        "axis, which no drive and no mode explains"
+        f"axis {axis}: at rest the record has {'; '.join(line.text for line in lines[:MAX_NAMED_LINES])}{more}: "
+        "vibration from outside the axis, which no drive and no mode explains"
     )

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
-from feedsim import cosim
-from feedsim.errors import InputError
+from feedsim import cosim, nc
+from feedsim.errors import InputError, SimulationError
+from feedsim.jobs.compensate import _open_of as open_values
 from feedsim.scenario import Friction, load
-from feedsim.uncertainty import cloud_of, interval, share_of
-from identified_sets import CIRCLE, write_set
+from feedsim.scenario.load import read_friction
+from feedsim.uncertainty import cloud_of, interval, of_run, share_of, torque_scale
+from identified_sets import CIRCLE, VALUES, write_set
 
 
 def drawn(file: Path, count: int, *more: str) -> list[Friction]:
@@ -74,6 +76,43 @@ def test_what_is_refused(tmp_path: Path) -> None:
         cloud_of(load(CIRCLE, [f"machine.axes.Z.friction={file}"]).machine)
 
 
+def test_a_set_that_compensates_varies_where_the_machine_does_not(tmp_path: Path) -> None:
+    """The machine is what the set stands for: of one axis either varies, or one error would count twice. Of a file of
+    identify-drive a set has the friction alone."""
+    file = write_set(tmp_path, load=0.5)
+    content = yaml.safe_load(file.read_text())
+    content["identified"]["parameters"]["drive.K_v"] = {"interval": ["60 1/s", "70 1/s"]}
+    content["identified"]["inertia"] = {"interval": ["0.05 kg.m2", "0.09 kg.m2"]}
+    file.write_text(yaml.safe_dump(content))
+    sets = dict.fromkeys(("X", "Z"), read_friction(file))
+    known, cloud = open_values(load(CIRCLE), sets, 19)
+    assert cloud is None
+    assert {axis: set(each.names) - set(VALUES) for axis, each in known.items()} == {"X": set(), "Z": set()}
+    assert all(each.fixed == () for each in known.values())
+    known, cloud = open_values(load(CIRCLE, [f"machine.axes.Z.friction={file}"]), sets, 19)
+    assert set(known) == {"X"}
+    assert cloud is not None
+    assert set(cloud.known) == {"Z"}
+    assert "inertia" in cloud.known["Z"].names
+    broken = tmp_path / "broken.yaml"
+    content["identified"]["correlation"]["matrix"] = [[1.0]]
+    broken.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match="axis Z: the group identified of its friction is not as feedsim identify"):
+        open_values(load(CIRCLE, [f"machine.axes.Z.friction={broken}"]), sets, 19)
+
+
+def test_a_draw_that_fails_says_so(tmp_path: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load(CIRCLE, [f"machine.axes.Z.friction={write_set(tmp_path)}", "motions.0.radius=5 mm"])
+    nominal = cosim.run(scenario, fmus=fmus)
+
+    def fail(*args: object, **named: object) -> None:
+        raise SimulationError("unit Z.friction: no")
+
+    monkeypatch.setattr("feedsim.uncertainty.runs.run", fail)
+    with pytest.raises(SimulationError, match=r"^draw 1 of 19 of the machine: unit Z\.friction: no"):
+        of_run(nominal, cloud_of(scenario.machine), 19, progress=lambda what, done, total: None)
+
+
 def test_intervals_hold_their_share_whatever_the_distribution() -> None:
     """Of normal, uniform and very skew draws: the mean over 2000 sets is that of the order statistics, to 0.5 %."""
     random = np.random.default_rng(5)
@@ -100,13 +139,26 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
         "name: Move\nmachine: machine\nmotions:\n  - {kind: dwell, duration: 0.05 s}\n"
         "  - {kind: move, by: {X: 5 mm}, feed: 3 m/min}\n  - {kind: dwell, duration: 0.2 s}\n"
     )
-    plan = load(scenario)
+    more = [
+        f"machine.axes.X.drive.{each}"
+        for each in ("cogging_1.order=10", "cogging_1.amplitude=0.2 N.m", "friction_table.points=2",
+                     "friction_table.speed_1=10 mm/s", "friction_table.torque_1=0.3 N.m")
+    ]  # fmt: skip
+    plan = load(scenario, more)
     (drawn,) = cloud_of(plan.machine).draws(1)
     before, after = plan.machine.axes["X"], drawn.axes["X"]
     ratio = before.drive.K_p / after.drive.K_p  # of the inertia
     assert abs(ratio - 1) > 0.02
-    plain = cosim.run(plan, fmus=fmus).trace["X.x_a"]
-    by_torque = cosim.run(plan.model_copy(update={"machine": drawn}), fmus=fmus).trace["X.x_a"]
+    scale = torque_scale(plan.machine, drawn, "X")
+    assert scale == pytest.approx(1 / ratio, rel=1e-12)
+    assert torque_scale(plan.machine, drawn, "Y") == 1.0
+    program = nc.plan(plan)
+    cycles = (len(program.time) - 1) * round(plan.machine.cycles.T_pos / plan.machine.cycles.T_c)
+    torque = 0.2 * np.sin(np.linspace(0, 60, cycles + 1))  # from outside
+    plain = cosim.run(plan, fmus=fmus, torque_feedforward={"X": torque}).trace["X.x_a"]
+    by_torque = cosim.run(
+        plan.model_copy(update={"machine": drawn}), fmus=fmus, torque_feedforward={"X": scale * torque}
+    ).trace["X.x_a"]
 
     with (folder / "modes.csv").open(newline="") as text:
         heads, *rows = list(csv.reader(text))
@@ -116,6 +168,6 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
             row[k] = repr(float(row[k]) / ratio**0.5)
     with (folder / "modes.csv").open("w", newline="") as text:
         csv.writer(text, lineterminator="\n").writerows([heads, *rows])
-    by_inertia = cosim.run(load(scenario), fmus=fmus).trace["X.x_a"]
+    by_inertia = cosim.run(load(scenario, more), fmus=fmus, torque_feedforward={"X": torque}).trace["X.x_a"]
     assert np.abs(by_torque - by_inertia).max() < 1e-10
     assert np.abs(by_torque - plain).max() > 1e-8  # and it makes a difference

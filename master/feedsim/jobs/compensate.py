@@ -24,7 +24,16 @@ from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
 from feedsim.scenario.load import read_friction
 from feedsim.trace import write_csv
-from feedsim.uncertainty import Cloud, Known, Uncertainty, check_count, cloud_of, known_of, of_compensation
+from feedsim.uncertainty import (
+    Cloud,
+    Known,
+    Uncertainty,
+    check_count,
+    cloud_of,
+    known_of,
+    known_values,
+    of_compensation,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,7 +144,7 @@ def compensate(
             where it is not given. Values may be texts, "4.2 ms". In a mapping "" is all axes.
         table: with the runs that show what errors of the delay and of the parameters cost.
         uncertain: draws of identified values, 19 or more, which give intervals of figures and bands of contours: of the
-            machine, and of the files of `friction`; 0: none.
+            machine, and of the files of `friction` of axes whose machine values do not vary; 0: none.
         set: changes of the scenario, as behind ``--set``.
         fmus: folder of the archives.
         out: folder that the result is written to; None: :meth:`Result.save` does it.
@@ -180,18 +189,18 @@ def compensate(
 def _open_of(
     plan: scenarios.Scenario, sets: Mapping[str, scenarios.Friction], count: int
 ) -> tuple[dict[str, Known], Cloud | None]:
-    """What is known of sets that compensate, by axis, and of the machine. InputError: of neither anything."""
+    """What is known of sets that compensate, by axis, and of the machine. InputError: of neither anything.
+
+    Of an axis whose machine values vary, the set stays as the file has it: it is what the control has, and only what it
+    stands for is uncertain. Drawn as well, one error would count twice.
+    """
     if not count:
         return {}, None
     check_count(count)
     found = {axis: known_of(friction, axis, friction.parameters()) for axis, friction in sets.items()}
-    known = {axis: each for axis, each in found.items() if each.names}
-    try:
-        return known, cloud_of(plan.machine)
-    except InputError:
-        if known:
-            return known, None
-        raise
+    of_machine = known_values(plan.machine)
+    known = {axis: each for axis, each in found.items() if each.names and axis not in of_machine}
+    return known, None if known and not of_machine else cloud_of(plan.machine)
 
 
 def _file(axis: str, file: File, program: nc.Program) -> Path:

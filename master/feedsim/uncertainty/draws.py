@@ -14,6 +14,7 @@ is the one of the drawn inertia, and the table of modes stays as it is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,7 @@ from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.fields import Quantity
 from feedsim.scenario import Drive, Friction, Machine
+from feedsim.scenario.parameter_group import ParameterGroup
 
 Array = NDArray[np.float64]
 SAME_VALUE_SHARE = 1e-3  # of the standard deviation: a value that is nearer to that of its identification is that value
@@ -83,14 +85,26 @@ class Cloud:
 def cloud_of(machine: Machine, axes: Sequence[str] | None = None) -> Cloud:
     """What the files of a machine say of its values. axes: that may vary; None: all.
 
-    Raises InputError: no axis has identified values with intervals.
+    Raises InputError: no axis has identified values with intervals; as :func:`known_of`.
     """
+    found = known_values(machine, axes)
+    if not found:
+        raise InputError(
+            f"{machine.name}: no axis has identified values with intervals, which draws could be made from; give an "
+            "axis the friction file of feedsim identify or identify-drive"
+        )
+    return Cloud(machine, found)
+
+
+def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[str, Known]:
+    """Axis -> what its files say of its values, of axes that have identified values with intervals. Raises InputError
+    as :func:`known_of`."""
     found = {}
     for name in axes or machine.axes:
         axis = machine.axes[name]
         if not isinstance(axis.friction, Friction):
             continue
-        present: dict[str, float] = {LOAD: axis.constant_load}
+        present: dict[str, float] = {LOAD: axis.constant_load, INERTIA: math.nan}  # that of the modes
         present |= {key: float(value) for key, value in axis.friction.parameters().items()}
         if isinstance(axis.drive, Drive):
             present |= {
@@ -101,16 +115,11 @@ def cloud_of(machine: Machine, axes: Sequence[str] | None = None) -> Cloud:
         known = known_of(axis.friction, name, present)
         if known.names:
             found[name] = known
-    if not found:
-        raise InputError(
-            f"{machine.name}: no axis has identified values with intervals, which draws could be made from; give an "
-            "axis the friction file of feedsim identify or identify-drive"
-        )
-    return Cloud(machine, found)
+    return found
 
 
 def known_of(friction: Friction, axis: str, present: Mapping[str, Any]) -> Known:
-    """What a friction file says of its values. present: key -> value [SI] that is in use.
+    """What a friction file says of its values. present: key -> value [SI] that is in use; others do not count.
 
     Raises InputError: the group `identified` is not as feedsim writes it.
     """
@@ -136,12 +145,12 @@ def _known(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any])
     fixed: list[str] = []
     for name, (low, high) in ends.items():
         spread = (high - low) / (2 * NORMAL_95)
-        if not spread > 0:
+        if name not in present or not spread > 0:
             continue
-        same = name == INERTIA or abs(present.get(name, np.inf) - (low + high) / 2) <= SAME_VALUE_SHARE * spread
+        same = name == INERTIA or abs(present[name] - (low + high) / 2) <= SAME_VALUE_SHARE * spread
         (names if same else fixed).append(name)
     sigma = np.array([(ends[name][1] - ends[name][0]) / (2 * NORMAL_95) for name in names])
-    mean = np.array([present.get(name, sum(ends[name]) / 2) for name in names], dtype=np.float64)
+    mean = np.array([sum(ends[name]) / 2 if name == INERTIA else present[name] for name in names], dtype=np.float64)
     correlation = np.eye(len(names))
     known = identified.get("correlation", {})
     of = [BESIDE.get(name, name) for name in known.get("names", ())]
@@ -167,6 +176,17 @@ def unit_of(name: str) -> str:
     model, key = (Drive, name.removeprefix("drive.")) if name.startswith("drive.") else (Friction, name)
     quantity = Quantity.of(model.model_fields[key])
     return quantity.unit if quantity is not None else units.DIMENSIONLESS
+
+
+def torque_scale(machine: Machine, drawn: Machine, axis: str) -> float:
+    """Inertia of an axis of a machine over that of a draw of it: what multiplies all torques of that axis.
+
+    A torque that reaches the axis from outside the machine, a feedforward, has to be multiplied with it as well.
+    """
+    before, after = machine.axes[axis].drive, drawn.axes[axis].drive
+    if not (isinstance(before, Drive) and isinstance(after, Drive) and before.M_max):
+        return 1.0
+    return after.M_max / before.M_max  # the limit is never drawn itself
 
 
 def drawn_friction(friction: Friction, known: Known, random: np.random.Generator) -> Friction:
@@ -222,7 +242,22 @@ def _drive(drive: Any, drawn: Mapping[str, float], factor: float) -> Any:
     if factor != 1:
         values["K_p"] = factor * values.get("K_p", drive.K_p)
         values["M_max"] = factor * drive.M_max
-    return drive.model_copy(update=values) if _within(Drive, values) else None
+    if not _within(Drive, values):
+        return None
+    torques = {} if factor == 1 else _group_torques(drive, factor)
+    return drive.model_copy(update={**values, **torques})
+
+
+def _group_torques(drive: Drive, factor: float) -> dict[str, ParameterGroup]:
+    """Groups of a drive that have torques, cogging and a friction table, with these times `factor`."""
+    found = {}
+    for name in Drive.model_fields:
+        if isinstance(each := getattr(drive, name), ParameterGroup):
+            quantities = {key: Quantity.of(info) for key, info in type(each).model_fields.items()}
+            torques = [key for key, quantity in quantities.items() if quantity is not None and quantity.unit == "N.m"]
+            if torques:
+                found[name] = each.model_copy(update={key: factor * getattr(each, key) for key in torques})
+    return found
 
 
 def _within(model: type[Friction | Drive], values: Mapping[str, float]) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,8 +18,9 @@ from feedsim.analysis.evaluate import Result
 from feedsim.cosim.feedforward import friction_feedforward
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.run import run
+from feedsim.errors import InputError, SimulationError
 from feedsim.scenario import Recording
-from feedsim.uncertainty.draws import Cloud, Known, drawn_friction
+from feedsim.uncertainty.draws import Cloud, Known, drawn_friction, torque_scale
 from feedsim.uncertainty.spread import interval, share_of
 
 Array = NDArray[np.float64]
@@ -83,7 +85,8 @@ def of_run(
     for k, machine in enumerate(cloud.draws(count, seed)):
         progress("draws", k, count)
         plan = scenario.model_copy(update={"machine": machine, "logging": None})
-        done = run(plan, program=program, fmus=fmus)
+        with _draw(k, count):
+            done = run(plan, program=program, fmus=fmus)
         figures.append(evaluate(done))
         curves.append({key: y for key, (_, y) in curves_of(done).items()})
     progress("draws", count, count)
@@ -119,10 +122,14 @@ def of_compensation(
                 axis: drawn_friction(friction, known[axis], random) if axis in known else friction
                 for axis, friction in found.frictions.items()
             }
-            torque = friction_feedforward(machine, program, sets, found.delays, law)
+            torque = {
+                axis: torque_scale(scenario.machine, machine, axis) * each
+                for axis, each in friction_feedforward(machine, program, sets, found.delays, law).items()
+            }
             plan = lean.model_copy(update={"machine": machine})
-            before = run(plan, program=program, fmus=fmus)
-            after = run(plan, program=program, fmus=fmus, torque_feedforward=torque)
+            with _draw(k, count):
+                before = run(plan, program=program, fmus=fmus)
+                after = run(plan, program=program, fmus=fmus, torque_feedforward=torque)
             figures.append(circle_figures(turn, before.trace, after.trace))
             for name, each in (("without", before), ("with", after)):
                 curves[name].append(contour_of(contour(each.trace, turn)))
@@ -133,6 +140,15 @@ def of_compensation(
     )
     names = {name: figure for name, figure in found.figures.items() if name in figures[0]}
     return Uncertainty(cloud or Cloud(scenario.machine, {}), count, intervals_of(names, figures), bands, known)
+
+
+@contextmanager
+def _draw(k: int, count: int) -> Iterator[None]:
+    """Say of a draw that is refused or fails that it is one: the machine as it is has run."""
+    try:
+        yield
+    except (InputError, SimulationError) as error:
+        raise type(error)(f"draw {k + 1} of {count} of the machine: {error}") from error
 
 
 def intervals_of(names: Mapping[str, object], draws: list[Mapping[str, Figure]]) -> dict[str, tuple[float, float]]:

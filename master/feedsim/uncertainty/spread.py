@@ -23,8 +23,7 @@ def check_count(count: int) -> None:
     if count < MIN_DRAWS:
         raise InputError(
             f"{spelt('uncertain')} {count}: at least {MIN_DRAWS} draws are needed; {MIN_DRAWS} hold 90 % of what may "
-            "be, 39 "
-            "and more hold 95 %"
+            "be, 39 and more hold 95 %"
         )
 
 

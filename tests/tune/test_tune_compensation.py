@@ -13,9 +13,11 @@ import yaml
 
 from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
-from feedsim.scenario import load
+from feedsim.scenario import Machine, load
 from feedsim.tune import circles as circles_module
+from feedsim.tune import compensation
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
+from feedsim.tune.compensation import tune
 from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, compensated, pulse, score
 from feedsim.tune.effects import effects_of
 from identified_sets import write_set
@@ -32,6 +34,46 @@ def test_pairs_of_the_practical_range() -> None:
     tuned = tuned_on(pairs)
     assert not set(tuned) & set(pairs)
     assert sum(pair.duration for pair in tuned) < 0.3 * sum(pair.duration for pair in pairs)
+
+
+def test_short_circles_keep_within_the_travel() -> None:
+    """A slide of 25 mm has room for radii of 5 and 10 mm, not for three times the smallest one."""
+    pairs = [Pair(radius, feed / 60) for radius in (0.005, 0.01) for feed in (0.5, 1.0, 2.0, 5.0)]
+    pairs.sort(key=lambda pair: pair.acceleration)
+    tuned = tuned_on(pairs)
+    assert len(tuned) >= 8
+    assert max(pair.radius for pair in tuned) <= 0.01
+    assert max(pair.feed for pair in tuned) <= 5.0 / 60 * (1 + 1e-9)
+
+
+def test_a_compensation_that_the_machine_has_is_taken_off_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No run sees it, neither without nor with what is tried; values and errors are those of a machine without."""
+    pairs = [Pair(0.005, feed / 60) for feed in (0.5, 1.0, 2.0, 5.0)]
+    monkeypatch.setattr(compensation, "practical", lambda machine, plane: pairs)
+    seen = []
+
+    def errors(circles: Circles, machine: Machine, **named: object) -> np.ndarray:
+        pulse = machine.axes["Z"].drive.friction_pulse
+        seen.append(0.0 if pulse is None else float(pulse.amplitude))
+        peak = abs(1.0 - seen[-1] / 1e-4)
+        return np.full((len(circles.pairs), 2, 2), [1.0 + peak, -0.1])
+
+    monkeypatch.setattr(Circles, "errors", errors)
+    present = ["amplitude=7e-5 m/s", "time=0.05 s"]
+    found = []
+    for more in ([], [f"machine.axes.Z.drive.friction_pulse.{each}" for each in present]):
+        seen.clear()
+        judged = tune(load(CIRCLE, more), "pulse", PLANE, ("Z",), "ratio", fmus=None, progress=lambda *_: None)
+        assert seen[0] == 0.0
+        found.append((judged.found.values, judged.held_before.tolist(), tuple(seen)))
+    assert found[0] == found[1]
+
+
+def test_the_law_is_that_of_the_given_archives(monkeypatch: pytest.MonkeyPatch, fmus: Path) -> None:
+    scenario = load(CIRCLE)
+    circles = Circles.of(scenario, PLANE, [Pair(0.005, 1.0 / 60)])
+    monkeypatch.setattr("feedsim.cosim.friction_law.fmus_directory", lambda: Path("nowhere"))
+    assert set(compensation._feedforward(circles, scenario.machine, ("Z",), fmus)) == {"Z"}
 
 
 def test_errors_are_those_of_the_contour(fmus: Path) -> None:

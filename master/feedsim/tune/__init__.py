@@ -1,6 +1,6 @@
 """What to change: parameters of drives that make a circle rounder or a stop shorter, with the value proposed.
 
-May use analysis, cosim, linear, structure, scenario.
+May use uncertainty, analysis, cosim, linear, structure, scenario.
 Start with proposals.py; the closed forms are in closed_forms.py.
 """
 

@@ -80,10 +80,11 @@ def tuned_on(pairs: Sequence[Pair]) -> list[Pair]:
     What a compensation has to do at a reversal follows most from the acceleration; small radii give it in little time.
     """
     low, high = (pairs[i].acceleration for i in (0, -1))
-    fastest, smallest = max(each.feed for each in pairs), min(each.radius for each in pairs)
+    fastest, largest = max(each.feed for each in pairs), max(each.radius for each in pairs)
+    smallest = min(each.radius for each in pairs)
     found = []
     for k, a in enumerate(np.geomspace(low, high, COUNT)):
-        radius = min(smallest * (1, 1, 2, 2, 2, 3, 3, 2)[k % 8], fastest**2 / a)
+        radius = min(smallest * (1, 1, 2, 2, 2, 3, 3, 2)[k % 8], largest, fastest**2 / a)
         found.append(Pair(radius, float(f"{math.sqrt(a * radius) * 60:.3g}") / 60))
     # The smallest circle at nearly the highest acceleration: there a pulse has the least time to decay.
     found.append(Pair(smallest, float(f"{math.sqrt(0.9 * high * smallest) * 60:.3g}") / 60))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,9 +14,9 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
-from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table, together
+from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table, together, without
 from feedsim.tune.effects import Effect, effects_of
-from feedsim.uncertainty import Cloud
+from feedsim.uncertainty import Cloud, torque_scale
 
 SEARCHED = 4  # draws that values are found on besides the machine as it is
 SEED = 2  # of the draws that the result is judged on: other ones than those it was found on
@@ -81,7 +81,7 @@ def tune(
     values are good for; they are found on a few, and judged on `count` other ones. Raises InputError: no circle of the
     practical range fits the travel, a drive or a friction of another maker; SimulationError as a run.
     """
-    machine = scenario.machine
+    machine = without(scenario.machine, kind, axes)
     held = practical(machine, plane)
     if len(held) < 4:
         raise InputError(
@@ -90,14 +90,21 @@ def tune(
         )
     tuned = tuned_on(held)
     on, off = Circles.of(scenario, plane, tuned), Circles.of(scenario, plane, held)
-    machines = [machine, *(cloud.draws(SEARCHED) if cloud is not None and kind != "model" else ())]
+
+    def draws(count: int, seed: int) -> Iterator[Machine]:
+        return (without(each, kind, axes) for each in cloud.draws(count, seed)) if cloud is not None else iter(())
+
+    machines = [machine, *(draws(SEARCHED, SEED - 1) if kind != "model" else ())]
     found = _found(on, machines, kind, axes, objective, fmus, progress)
 
     def errors(circles: Circles, own: Machine, *, compensated: bool) -> Array:
         if not compensated:
             return size(circles.errors(own, fmus=fmus))
-        torque = _feedforward(circles, machine, axes) if kind == "model" else None
-        return size(circles.errors(found.on(own), fmus=fmus, torque=torque))
+        torque = None
+        if kind == "model":
+            made = _feedforward(circles, machine, axes, fmus)
+            torque = {axis: torque_scale(machine, own, axis) * each for axis, each in made.items()}
+        return size(circles.errors(found.on(own, machine), fmus=fmus, torque=torque))
 
     names = list(effects_of(machine, axes))
     total, done = 4 + len(names) + count, 0
@@ -112,7 +119,7 @@ def tune(
     tuned_before, tuned_after = (errors(on, machine, compensated=each) for each in (False, True))
     held_before, held_after = both(machine)
     changed = {effect: both(own) for effect, own in names}
-    drawn = np.array([both(own) for own in cloud.draws(count, seed=SEED)]) if cloud is not None else None
+    drawn = np.array([both(own) for own in draws(count, SEED)]) if cloud is not None else None
     progress("judging", total, total)
     return Judged(
         scenario, plane, tuple(axes), objective, found, tuple(tuned), tuple(held), tuned_before, tuned_after,
@@ -149,9 +156,9 @@ def _found(
     return Found(kind, values, runs + len(machines) * int(np.prod(grid.errors.shape[:2])))
 
 
-def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str]) -> TorqueFeedforward:
+def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str], fmus: Path | None) -> TorqueFeedforward:
     """The friction model of the machine file as torque feedforward, as feedsim compensate has it."""
     frictions = {axis: machine.shipped_friction(axis, "the model") for axis in axes}
     delays = {axis: lag_of(machine.shipped_drive(axis, "the model"), machine.cycles).delay for axis in axes}
-    with FrictionLaw() as law:
+    with FrictionLaw(fmus) as law:
         return friction_feedforward(machine, circles.program, frictions, delays, law)

@@ -23,9 +23,11 @@ from feedsim.errors import InputError
 from feedsim.scenario import Drive, Machine
 from feedsim.tune.circles import Circles, size
 from feedsim.tune.closed_forms import axis_lag
+from feedsim.uncertainty import torque_scale
 
 COMPENSATOR_KINDS = ("pulse", "pulse_characteristic", "table", "model")
 OBJECTIVES = ("ratio", "worst", "largest")
+GROUP_OF_KIND = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
 Progress = Callable[[str, int, int], None]
 
 # Amplitudes in shares of 2 F_C/K_p, the speed error that turns the friction torque round; time constants [s].
@@ -52,13 +54,35 @@ class Found:
     values: Mapping[str, Mapping[str, float | bool | int]]
     runs: int
 
-    def on(self, machine: Machine) -> Machine:
-        """The machine with it; "model" is no part of the drive and leaves it as it is."""
-        for axis, values in self.values.items():
-            group = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
-            if self.kind in group:
-                machine = compensated(machine, axis, group[self.kind], values)
+    def on(self, machine: Machine, of: Machine) -> Machine:
+        """A draw of the machine `of`, or that machine, with it; "model" is no part of the drive and changes nothing."""
+        group = GROUP_OF_KIND.get(self.kind)
+        return machine if group is None else with_groups(machine, of, group, self.values)
+
+
+def with_groups(
+    machine: Machine, of: Machine, group: str, values: Mapping[str, Mapping[str, float | bool | int]]
+) -> Machine:
+    """A draw of the machine `of`, or that machine, whose axes have a group of their drives with other values.
+
+    The values are those of the control; all torques of a draw are multiplied with one factor, and so are theirs.
+    """
+    for axis, each in values.items():
+        scale = torque_scale(of, machine, axis)
+        own = {name: scale * value if name.startswith("torque_") else value for name, value in each.items()}
+        machine = compensated(machine, axis, group, own)
+    return machine
+
+
+def without(machine: Machine, kind: str, axes: Sequence[str]) -> Machine:
+    """The machine without a compensation of that kind on some axes: one that its file has is no part of the search."""
+    if (group := GROUP_OF_KIND.get(kind)) is None:
         return machine
+    changed = dict(machine.axes)
+    for axis in axes:
+        drive = changed[axis].drive.model_copy(update={group: None})
+        changed[axis] = changed[axis].model_copy(update={"drive": drive})
+    return machine.model_copy(update={"axes": changed})
 
 
 def compensated(machine: Machine, axis: str, group: str, values: Mapping[str, float | bool | int]) -> Machine:
@@ -142,12 +166,13 @@ def _over(
     circles: Circles, machines: Sequence[Machine], fmus: Path | None, group: str = "",
     values: Mapping[str, Mapping[str, float | bool | int]] | None = None,
 ) -> Array:  # fmt: skip
-    """(machines x pairs, axes, 2) errors [m] of machines whose axes have a group of their drives with other values."""
+    """(machines x pairs, axes, 2) errors [m] of machines whose axes have a group of their drives with other values.
+
+    machines: the first one, and draws of it.
+    """
     found = []
     for machine in machines:
-        own = machine
-        for axis, each in (values or {}).items():
-            own = compensated(own, axis, group, each)
+        own = with_groups(machine, machines[0], group, values or {})
         found.append(circles.errors(own, fmus=fmus))
     return np.concatenate(found)
 
@@ -232,9 +257,8 @@ def together(
         return float(score((errors / before[:, columns]).T, errors.T, objective).mean())
 
     least, runs = cost(best), 1
-    free = [
-        (axis, name) for axis, each in best.items() for name in ("amplitude", "amplitude_min", "time") if name in each
-    ]
+    names = ("amplitude", "amplitude_min", "time")
+    free = [(axis, name) for axis, each in best.items() for name in names if each.get(name)]  # 0 stays 0
     total = 2 * len(PULSE_STEPS) * len(free)
     for step in PULSE_STEPS:
         for axis, name in free:

@@ -21,7 +21,7 @@ from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, BEFORE
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensation import Judged
-from feedsim.tune.compensators import NEVER_WORSE, amplitude
+from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, amplitude
 from feedsim.tune.effects import WITHOUT_PLAY
 from feedsim.uncertainty import interval, share_of
 from feedsim.units import convert
@@ -29,7 +29,6 @@ from feedsim.variables import parameters
 
 DASHES: tuple[Dash, ...] = ("", "dashed", "dotted")  # of axes in one panel
 SETTINGS, SHEET = "settings.yaml", "sheet.csv"
-GROUPS = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
 CONTROL_OF_KIND = {"pulse": "sinumerik", "pulse_characteristic": "sinumerik", "table": "twincat"}
 WORDS = {
     "pulse": "a constant pulse on the speed setpoint",
@@ -139,9 +138,9 @@ def _drawn_answer(judged: Judged) -> list[str]:
 
 def rows(judged: Judged) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
     """Axis, parameter, its name in a control, old and new value in SI."""
-    if judged.found.kind not in GROUPS:
+    if judged.found.kind not in GROUP_OF_KIND:
         return
-    group, names = GROUPS[judged.found.kind], names_of(CONTROL_OF_KIND[judged.found.kind])
+    group, names = GROUP_OF_KIND[judged.found.kind], names_of(CONTROL_OF_KIND[judged.found.kind])
     table = parameters("controller")
     for axis, values in judged.found.values.items():
         present = getattr(judged.scenario.machine.axes[axis].drive, group, None)

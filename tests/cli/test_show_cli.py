@@ -6,6 +6,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from feedsim import cli
 from feedsim.analysis import diagnoses, evaluate
 from feedsim.report import run as report
-from feedsim.report.show.report import _beside
+from feedsim.report.show.report import _beside, _figures
 from report_helpers import circle_run
 
 
@@ -130,3 +131,13 @@ def test_results_that_are_alike_are_said_to_be(results: tuple[Path, Path], tmp_p
     capsys.readouterr()
     assert show(tmp_path / "out2", results[0]) == 0
     assert capsys.readouterr().out.startswith("XZ: circular deviation G ")
+
+
+def test_values_in_unlike_units_have_no_difference() -> None:
+    """A figure of an older result may have another unit: neither its value nor a difference is shown."""
+    sources: Any = [
+        SimpleNamespace(name=name, figures={"XZ.G": value})
+        for name, value in (("first", (8.0, "um")), ("second", (9.5, "um")), ("older", (0.008, "mm")))
+    ]
+    (row,) = _figures(sources).parts[0].rows
+    assert row[1:] == ("8.00", "9.50", "+1.50", "–", "–", "µm")

@@ -14,11 +14,12 @@ import pytest
 from agreement_helpers import assert_numbers_agree
 from feedsim.cli import main
 from feedsim.cosim import run
+from feedsim.errors import InputError
 from feedsim.files.columns import Columns, load_columns
-from feedsim.identify import Recorded
+from feedsim.identify import Record, Recorded
 from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
 from feedsim.replay.drive import DriveFound, feedforward_of
-from feedsim.replay.identified import identify_drives
+from feedsim.replay.identified import _refuse_own_setpoint, identify_drives
 from feedsim.scenario import Machine, load, load_machine
 from feedsim.structure import checked_modes
 from feedsim.trace import write_csv
@@ -204,6 +205,17 @@ def test_a_setpoint_that_is_the_position_itself(tmp_path: Path, capsys: pytest.C
         said = capsys.readouterr().err
         assert "axis X: the position setpoint is the recorded position (largest difference 0 nm of a way" in said
         assert not (tmp_path / "out").exists()
+
+
+def test_an_axis_at_rest_is_not_its_own_setpoint() -> None:
+    """What is missing there is motion, and a later check says so."""
+    time = 1e-3 * np.arange(100)
+    still = Record("made", time=time, torque=np.zeros(100), angle=np.ones(100), setpoint=np.ones(100))
+    each = AxisRecord("X", still, 1.0, np.ones(100, dtype=bool))
+    _refuse_own_setpoint(each)
+    moved = replace(each, record=replace(still, angle=time, setpoint=time))
+    with pytest.raises(InputError, match="axis X: the position setpoint is the recorded position"):
+        _refuse_own_setpoint(moved)
 
 
 def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

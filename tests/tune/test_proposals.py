@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,10 @@ import pytest
 
 from command_helpers import feedsim
 from feedsim import analysis, cosim
+from feedsim.cli import main
 from feedsim.judge import judged
 from feedsim.linear.system import LinearSystem
-from feedsim.report.changes import changes_section
+from feedsim.report.changes import changes_part, changes_section
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.structure import checked_modes
 from feedsim.tune import Proposal, of_circle, of_run
@@ -149,8 +151,29 @@ def test_try_runs_and_overlays(fmus: Path, tmp_path: Path) -> None:
 
 def test_the_section_names_the_commands_that_go_on() -> None:
     """All values of a drive, and those of a compensation, are found by commands that take the scenario."""
-    page = str(changes_section(
-        [Proposal("reversal peaks of Z", "Z", "drive.T_n", 0.02, 0.005, "s", "", "lower")], None, "my_circle.yaml"
-    ))  # fmt: skip
-    assert "feedsim tune drive my_circle.yaml --axis Z" in page
-    assert "feedsim tune compensation my_circle.yaml" in page
+    proposals = [Proposal("reversal peaks of Z", "Z", "drive.T_n", 0.02, 0.005, "s", "", "lower")]
+    page = str(changes_section(proposals, None, Path.cwd() / "parts" / "my circle.yaml"))
+    assert "feedsim tune drive 'parts/my circle.yaml' --axis Z" in page
+    assert "feedsim tune compensation 'parts/my circle.yaml'" in page
+    assert "feedsim tune" not in str(changes_section(proposals, None, Path("my circle.ssp")))
+
+
+def test_a_margin_without_limit_is_no_number_in_the_summary() -> None:
+    """A loop that no gain makes unstable has an infinite gain margin, which JSON has not."""
+    margins = ((math.inf, 63.0), (15.9, 41.0))
+    (part,) = changes_part(
+        [Proposal("reversal peaks of Z", "Z", "drive.K_p", 0.0, 1.0, "N.m.s/rad", "", margins=margins)]
+    )
+    assert part["margins"] == [[None, 63.0], [15.9, 41.0]]
+    json.dumps(part, allow_nan=False)
+
+
+@pytest.mark.parametrize("name", ["K_v=0 1/s", "K_p=0 N.m.s/rad"])
+def test_a_drive_that_does_not_hold_its_axis_is_not_tuned(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command, scenario, own in (("drive", "z_positioning", ["--axis", "Z"]), ("compensation", "xz_circle", [])):
+        words = [str(CIRCLE.with_name(f"{scenario}.yaml")), *own, "--set", f"machine.axes.Z.drive.{name}"]
+        assert main(["tune", command, *words, "--out", str(tmp_path / "out")]) == 2
+        assert f"axis Z: {name[:3]} is 0; tuning needs a drive that holds its axis" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

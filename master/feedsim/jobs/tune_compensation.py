@@ -21,6 +21,7 @@ from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
 from feedsim.report.tune.report import SETTINGS, SHEET
+from feedsim.tune.closed_forms import check_controlled
 from feedsim.tune.compensation import Judged, tune
 from feedsim.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES
 from feedsim.uncertainty import check_count, cloud_of
@@ -131,7 +132,7 @@ def tune_compensation(
         if axis not in plane:
             raise InputError(f"{spelt('axes')} {','.join(wanted)}: {no_axis(axis, plane)}")
         plan.machine.shipped_friction(axis, "tuning")
-        plan.machine.shipped_drive(axis, "tuning")
+        check_controlled(plan.machine, axis)
     if not wanted or len(dict.fromkeys(wanted)) < len(wanted):
         raise InputError(f"{spelt('axes')} {','.join(wanted)}: names of axes are needed, each once, such as X,Z")
     cloud = None

@@ -77,7 +77,7 @@ class Comparison:
 
     @property
     def findings(self) -> list[str]:
-        """Why the replay may determine nothing of the record, and what is left that is not the axis' own."""
+        """Why the replay may say nothing of the record, and what is left that is not the axis' own."""
         found: list[str] = []
         torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
         recorded = float(np.max(np.abs(torque), initial=0.0))
@@ -176,12 +176,12 @@ def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | N
     """The records of some axes of a machine through its units, axis by axis beside what was recorded.
 
     By how much a control logs its torque later than its position is not known ahead: the delay with which it agrees
-    best is taken out, and determined.
+    best is taken out, and reported.
     """
     replay = Replay(machine, records, fmus=fmus)
     per_row = per_row_of(replay.interval, machine)
     limits = {axis: each.drive.M_max for axis, each in machine.axes.items() if isinstance(each.drive, Drive)}
-    # A drive of another maker need not determine when it is at its limit.
+    # A drive of another maker need not say when it is at its limit.
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
     found = replay.follow(machine, signals, per_row)
     return {axis: compared(each, found[axis], per_row, limits.get(axis, inf)) for axis, each in records.items()}

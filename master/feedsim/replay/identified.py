@@ -168,7 +168,7 @@ def _refuse_own_setpoint(each: AxisRecord) -> None:
     """Raises InputError: the setpoint is the position itself, in which no lag shows a drive."""
     way = float(np.ptp(each.position[each.rows]))
     off = float(np.max(np.abs(each.setpoint - each.position)[each.rows]))
-    if off <= SETPOINT_ROUNDING * way:
+    if way > 0 and off <= SETPOINT_ROUNDING * way:
         raise InputError(
             f"{each.record.name}, axis {each.axis}: the position setpoint is the recorded position (largest difference "
             f"{1e9 * off:.3g} nm of a way of {1e3 * way:.4g} mm). The distance between them shows the drive, and a fit "

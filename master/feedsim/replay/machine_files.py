@@ -21,7 +21,7 @@ from feedsim.scenario import Drive, Filter, Friction
 from feedsim.scenario.parameter_group import ParameterGroup
 
 TOOL_AXES = ("X", "Y", "Z")
-CONTROL = 125e-6  # [s] control cycle of a machine that determines none
+CONTROL = 125e-6  # [s] the usual control cycle
 ASSUMED = "assumed: the record does not show it"
 
 

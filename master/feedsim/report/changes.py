@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from feedsim.control import names_of
-from feedsim.report.content import Bullets, Section, Table, Text, code
+from feedsim.report.content import Bullets, Section, Table, Text, code, typed
 from feedsim.report.control import asked
 from feedsim.report.formatting import minus, typeset
+from feedsim.report.provenance import finite
 from feedsim.scenario import Machine
 from feedsim.tune import Proposal
 from feedsim.units import convert
@@ -25,9 +27,9 @@ REVERSALS = "reversal peaks"
 
 
 def changes_section(
-    proposals: Sequence[Proposal], machine: Machine | None = None, scenario: str = ""
+    proposals: Sequence[Proposal], machine: Machine | None = None, scenario: Path | None = None
 ) -> Section | None:
-    """Every proposal; None where there is none. scenario: name of its file, which commands that go on take."""
+    """Every proposal; None where there is none. scenario: its file, which commands that go on take."""
     if not proposals:
         return None
     rows: list[tuple[Text, ...]] = [
@@ -38,7 +40,7 @@ def changes_section(
         for each in proposals
     ]  # fmt: skip
     heads = ("Cause", "Axis", "Parameter", "Present", "Proposed", "In the control", "Why", "Margins")
-    further = _further(proposals, scenario) if scenario and not scenario.endswith(".ssp") else None
+    further = _further(proposals, typed(scenario)) if scenario is not None and scenario.suffix != ".ssp" else None
     return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes")
 
 
@@ -80,7 +82,7 @@ def changes_part(proposals: Sequence[Proposal]) -> list[dict[str, Any]]:
         {
             "cause": each.cause, "axis": each.axis, "parameter": each.parameter, "present": each.present,
             "proposed": each.proposed, "unit": each.unit, "direction": each.direction, "reason": each.reason,
-            "margins": None if each.margins is None else [list(margin) for margin in each.margins],
+            "margins": None if each.margins is None else [list(map(finite, margin)) for margin in each.margins],
         }
         for each in proposals
     ]  # fmt: skip

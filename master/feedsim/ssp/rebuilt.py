@@ -29,7 +29,7 @@ MODES_RESOURCE, SETPOINTS_RESOURCE = "modes.csv", "setpoints.csv"  # beside the 
 # What the annotation may show at its top.
 OWN_KEYS = ("name", "note", "machine", "motions", "coupling", "recording", "logging", "evaluate")
 MAX_ANNOTATION_DEPTH = 50  # levels of the annotation; a scenario has some 10
-MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody shows how far
+MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where no file gives limits
 
 
 @dataclass(frozen=True)
@@ -315,7 +315,7 @@ def _group(parts: Parts, component: str, leave: tuple[str, ...] = ()) -> dict[st
 
 
 def _pitch(I_P: float, told: Any) -> str:
-    """A pitch whose lead is I_P [m/rad] to the last bit, if there is one; the one that was shown, where it still is."""
+    """A pitch whose lead is I_P [m/rad] to the last bit, if there is one; the annotated one, where it still is."""
     near = 2 * pi * I_P
     candidates = [near, nextafter(near, inf), nextafter(near, -inf)]
     if isinstance(told, str):
@@ -333,7 +333,7 @@ def _seen_pitch(table: Table, setpoint: str) -> float:
 
 
 def _limits(table: Table, setpoint: str, x_0: float) -> dict[str, Any]:
-    """Limits of an axis that nobody shows: those that its setpoints reach."""
+    """Limits of an axis of which no file gives any: those that its setpoints reach."""
     x_s = np.append(table.x_s[setpoint], x_0)
     speed = np.abs(np.diff(x_s[:-1])) / table.cycle
     acceleration = np.abs(np.diff(x_s[:-1], 2)) / table.cycle**2

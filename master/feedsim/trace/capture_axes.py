@@ -24,7 +24,7 @@ LEAST_PITCH = 0.9  # mm: below it the positions are in another unit, where the f
 OTHER_LENGTHS = {"in": 25.4, "m": 1000.0}  # unit -> mm
 DEGREES_PER_TURN = 360.0  # deg: what a rotary axis travels with a turn
 FITS = 0.1  # relative residual up to which POWER is TORQUE times a speed
-PITCH_TOLERANCE = 0.01  # relative; a pitch is shown to that at best, as the channels are sampled at different instants
+PITCH_TOLERANCE = 0.01  # relative; a pitch is known to that at best, as the channels are sampled at different instants
 NEAR_WITHOUT = 0.03  # the same where rows had to be left out, of which some beside are touched, too
 # N.m of TORQUE for an A of CURRENT that motors of feed axes with a screw have.
 TORQUE_CONSTANTS = (0.05, 5.0)

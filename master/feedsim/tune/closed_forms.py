@@ -8,7 +8,18 @@ in cosim/feedforward.py, exact for the sampled drive):
 
 from __future__ import annotations
 
-from feedsim.scenario import Cycles, Drive
+from feedsim.errors import InputError
+from feedsim.scenario import Cycles, Drive, Machine
+
+
+def check_controlled(machine: Machine, axis: str) -> None:
+    """InputError: the drive of an axis is another maker's, or does not hold the axis at its setpoint."""
+    drive = machine.shipped_drive(axis, "tuning")
+    for name, value in (("K_v", drive.K_v), ("K_p", drive.K_p)):
+        if value <= 0:
+            raise InputError(
+                f"axis {axis}: {name} is 0; tuning needs a drive that holds its axis: give it a value above 0"
+            )
 
 
 def axis_lag(drive: Drive) -> float:

@@ -27,7 +27,7 @@ from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.model import Recording
 from feedsim.trace import Trace
 from feedsim.tune.circles import REST, RUN_IN_ANGLE, Pair, run_in, sweep_of, turn_of
-from feedsim.tune.closed_forms import axis_lag
+from feedsim.tune.closed_forms import axis_lag, check_controlled
 
 BAND = 1e-6  # [m] within which an axis has settled
 ROOM = 0.9  # of the travel on either side of the pose that is used
@@ -250,10 +250,10 @@ def partner_of(scenario: Scenario, axis: str) -> str:
 
 
 def check_axis(scenario: Scenario, axis: str) -> None:
-    """InputError: an axis that is not there or whose units are another maker's."""
+    """InputError: an axis that is not there, whose units are another maker's, or an axis without position control."""
     machine = scenario.machine
     if axis not in machine.axes:
         raise InputError(f"no axis {axis!r}; there is {', '.join(machine.axes)}")
     machine.shipped_friction(axis, "tuning")
     for name in machine.axes:
-        machine.shipped_drive(name, "tuning")
+        check_controlled(machine, name)

@@ -120,7 +120,7 @@ def report_of(
             sheets_line(run),
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
-            changes_section(proposals, machine, scenario.file.name),
+            changes_section(proposals, machine, scenario.file),
             *accuracy_sections(run),
             sections.figures_section(figures),
             motions_section(run),

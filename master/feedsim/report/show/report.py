@@ -271,7 +271,7 @@ def _figures(sources: Sequence[Source]) -> Section | None:
             value, own = source.figures.get(name, (math.nan, unit))
             cells.append(shown(Figure(value, unit, ""))[0] if name in source.figures and own == unit else "–")
             if k:
-                difference = value - first
+                difference = value - first if own == unit else math.nan
                 cells.append(_difference(difference, unit))
             if math.isnan(first) and own == unit:
                 first = value

@@ -19,10 +19,11 @@ from feedsim.linear.candidates import Candidates
 from feedsim.linear.judgement import judge
 from feedsim.scenario import Drive, Machine, load, load_machine
 from feedsim.structure import Modes, checked_modes
+from feedsim.structure.modes import read_modes
 from feedsim.tune.changed import changed_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.closed_forms import axis_lag, loop_lag
-from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, tune_drive
+from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, _Search, tune_drive
 from feedsim.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
 from feedsim.tune.drive_result import Limits
 from feedsim.tune.knobs import Knobs, matched, with_drives
@@ -69,6 +70,25 @@ def margins_of(L: np.ndarray) -> tuple[float, float]:
     gain = min(abs(20 * math.log10(abs(L[k]))) for k in real)
     unit = np.flatnonzero((np.abs(L[1:]) < 1) != (np.abs(L[:-1]) < 1))
     return gain, min(abs(180 - abs(np.degrees(np.angle(L[k])))) for k in unit)
+
+
+def test_modes_are_changed_behind_a_transmission(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table of changed modes has those of the structure, to which the machine joins its motor, once."""
+    contact = ("stiffness=200 N/um", "damping=3e4 N.s/m", "inertia=0.004 kg.m^2")
+    scenario = load(Z, [f"machine.axes.Z.transmission.{each}" for each in contact])
+    structure = read_modes(scenario.machine.modes, list(scenario.machine.axes))
+    monkeypatch.setattr(_Search, "errors", lambda *args, **named: ())
+    poses = {"another": structure}
+    with _Search.begun(scenario, "Z", Limits(8.0, 40.0, 1e-5), poses, None, lambda *_: None, 10) as search:
+        changed = search.with_modes(scenario.machine, 1.1)
+        table = read_modes(changed.modes, list(changed.axes))
+        assert table.frequency == pytest.approx(1.1 * structure.frequency, rel=1e-15)
+        joined = checked_modes(changed)
+        assert len(joined.frequency) == len(structure.frequency) + 1
+        for name in ("pose of the machine file", "another"):
+            own = search.judges[f"{name}, modes 10 % higher"].modes
+            assert own.frequency == pytest.approx(joined.frequency, rel=1e-12)
+            assert search.judges[name].modes.J_inf("Z") == pytest.approx(0.004, rel=1e-9)
 
 
 @pytest.mark.parametrize(("K_p", "T_n", "K_v"), [(0.25, 0.02, 60.0), (1.2, 0.004, 120.0)])

@@ -23,7 +23,7 @@ from feedsim.linear.judgement import Loop, judge
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.structure import Modes
-from feedsim.structure.modes import write_modes
+from feedsim.structure.modes import with_transmissions, write_modes
 from feedsim.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
 from feedsim.tune.drive_result import ERROR_FLOOR, WORSE, Case, Limits, Margins, Point, Tuned, decibels
 from feedsim.tune.effects import Effect, effects_of
@@ -105,7 +105,7 @@ class _Search:
     ) -> Iterator[_Search]:  # fmt: skip
         """Plan, judge and run the drive as it is."""
         machine = scenario.machine
-        own, _ = plant_modes(machine)
+        own, _ = plant_modes(_without_transmissions(machine))  # tables hold structures; contacts come behind
         partner = partner_of(scenario, axis)
         with TemporaryFolder() as folder:
             scaled = {1.0: machine.modes}
@@ -116,8 +116,9 @@ class _Search:
             for name, modes in {"pose of the machine file": own, **poses}.items():
                 for factor in FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]:
                     what = name if factor == 1 else f"{name}, {_percent('modes', factor)}"
-                    judges[what] = Candidates(machine, _scaled(modes, factor), axis)
-            knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis), not own.rigid.all())
+                    judges[what] = Candidates(machine, with_transmissions(machine, _scaled(modes, factor)), axis)
+            elastic = not with_transmissions(machine, own).rigid.all()
+            knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis), elastic)
             search = cls(
                 scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges,
                 ("pose of the machine file", *poses), scaled, (), (),
@@ -385,6 +386,11 @@ def _over(found: Mapping[str, tuple[tuple[float, str], tuple[float, str]]], nois
 
 def _scaled(modes: Modes, factor: float) -> Modes:
     return modes if factor == 1 else replace(modes, frequency=modes.frequency * factor)
+
+
+def _without_transmissions(machine: Machine) -> Machine:
+    axes = {name: axis.model_copy(update={"transmission": None}) for name, axis in machine.axes.items()}
+    return machine.model_copy(update={"axes": axes})
 
 
 def _percent(what: str, factor: float) -> str:

@@ -82,7 +82,7 @@ def _cogging(machine: Machine, axis: str) -> Machine | None:
 def _play(machine: Machine, axis: str) -> Machine | None:
     """Play without dynamics fits axes that are measured at the motor."""
     own = machine.axes[axis]
-    if own.play or not isinstance(own.drive, Drive) or not own.drive.indirect:
+    if own.play or own.transmission is not None or not isinstance(own.drive, Drive) or not own.drive.indirect:
         return None
     return _with(machine, axis, play=PLAY)
 

@@ -16,6 +16,7 @@ from feedsim.jobs.compensate import _open_of as open_values
 from feedsim.scenario import Friction, load
 from feedsim.scenario.load import read_friction
 from feedsim.uncertainty import cloud_of, interval, of_run, share_of, torque_scale
+from feedsim.uncertainty.draws import on_draw
 from identified_sets import CIRCLE, VALUES, write_set
 
 
@@ -138,13 +139,18 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
     scenario.write_text(
         "name: Move\nmachine: machine\nmotions:\n  - {kind: dwell, duration: 0.05 s}\n"
         "  - {kind: move, by: {X: 5 mm}, feed: 3 m/min}\n  - {kind: dwell, duration: 0.2 s}\n"
+        "loads:\n  - {kind: slide, axis: X, table: {time: [0.1 s, 0.2 s], values: [0 N, 300 N]}}\n"
+        "  - {kind: tool, direction: Z, factor: 0.5, table: {time: [0 s, 0.2 s], values: [0 N, 10 N]}}\n"
     )
     more = [
-        f"machine.axes.X.drive.{each}"
-        for each in ("cogging_1.order=10", "cogging_1.amplitude=0.2 N.m", "friction_table.points=2",
-                     "friction_table.speed_1=10 mm/s", "friction_table.torque_1=0.3 N.m")
+        f"machine.axes.X.{each}"
+        for each in ("drive.cogging_1.order=10", "drive.cogging_1.amplitude=0.2 N.m", "drive.friction_table.points=2",
+                     "drive.friction_table.speed_1=10 mm/s", "drive.friction_table.torque_1=0.3 N.m",
+                     "guide.F_C=20 N", "guide.F_S=30 N", "transmission.stiffness=400 N/um",
+                     "transmission.damping=1e4 N.s/m")
     ]  # fmt: skip
-    plan = load(scenario, more)
+    inertia = 0.01  # [kg.m2] of what turns with the motor
+    plan = load(scenario, [*more, f"machine.axes.X.transmission.inertia={inertia} kg.m^2"])
     (drawn,) = cloud_of(plan.machine).draws(1)
     before, after = plan.machine.axes["X"], drawn.axes["X"]
     ratio = before.drive.K_p / after.drive.K_p  # of the inertia
@@ -156,9 +162,7 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
     cycles = (len(program.time) - 1) * round(plan.machine.cycles.T_pos / plan.machine.cycles.T_c)
     torque = 0.2 * np.sin(np.linspace(0, 60, cycles + 1))  # from outside
     plain = cosim.run(plan, fmus=fmus, torque_feedforward={"X": torque}).trace["X.x_a"]
-    by_torque = cosim.run(
-        plan.model_copy(update={"machine": drawn}), fmus=fmus, torque_feedforward={"X": scale * torque}
-    ).trace["X.x_a"]
+    by_torque = cosim.run(on_draw(plan, drawn), fmus=fmus, torque_feedforward={"X": scale * torque}).trace["X.x_a"]
 
     with (folder / "modes.csv").open(newline="") as text:
         heads, *rows = list(csv.reader(text))
@@ -168,6 +172,7 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
             row[k] = repr(float(row[k]) / ratio**0.5)
     with (folder / "modes.csv").open("w", newline="") as text:
         csv.writer(text, lineterminator="\n").writerows([heads, *rows])
-    by_inertia = cosim.run(load(scenario, more), fmus=fmus, torque_feedforward={"X": torque}).trace["X.x_a"]
+    other = load(scenario, [*more, f"machine.axes.X.transmission.inertia={inertia * ratio!r} kg.m^2"])
+    by_inertia = cosim.run(other, fmus=fmus, torque_feedforward={"X": torque}).trace["X.x_a"]
     assert np.abs(by_torque - by_inertia).max() < 1e-10
     assert np.abs(by_torque - plain).max() > 1e-8  # and it makes a difference

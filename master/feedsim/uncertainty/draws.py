@@ -15,7 +15,7 @@ is the one of the drawn inertia, and the table of modes stays as it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +26,8 @@ from feedsim import units
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.fields import Quantity
-from feedsim.scenario import Drive, Friction, Machine
+from feedsim.scenario import Drive, Friction, Machine, Scenario
+from feedsim.scenario.axis_units import SHARED_WITH_GUIDE
 from feedsim.scenario.parameter_group import ParameterGroup
 
 Array = NDArray[np.float64]
@@ -36,7 +37,6 @@ LOAD, INERTIA = "constant_load", "inertia"
 # Symbol of the correlation matrix -> key of the group `identified`, of what is no parameter of the friction.
 BESIDE = {"M_0": LOAD, "J": INERTIA}
 DRAWN_UNITS = {LOAD: "N.m", INERTIA: "kg.m2"}
-TORQUES = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "F_log")  # what friction multiplies a torque with
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,12 +181,22 @@ def unit_of(name: str) -> str:
 def torque_scale(machine: Machine, drawn: Machine, axis: str) -> float:
     """Inertia of an axis of a machine over that of a draw of it: what multiplies all torques of that axis.
 
-    A torque that reaches the axis from outside the machine, a feedforward, has to be multiplied with it as well.
+    A torque that reaches the axis from outside the machine, a feedforward or a load, has to be multiplied as well.
     """
     before, after = machine.axes[axis].drive, drawn.axes[axis].drive
     if not (isinstance(before, Drive) and isinstance(after, Drive) and before.M_max):
         return 1.0
     return after.M_max / before.M_max  # the limit is never drawn itself
+
+
+def on_draw(scenario: Scenario, drawn: Machine) -> Scenario:
+    """The scenario on a draw of its machine, without a log: loads are torques and forces from outside as well."""
+    loads = []
+    for load in scenario.loads:
+        axis = load.axis_name
+        scale = torque_scale(scenario.machine, drawn, axis) if axis in drawn.axes else 1.0
+        loads.append(load.model_copy(update={"factor": scale * load.factor}) if scale != 1 else load)
+    return scenario.model_copy(update={"machine": drawn, "loads": tuple(loads), "logging": None})
 
 
 def drawn_friction(friction: Friction, known: Known, random: np.random.Generator) -> Friction:
@@ -209,7 +219,8 @@ def _possible(axis: Any, known: Known, random: np.random.Generator) -> Any:
         friction, drive = _friction(axis.friction, drawn, factor), _drive(axis.drive, drawn, factor)
         if friction is not None and drive is not None:
             load = factor * drawn.get(LOAD, axis.constant_load)
-            return axis.model_copy(update={"friction": friction, "drive": drive, "constant_load": load})
+            parts = {} if factor == 1 else _behind_motor(axis, factor)
+            return axis.model_copy(update={"friction": friction, "drive": drive, "constant_load": load, **parts})
     raise _impossible(known)
 
 
@@ -223,7 +234,7 @@ def _impossible(known: Known) -> InputError:
 def _friction(friction: Friction, drawn: Mapping[str, float], factor: float) -> Friction | None:
     """With the values drawn, its torques times `factor`; None where that is no friction."""
     values = {name: value for name, value in drawn.items() if name in Friction.model_fields}
-    for name in TORQUES if factor != 1 else ():
+    for name in SHARED_WITH_GUIDE if factor != 1 else ():
         values[name] = factor * values.get(name, float(getattr(friction, name)))
     if not _within(Friction, values):
         return None
@@ -256,8 +267,22 @@ def _group_torques(drive: Drive, factor: float) -> dict[str, ParameterGroup]:
             quantities = {key: Quantity.of(info) for key, info in type(each).model_fields.items()}
             torques = [key for key, quantity in quantities.items() if quantity is not None and quantity.unit == "N.m"]
             if torques:
-                found[name] = each.model_copy(update={key: factor * getattr(each, key) for key in torques})
+                found[name] = _times(each, torques, factor)
     return found
+
+
+def _behind_motor(axis: Any, factor: float) -> dict[str, ParameterGroup]:
+    """Contact of the motor, and a guide with a law of its own, with their forces times `factor`."""
+    found: dict[str, ParameterGroup] = {}
+    if axis.transmission is not None:
+        found["transmission"] = _times(axis.transmission, ("stiffness", "damping"), factor)
+    if axis.guide is not None and axis.guide.share is None:
+        found["guide"] = _times(axis.guide, SHARED_WITH_GUIDE, factor)
+    return found
+
+
+def _times(group: ParameterGroup, names: Iterable[str], factor: float) -> ParameterGroup:
+    return group.model_copy(update={name: factor * getattr(group, name) for name in names})
 
 
 def _within(model: type[Friction | Drive], values: Mapping[str, float]) -> bool:

@@ -20,7 +20,7 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.run import run
 from feedsim.errors import InputError, SimulationError
 from feedsim.scenario import Recording
-from feedsim.uncertainty.draws import Cloud, Known, drawn_friction, torque_scale
+from feedsim.uncertainty.draws import Cloud, Known, drawn_friction, on_draw, torque_scale
 from feedsim.uncertainty.spread import interval, share_of
 
 Array = NDArray[np.float64]
@@ -84,9 +84,8 @@ def of_run(
     curves: list[dict[tuple[str, str], Array]] = []
     for k, machine in enumerate(cloud.draws(count, seed)):
         progress("draws", k, count)
-        plan = scenario.model_copy(update={"machine": machine, "logging": None})
         with _draw(k, count):
-            done = run(plan, program=program, fmus=fmus)
+            done = run(on_draw(scenario, machine), program=program, fmus=fmus)
         figures.append(evaluate(done))
         curves.append({key: y for key, (_, y) in curves_of(done).items()})
     progress("draws", count, count)
@@ -110,7 +109,7 @@ def of_compensation(
     columns = tuple(f"{axis}.x_a" for axis in turn.axes)
     tool = tuple(name for name in found.after.trace.columns if name.startswith("tcp."))
     recording = Recording(interval=scenario.recording.interval, variables=(*columns, *tool))
-    lean = scenario.model_copy(update={"recording": recording, "logging": None})
+    lean = scenario.model_copy(update={"recording": recording})
     random = np.random.default_rng(seed + 1)
     machines = cloud.draws(count, seed) if cloud is not None else iter([scenario.machine] * count)
     figures: list[Mapping[str, Figure]] = []
@@ -126,7 +125,7 @@ def of_compensation(
                 axis: torque_scale(scenario.machine, machine, axis) * each
                 for axis, each in friction_feedforward(machine, program, sets, found.delays, law).items()
             }
-            plan = lean.model_copy(update={"machine": machine})
+            plan = on_draw(lean, machine)
             with _draw(k, count):
                 before = run(plan, program=program, fmus=fmus)
                 after = run(plan, program=program, fmus=fmus, torque_feedforward=torque)

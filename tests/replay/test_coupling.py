@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from feedsim.cosim import run
+from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
-from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.identify import Record
+from feedsim.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
 from feedsim.replay.coupling import coupled
 from feedsim.replay.elastic import Beside, ElasticMode, with_modes
+from feedsim.replay.identified import _beside
 from feedsim.replay.machine_files import RigidAxis, machine_files
 from feedsim.scenario import Machine, load, load_machine
 from feedsim.structure import checked_modes
@@ -114,3 +117,18 @@ def test_a_table_of_modes_has_the_shape(tmp_path: Path) -> None:
     assert table.ports["x_Y"][2] == pytest.approx(0.04 * table.ports["x_X"][0])
     assert table.ports["tcp_Y"][2] == table.ports["x_Y"][2]
     assert table.ports["n_Y"][2] == 0
+
+
+def test_records_with_unlike_gaps() -> None:
+    """A mode stays as it is, and a replay of both says what differs."""
+
+    def record(axis: str, count: int) -> AxisRecord:
+        time = 2e-3 * np.arange(count)
+        made = Record("log.csv", time=time, torque=np.zeros(count), angle=time**2, setpoint=time**2)
+        return AxisRecord(axis, made, 1.0, np.ones(count, dtype=bool))
+
+    records = {"X": record("X", 300), "Y": record("Y", 200)}
+    mode = ElasticMode(25.0, 0.04, 1.0, 1.0)
+    assert _beside({}, {"X": (mode,), "Y": ()}, records, None) == {"X": (mode,), "Y": ()}
+    with pytest.raises(InputError, match=r"differ from axis to axis: X 0 to 0\.598 s, Y 0 to 0\.398 s; give a window"):
+        Replay(load_machine(MACHINES / "sinumerik_840d"), records)

@@ -154,12 +154,20 @@ def _begins_in_motion(record: Record) -> bool:
     return bool(speed[0] > MOVES * np.max(speed))
 
 
+def same_time(records: Mapping[str, AxisRecord]) -> bool:
+    """Whether records of several axes have rows at the same instants."""
+    first, *others = (each.record.time for each in records.values())
+    return all(np.array_equal(first, time) for time in others)
+
+
 class Replay:
     """Records of some axes of a machine, and what its units make of them; the other axes are held where they are.
 
     Attributes:
         records: axis -> its record; all over the same time.
         lead: time that the run begins ahead of the first row [s].
+
+    Raises InputError: rows that no control cycle meets; records over unlike times.
     """
 
     def __init__(
@@ -173,6 +181,14 @@ class Replay:
         self.records, self._coupling, self._fmus = dict(records), coupling, fmus
         one = next(iter(records.values())).record
         self.time, self.interval = one.time, one.interval
+        if not same_time(records):
+            stretches = ", ".join(
+                f"{axis} {each.record.time[0]:.6g} to {each.record.time[-1]:.6g} s" for axis, each in records.items()
+            )
+            raise InputError(
+                f"{one.name}: the stretches without a gap differ from axis to axis: {stretches}; give a window that is "
+                "without one in all of them, or one axis at a time"
+            )
         T_c = machine.cycles.T_c
         if abs(self.interval / T_c - round(self.interval / T_c)) > 1e-6 * self.interval / T_c:
             raise InputError(

@@ -14,7 +14,7 @@ from feedsim.errors import InputError
 from feedsim.identify import Recorded
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
-from feedsim.replay.closed_loop import AxisRecord
+from feedsim.replay.closed_loop import AxisRecord, same_time
 from feedsim.replay.compare import Comparison, replayed
 from feedsim.replay.coupling import coupled
 from feedsim.replay.drive import DECISIVE, DriveFound, identify_drive
@@ -139,9 +139,12 @@ def _beside(
     files: Mapping[str, str], modes: Mapping[str, Sequence[ElasticMode]], records: Mapping[str, AxisRecord],
     fmus: Path | None,
 ) -> dict[str, tuple[ElasticMode, ...]]:  # fmt: skip
-    """The modes of all axes with what they do at the scales of others. files: of the machine with these modes."""
+    """The modes of all axes with what they do at the scales of others. files: of the machine with these modes.
+
+    Of records whose gaps lie elsewhere nothing is said.
+    """
     shapes = {}
-    if len(records) > 1 and any(modes.values()):
+    if len(records) > 1 and any(modes.values()) and same_time(records):
         with _folder(files) as folder:
             shapes = coupled(load_machine(folder), records, fmus)
     found, k = {}, len(modes)  # the table begins with a rigid mode of every axis

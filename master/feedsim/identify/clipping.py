@@ -37,14 +37,18 @@ class _Heap:
     rows: NDArray[np.bool_]
 
     def like(self, other: _Heap) -> bool:
-        """Whether both end at the same limit."""
-        return self.side == other.side and abs(self.limit - other.limit) <= self.reach + other.reach
+        """Whether both end at the same limit: a range is as wide to either side."""
+        return abs(self.limit - other.limit) <= self.reach + other.reach
 
 
-def without_clipped(records: Sequence[Record], J: float | None = None) -> tuple[tuple[Record, ...], tuple[str, ...]]:
+def without_clipped(
+    records: Sequence[Record],
+    J: float | None = None,
+    left_out: str = "these rows and the plateaus with them are left out",
+) -> tuple[tuple[Record, ...], tuple[str, ...]]:
     """The records with the rows marked at which their torque is cut off, and a sentence for each such record.
 
-    J: inertia [kg.m2] for records whose other rows determine none.
+    J: inertia [kg.m2] for records whose other rows determine none. left_out: what the caller does with such rows.
     """
     heaps = [tuple(_heap(record, side) for side in (1.0, -1.0)) for record in records]
     trial = [
@@ -70,7 +74,7 @@ def without_clipped(records: Sequence[Record], J: float | None = None) -> tuple[
             found.append(record)
             continue
         found.append(replace(record, clipped=np.any([heap.rows for heap in kept], axis=0)))
-        said.append(_words(found[-1], kept, torque))
+        said.append(_words(found[-1], kept, torque, left_out))
     return tuple(found), tuple(said)
 
 
@@ -112,7 +116,7 @@ def _beyond(heap: _Heap, needed: Array, margin: float) -> bool:
     return most > limit + max(CLIPPED_EXCESS * abs(limit), margin)
 
 
-def _words(record: Record, heaps: Sequence[_Heap], needed: Array) -> str:
+def _words(record: Record, heaps: Sequence[_Heap], needed: Array, left_out: str) -> str:
     assert record.clipped is not None
     limits = " and ".join(f"{heap.side * heap.limit:+.4g} N.m" for heap in heaps)
     parts = runs(record.clipped)
@@ -122,6 +126,6 @@ def _words(record: Record, heaps: Sequence[_Heap], needed: Array) -> str:
     most = max(float(np.max(heap.side * needed[heap.rows])) for heap in heaps)
     return (
         f"{record.name}: the torque is cut off at {limits}, where inertia and friction need up to {most:.3g} N.m: "
-        f"{share:.2g} % of the rows, at {', '.join(times)}{rest}; these rows and the plateaus with them are left out; "
-        "record with a wider range, or drive more gently"
+        f"{share:.2g} % of the rows, at {', '.join(times)}{rest}; {left_out}; record with a "
+        "wider range, or drive more gently"
     )

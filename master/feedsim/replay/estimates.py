@@ -226,7 +226,7 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
     """
     scale = np.array([problem.deviation(name, found.values) for name in found.names])
     J, r, count = found.jacobian, found.residuals, len(problem.rows)
-    channels = slice(0, count), slice(count, 2 * count)
+    channels = np.arange(count), count + np.flatnonzero(problem.counted)
     prior = J[2 * count :].T @ J[2 * count :]
     normal = sum((J[rows].T @ J[rows] for rows in channels), prior)
     middle = sum(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
@@ -12,6 +12,8 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
+from feedsim.identify.clipping import without_clipped
+from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord, same_time
@@ -32,6 +34,7 @@ from feedsim.replay.machine_files import (
 from feedsim.replay.outside import Line, without_outside
 from feedsim.replay.start import Begin, limits, start_values
 from feedsim.scenario import Friction, Machine, load_machine
+from feedsim.structure import checked_modes
 
 OF_MACHINE = "of the machine"
 SETPOINT_ROUNDING = 1e-7  # of the way: a setpoint and a position that differ by rounding alone
@@ -43,13 +46,14 @@ class DrivesFound:
 
     drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
     machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis. outside: axis -> lines
-    from outside the axis, which were taken out of what was fitted.
+    from outside the axis, which were taken out of what was fitted. clipped: sentences on torque that is cut off.
     """
 
     drives: Mapping[str, DriveFound]
     comparisons: Sequence[Comparison]
     files: Mapping[str, str]
     outside: Mapping[str, Sequence[Line]] = field(default_factory=dict)
+    clipped: Sequence[str] = ()
 
 
 def identify_drives(
@@ -80,10 +84,12 @@ def identify_drives(
     """
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
-    fitted, outside = {}, {}
+    fitted, outside, clipped = {}, {}, []
     for axis, each in records.items():
         _refuse_own_setpoint(each)
-        fitted[axis], outside[axis] = without_outside(each)
+        whole, said = _without_clipped(each, machine)
+        clipped += said
+        fitted[axis], outside[axis] = without_outside(whole)
     begins = {axis: _begin(each) if machine is None else None for axis, each in fitted.items()}
     interval = next(iter(records.values())).record.interval
 
@@ -132,7 +138,19 @@ def identify_drives(
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
         comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
-    return DrivesFound(found, comparisons, files, outside)
+    return DrivesFound(found, comparisons, files, outside, clipped)
+
+
+def _without_clipped(each: AxisRecord, machine: Machine | None) -> tuple[AxisRecord, list[str]]:
+    """The record with the rows marked at which its torque is cut off, and a sentence on them."""
+    if not each.record.driven:
+        return each, []
+    J = checked_modes(machine).J_tot(each.axis) if machine is not None else None
+    if J is None:
+        with suppress(InputError):  # where a torque is cut off, it comes out too small: what needs more, does
+            J = inertia([each.record]).J.value
+    (record,), said = without_clipped([each.record], J, "the torque of these rows is left out of the fit")
+    return replace(each, record=record), [f"axis {each.axis}: {text}" for text in said]
 
 
 def _beside(

@@ -153,7 +153,7 @@ def unpredicted(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> tuple[
         others = np.concatenate([np.setdiff1d(np.arange(2 * count), out), prior])
         step = np.linalg.lstsq(J[others], -r[others], rcond=None)[0]
         left[out] = r[out] + J[out] @ step
-    return rms(left[:count]), rms(left[count:])
+    return rms(left[:count]), rms(left[count:][problem.counted])
 
 
 def independent(problem: Problem, count: int) -> float:

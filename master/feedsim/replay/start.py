@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
 
 import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.inertia import inertia
+from feedsim.identify.inertia import Inertia, inertia
 from feedsim.identify.parameters import EXCESS
+from feedsim.identify.record import Record
 from feedsim.replay.closed_loop import AxisRecord
 
 BANDWIDTH = 50.0  # [Hz] of a speed loop to begin with: K_p = 2 pi f J
@@ -22,6 +23,7 @@ RESERVE = 1.5  # what the machine may do beyond what the record shows
 # Shares of the mean torque that friction may have of it, where the record does not separate it from the constant load.
 FRICTION_SHARES = (0.05, 0.15, 0.4)
 LEAST_TRAVEL = 0.01  # rad: a motor that turns less determines no drive
+CLIPPED_DEVIATION = 0.3  # of the logarithm of an inertia to which rows belong whose torque is cut off
 SEPARATED = 0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
 # A torque limit that is not known must not act: gentle moves determine nothing of the torque of rapid ones.
 TORQUE_LIMIT_RATIO = 20.0
@@ -55,7 +57,7 @@ def start_values(each: AxisRecord) -> Begin:
             f"{1e6 * LEAST_TRAVEL * each.I_P:.3g} um at least"
         )
     rows = np.flatnonzero(each.rows)
-    found = inertia([each.record.between(int(rows[0]), int(rows[-1]) + 1)])
+    found, J_sigma = _rigid_line(each.record.between(int(rows[0]), int(rows[-1]) + 1))
     line = {name: one.value for name, one in found.estimates.items()}
     J = line["J"]
     if not J > 0:
@@ -66,7 +68,7 @@ def start_values(each: AxisRecord) -> Begin:
     torque = float(np.sqrt(np.mean(each.record.torque[moving] ** 2)))
     least = 0.01 * torque
     spread = {name: NORMAL_95 * one.sigma for name, one in found.estimates.items() if one.status == "estimated"}
-    J_sigma = found.J.sigma / J
+    J_sigma = max(J_sigma, found.J.sigma / J)
     if max(spread["F_C"], spread.get("M_0", inf)) <= SEPARATED * line["F_C"]:
         return Begin([_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"])])
     # The direction in which it moves further.
@@ -84,6 +86,19 @@ def start_values(each: AxisRecord) -> Begin:
         f"motion in one direction determines only M_0 {sign} friction: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
     )
     return Begin(starts, only)
+
+
+def _rigid_line(record: Record) -> tuple[Inertia, float]:
+    """The rigid line, and the deviation of the inertia's logarithm by which it may be off besides its own.
+
+    Where too few rows are left whose torque is not cut off, it is one through all rows: too small, but a start.
+    """
+    try:
+        return inertia([record]), 0.0
+    except InputError:
+        if record.clipped is None:
+            raise
+        return inertia([replace(record, clipped=None)]), CLIPPED_DEVIATION
 
 
 def _values(

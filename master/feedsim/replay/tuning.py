@@ -20,7 +20,7 @@ from feedsim.estimation.least_squares import LeastSquares, Point
 from feedsim.estimation.secant import secant
 from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import rms
-from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.replay.closed_loop import AxisRecord, Mask, Replay, per_row_of
 from feedsim.replay.elastic import modes_of, with_modes
 from feedsim.replay.parameters import difference, no_effect, parameter
 from feedsim.scenario import Machine
@@ -47,7 +47,7 @@ class Tuned:
     Attributes:
         names, values: of what was free. point: in usual deviations from the start.
         residuals: (2 N + M,) of position and torque in their weights, and of what is usual. jacobian: (2 N + M, P) of
-            them, over usual deviations.
+            them, over usual deviations. counted: (N,) rows whose torque counts.
     """
 
     names: tuple[str, ...]
@@ -55,6 +55,7 @@ class Tuned:
     point: Point
     residuals: Array
     jacobian: Array
+    counted: Mask
 
     @property
     def position(self) -> Array:
@@ -63,8 +64,8 @@ class Tuned:
 
     @property
     def torque(self) -> Array:
-        """(N,) what is left [N.m]."""
-        return self.point.errors[len(self.point.errors) // 2 :]
+        """What is left [N.m], of the rows that count."""
+        return self.point.errors[len(self.point.errors) // 2 :][self.counted]
 
 
 @dataclass(eq=False)
@@ -120,12 +121,21 @@ class Problem:
         return values["T_dyn"] if self.total is None else max(self.total - values["T_sym"], 0.0)
 
     @property
+    def counted(self) -> Mask:
+        """(N,) of `rows`: whether the torque counts."""
+        clipped = self.each.record.clipped
+        return np.ones(len(self.rows), dtype=bool) if clipped is None else ~clipped[self.rows]
+
+    @property
     def per_row(self) -> int:
         """Samples of the simulation per row: the delay of the torque lies between rows."""
         return per_row_of(self.replay.interval, self.machine)
 
     def errors(self, values: Mapping[str, float]) -> tuple[Array, Array]:
-        """(N,) of the position [m] and (N,) of the torque [N.m], at the rows of the record."""
+        """(N,) of the position [m] and (N,) of the torque [N.m], at the rows of the record.
+
+        A torque that the record cuts off is none that the motor has: it is 0 there.
+        """
         machine, scale = self.tuned(values)
         self.runs += 1
         try:
@@ -137,6 +147,8 @@ class Problem:
         fine = time[0] + h * np.arange(len(found["M_a"]))
         torque = scale * np.interp(time - delay, fine, found["M_a"])
         off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
+        if self.each.record.clipped is not None:
+            off = np.where(self.each.record.clipped, 0.0, off)
         return found["x_a"][:: self.per_row] - self.each.position, off
 
     def damping_penalty(self, values: Mapping[str, float]) -> float:
@@ -184,12 +196,12 @@ class Problem:
         for k, name in enumerate(names):
             if near is not None and name in near.names:
                 slopes[:, k] = near.point.slopes[:, near.names.index(name)]
-        return _tuned(problem, secant(problem, problem.position(begin), slopes, tolerance))
+        return self._tuned(problem, secant(problem, problem.position(begin), slopes, tolerance))
 
     def exact(self, fit: Tuned, central: bool = False) -> Tuned:
         """The same with its Jacobian by differences, which cross-validation and intervals are taken from."""
         problem = self._least_squares(fit.names)
-        return _tuned(problem, problem.exact(fit.point, central))
+        return self._tuned(problem, problem.exact(fit.point, central))
 
     def _least_squares(self, names: tuple[str, ...]) -> LeastSquares:
         """The sum of squares over both channels in their weights and over how far every parameter is off its start."""
@@ -207,6 +219,6 @@ class Problem:
         problem = LeastSquares(errors, parameters, steps, prior, weights)
         return problem
 
-
-def _tuned(problem: LeastSquares, point: Point) -> Tuned:
-    return Tuned(problem.names, problem.values(point.x), point, problem.residuals(point), problem.jacobian(point))
+    def _tuned(self, problem: LeastSquares, point: Point) -> Tuned:
+        values, residuals, jacobian = problem.values(point.x), problem.residuals(point), problem.jacobian(point)
+        return Tuned(problem.names, values, point, residuals, jacobian, self.counted)

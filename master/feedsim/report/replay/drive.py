@@ -76,6 +76,7 @@ class DriveReport:
     def warnings(self) -> list[str]:
         """What a user should know."""
         told = dict.fromkeys(text for source in self.sources for text in source.warnings)
+        told |= dict.fromkeys(self.found.clipped)
         for axis, lines in self.found.outside.items():
             if lines:
                 told[Note(f"{in_words(axis, lines)}; it was taken out of what was fitted")] = None

@@ -375,6 +375,22 @@ def test_torque_that_is_cut_off_determines_nothing(
     assert "the torque of these rows is left out of the fit; record with a wider range" in said
 
 
+def test_a_record_of_the_position_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither following error nor speed setpoint: feedforward and delays show as one lag. T_sym came out at 2.6 ms (0.8
+    to 4.4) where it is 0.6 ms, and k_ffw at 1.07, as estimated, in a fit that meets the record to its noise."""
+    true, found = simple_axis(tmp_path, monkeypatch)
+    one, own = found.drives["X"].estimates, true.axes["X"].drive
+    assert not found.clipped
+    for name in ("k_ffw", "T_sym", "T_dyn"):
+        assert one[name].status == "undetermined", name
+        assert one[name].reason.startswith("without the control's own following error only the lag shows"), name
+        assert one[name].interval[0] <= getattr(own, name) <= one[name].interval[1], name
+    assert one["K_v"].reason.startswith("without the control's own speed setpoint it rests on an axis")
+    lag = one["T_dyn"].value + one["T_sym"].value + (1 - one["k_ffw"].value) / one["K_v"].value
+    assert lag == pytest.approx(own.T_dyn + own.T_sym + (1 - own.k_ffw) / own.K_v, abs=5e-6)
+    assert one["J"].interval[0] <= checked_modes(true).J_tot("X") <= one["J"].interval[1]
+
+
 ONE_WAY = """
 name: one_way
 machine: {machine}

@@ -11,7 +11,8 @@ import pytest
 
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.parameters import estimate
-from feedsim.replay.estimates import STRETCHES, between_stretches, one_phase, with_undecided
+from feedsim.identify.result import Estimate
+from feedsim.replay.estimates import STRETCHES, between_stretches, one_phase, shared_lag, with_undecided
 
 
 def fits(*values: dict[str, float]) -> Any:
@@ -44,6 +45,19 @@ def test_a_torque_at_one_phase_of_the_cycle_determines_no_inertia() -> None:
     found = one_phase(own)
     assert found["J"].status == "undetermined"
     assert found["F_C"] == own["F_C"]
+
+
+def test_intervals_include_every_share_of_a_lag() -> None:
+    """A fit to a position alone, whose lag of 8.185 ms is shared otherwise than in the axis, which had k_ffw = 1.0001
+    and 0.636 ms of T_sym. The record was met to its noise by both."""
+    values = {"K_v": 33.518, "k_ffw": 1.0685, "T_dyn": 7.6559e-3, "T_sym": 2.5728e-3}
+    found = {name: Estimate(name, value, "1", "", 1e-3 * value) for name, value in values.items()}
+    wider = shared_lag(found, "without it")
+    assert wider["K_v"] == found["K_v"]
+    for name, value in (("k_ffw", 1.0001), ("T_sym", 0.63607e-3), ("T_sym", 0.0), ("T_sym", 8.185e-3)):
+        assert wider[name].interval[0] <= value <= wider[name].interval[1], name
+        assert wider[name].reason.startswith("without it only the lag shows")
+    assert {name for name, each in wider.items() if each.status == "undetermined"} == {"k_ffw", "T_sym", "T_dyn"}
 
 
 @pytest.mark.parametrize("between", [0.0, 0.5])

@@ -31,13 +31,13 @@ SHAPE = 0.25  # standard deviation of the friction, of itself, where only its us
 STRETCHES = 8  # of the motion, each of which is left out once
 PRIOR_SHARE = 0.8  # share of the usual deviation that is left: the record does not determine the value
 _CONTROLLER = variables.parameters("controller")
-ON_THE_MODEL = (
-    "without the control's own speed setpoint or following error it rests on an axis that is taken to be rigid"
-)
+ON_THE_MODEL = "{} it rests on an axis that is taken to be rigid"
+SHARED_LAG = "{} only the lag shows, T_dyn + T_sym + (1 - k_ffw)/K_v, and it may be shared otherwise"
 ONE_PHASE = (
     "the torque is recorded once a cycle of the position loop, at one phase of it: it may be a quarter too small; rows "
     "of a shorter interval show it"
 )
+SHARING = ("T_sym", "k_ffw")
 ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s",
          "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
 
@@ -90,13 +90,14 @@ def estimates_of(
     else:
         put("K_v", values["K_v"], spread["K_v"], "K_v")
         if not known:
-            result["K_v"] = replace(result["K_v"], status="undetermined", reason=ON_THE_MODEL)
+            reason = ON_THE_MODEL.format(_without("speed setpoint", problem.each.record.speed_setpoint))
+            result["K_v"] = replace(result["K_v"], status="undetermined", reason=reason)
     if taps is not None:
         result["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], taps.sigma), 0.0)
     else:
         put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
         if not known:
-            result["T_dyn"] = replace(result["T_dyn"], status="undetermined", reason=ON_THE_MODEL)
+            result = shared_lag(result, _without("following error", problem.each.record.deviation))
     if EXCESS in found.names:
         rise = inner_to_outer(found.names, ["F_S"])[0]
         put("F_S", values["F_C"] + values[EXCESS], float(np.sqrt(rise @ covariance @ rise)), EXCESS)
@@ -135,6 +136,9 @@ def correlation_of(
         else:
             rows[row] = [float(each == name) for each in found.names]
     matrix = rows @ covariance @ rows.T + np.diag(further)
+    if taps is None:  # T_sym and k_ffw share the lag: what shared_lag() adds moves both
+        added = [estimates[name].sigma ** 2 - matrix[k, k] if name in SHARING else 0 for k, name in enumerate(names)]
+        matrix += np.outer(*2 * [np.sqrt(np.maximum(added, 0.0))])
     scale = np.sqrt(np.diag(matrix))
     return Correlation(tuple(names), np.asarray(matrix / np.outer(scale, scale)))
 
@@ -162,6 +166,28 @@ def one_way(each: AxisRecord, estimates: Mapping[str, Estimate], only: str) -> d
         )
     undetermined = {name: replace(estimates[name], status="undetermined", reason=only) for name in ("M_0", "F_C")}
     return {**estimates, **undetermined}
+
+
+def shared_lag(estimates: Mapping[str, Estimate], without: str) -> dict[str, Estimate]:
+    """Estimates of a record whose delay of the setpoint is not known, on a model that is not quite the axis.
+
+    A slow motion lags by T_dyn + T_sym + (1 - k_ffw)/K_v times its speed, and so does every set of values with that
+    sum. What a change of speed shows besides is of the order of (1/K_v) T_sym less half of (1/K_v)^2, along which T_sym
+    and k_ffw move together: the sets are a curved valley, and its tangent where a fit ends is no interval. T_sym may be
+    anything from 0 to the whole lag.
+
+    without: what the record lacks, in words.
+    """
+    K_v, T_sym = estimates["K_v"].value, estimates["T_sym"].value
+    lag = estimates["T_dyn"].value + T_sym + (1 - estimates["k_ffw"].value) / K_v
+    open_ = max(T_sym, lag - T_sym) / NORMAL_95
+    reason = SHARED_LAG.format(without)
+    further = {"T_dyn": 0.0, "T_sym": open_, "k_ffw": K_v * open_}
+    wider = {
+        name: replace(estimates[name], sigma=hypot(estimates[name].sigma, sigma), status="undetermined", reason=reason)
+        for name, sigma in further.items()
+    }
+    return {**estimates, **wider}
 
 
 def with_undecided(estimates: Mapping[str, Estimate], found: Tuned, undecided: Sequence[Tuned]) -> dict[str, Estimate]:
@@ -203,6 +229,13 @@ def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -
     named = [[f"{key}_{k}" for key in KEYS] for k in range(1, len(own) + 1)]
     modes = [replace(each, sigma=tuple(spread[name] for name in names)) for each, names in zip(own, named, strict=True)]
     return tuple(sorted(modes, key=lambda each: each.frequency))
+
+
+def _without(signal: str, recorded: Array | None) -> str:
+    """Begin of a reason: the record lacks a signal, or has it of other samples than its setpoint and position."""
+    if recorded is None:
+        return f"without the control's own {signal}"
+    return f"as the recorded {signal} does not follow from setpoint and position to the last digits,"
 
 
 def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:

@@ -370,6 +370,8 @@ def test_torque_that_is_cut_off_determines_nothing(
     assert one["J"].status == one["K_p"].status == "estimated"
     for name, value in (("J", J), ("K_p", 6.5), ("F_C", true.axes["X"].friction.F_C)):
         assert one[name].interval[0] <= value <= one[name].interval[1], name
+    # Where a fourth of the rows is cut off, the rest of them do not separate the two, though the axis moves both ways.
+    assert limit == 0.8 or one["F_C"].reason.startswith("torque that is not cut off determines only M_0 + friction")
     (said,) = found.clipped
     assert said.startswith("axis X: log.csv: the torque is cut off at +")
     assert "the torque of these rows is left out of the fit; record with a wider range" in said

@@ -82,9 +82,8 @@ def start_values(each: AxisRecord) -> Begin:
     if line["F_C"] > 0 and "M_0" in spread:
         starts.append(_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"]))
     sign = "+" if way > 0 else "-"
-    only = (
-        f"motion in one direction determines only M_0 {sign} friction: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
-    )
+    rows_left = "motion in one direction" if each.record.clipped is None else "torque that is not cut off"
+    only = f"{rows_left} determines only M_0 {sign} friction: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
     return Begin(starts, only)
 
 

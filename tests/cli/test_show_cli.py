@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -50,6 +51,25 @@ def test_what_differs_is_told(results: tuple[Path, Path], tmp_path: Path, capsys
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "+1.00<" in page  # the difference of G
     assert set(re.findall(r'<figure id="([\w-]+)" class="chart(?: lead)?"', page)) >= {"contour-XZ", "position"}
+
+
+def test_a_compensated_run_lies_beside_a_run(
+    results: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its turn with compensation has the names of a run; what only one of both has stands in the table."""
+    compensated = tmp_path / "compensated"
+    shutil.copytree(results[0], compensated)
+    told = json.loads((compensated / "summary.json").read_text())
+    G = {"value": 0.25, "unit": "um", "meaning": ""}
+    told["figures"] = {"before.G": told["figures"]["XZ.G"], "after.G": G, "X.peak_feedforward": {**G, "unit": "N.m"}}
+    told |= {"kind": "compensate", "compensation": {"turn": {"plane": ["X", "Z"]}}}
+    (compensated / "summary.json").write_text(json.dumps(told))
+    assert show(tmp_path / "out", results[0], compensated) == 0
+    said = capsys.readouterr().out
+    assert "XZ: circular deviation G 0.00 -> 0.25 um." in said
+    assert "before" not in said
+    assert "reversal peak of" not in said  # peak_feedforward is none, and the peaks stand on one side alone
+    assert "X.peak_feedforward" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_record_lies_beside_a_result(results: tuple[Path, Path], tmp_path: Path) -> None:

@@ -118,10 +118,7 @@ def _read(path: Path, name: str) -> Source:
         told = json.loads(summary.read_text(encoding="utf-8"))
         return Source(
             name, path, recording, time,
-            figures={
-                key: (math.nan if each["value"] is None else float(each["value"]), str(each["unit"]))
-                for key, each in told["figures"].items()
-            },
+            figures=_figures(told),
             parameters=_parameters(told),
             circles={prefix: tuple(map(_turn, turns)) for prefix, turns in told.get("circles", {}).items()},
             answer=tuple(map(str, told.get("answer", ()))),
@@ -129,6 +126,19 @@ def _read(path: Path, name: str) -> Source:
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{summary}: is no summary of `feedsim run`: {type(error).__name__}: {error}") from None
+
+
+def _figures(summary: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+    """Name -> value and unit; of a compensation those of its compensated turn, by the names that a run gives them."""
+    found = {
+        key: (math.nan if each["value"] is None else float(each["value"]), str(each["unit"]))
+        for key, each in summary["figures"].items()
+    }
+    if summary.get("kind") != "compensate":
+        return found
+    label = "".join(map(str, summary["compensation"]["turn"]["plane"]))
+    kept = {key: each for key, each in found.items() if not key.startswith("before.")}
+    return {f"{label}.{key.removeprefix('after.')}" if key.startswith("after.") else key: e for key, e in kept.items()}
 
 
 def _turn(told: Mapping[str, Any]) -> Turn:

@@ -158,15 +158,20 @@ def _readable(value: str) -> str:
 
 
 def _leading(sources: Sequence[Source]) -> dict[str, Values]:
-    """Leading figure -> its value and unit in every source, in the order of LEADING_FIGURES within each prefix."""
+    """Leading figure -> its value and unit in every source, in the order of LEADING_FIGURES within each prefix.
+
+    Where results have leading figures in common, those that one of them lacks are left to the table.
+    """
     places: dict[str, int] = {}
+    axes = {axis for source in sources for axis in source.axes}
     for name in dict.fromkeys(name for source in sources for name in source.figures):
         key = name.partition(".")[2]
-        if "." not in key and not key.endswith(("+", "-")):
-            for k, each in enumerate(LEADING_FIGURES):
-                if key == each or (each.endswith("_") and key.startswith(each)):
-                    places[name] = k
+        for k, each in enumerate(LEADING_FIGURES):
+            if key == each or (each.endswith("_") and key.startswith(each) and key.removeprefix(each) in axes):
+                places[name] = k
     order = sorted(places, key=lambda name: (name.partition(".")[0], places[name]))
+    common = [name for name in order if all(name in source.figures for source in sources if source.figures)]
+    order = common or order
     return {name: [source.figures.get(name) for source in sources] for name in order}
 
 

@@ -21,14 +21,14 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
 # What has an iteration, an order or pinned digits in it, but no statistics. The rest, many minutes: --all.
-REFERENCES = ("reference/test_reference.py", "identify/test_fit.py", "identify/test_stribeck.py")
+REFERENCES = ("reference/test_reference.py", "estimation/test_fit.py", "identify/test_stribeck.py")
 CORE = (
     "reference/test_reference.py",
-    "identify",
+    "estimation", "identify",
     "physics/test_closed_forms.py", "physics/test_friction_law.py", "physics/test_linear_blocks.py",
     "physics/test_linear_machine.py", "physics/test_output_error.py", "physics/test_stationary.py",
 )  # fmt: skip
-ALL = ("reference", "identify", "physics")
+ALL = ("reference", "estimation", "identify", "physics")
 PROBE = """
 import json, math, numpy, scipy.linalg
 x = [0.001 * i for i in range(1, 20000)]

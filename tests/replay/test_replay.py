@@ -16,20 +16,10 @@ from feedsim.replay.closed_loop import Replay, read_axes, windowed
 from feedsim.scenario import load, load_machine
 from feedsim.trace import Trace, read_csv, write_csv
 from feedsim.trace.trace import Array
+from kinds_helpers import LOGGED as SCENARIO
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
-SCENARIO = f"""
-name: log of Z
-machine: {MACHINE}
-motions:
-  - {{kind: dwell, duration: 0.1 s}}
-  - {{kind: move, by: {{Z: 12 mm}}, feed: 6000 mm/min}}
-  - {{kind: move, by: {{Z: -5 mm}}, feed: 600 mm/min}}
-  - {{kind: dwell, duration: 0.1 s}}
-recording: {{interval: 1 ms}}
-logging: {{interval: 2 ms, axes: [Z], signals: [x_s, x_a, x_e, n_s, n_ffw, M_a]}}
-"""
 
 
 @pytest.fixture(scope="module")

@@ -258,7 +258,7 @@ def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) ->
 def evaluate(result: Result, asked: Sequence[Task] | None = None) -> dict[str, Figure]:
     """Every figure that the scenario of ``result`` asks for, e.g. "Z.overshoot", "XZ.G", "XZ.tool.glitch_X".
 
-    asked: the scenario's tasks, where they are at hand already.
+    asked: the scenario's tasks, where the caller has them already.
 
     >>> import feedsim as fs
     >>> figures = fs.evaluate(fs.run("z_positioning.yaml"))

@@ -87,7 +87,7 @@ def run(
     """Run `scenario` and return its trace.
 
     Args:
-        program: the scenario's planned motions, where they are at hand already.
+        program: the scenario's planned motions, where the caller has them already.
         fmus: folder with plant.fmu, controller.fmu, friction.fmu, or machine.fmu; default
             :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).

@@ -3,7 +3,7 @@
 A torque A sin(k phi + psi), phi the angle of the motor, is along a circle a torque over the time of a turn, as phi
 follows the position of the axis. Its harmonics move the axis by the response of the loops to a torque at the motor.
 Speed and resonances are in that response, so the amplitude comes out in N.m. Looked for between the reversals, beside
-all terms of the model. Start reading at strongest().
+all terms of the model. Start reading at fitted().
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
-from feedsim.analysis.circle.model import Fit, blocks_of
+from feedsim.analysis.circle.model import Fit, blocks_of, fit
 from feedsim.analysis.figures import Array
 from feedsim.estimation.covariance import Covariance
 from feedsim.estimation.interval import student
@@ -86,6 +86,17 @@ class Wave:
     def curve(self, circle: CircleUnderTest, angle: Array, sense: int) -> Array:
         """Radial deviation (N,) [m]."""
         return np.asarray(self.columns(circle, angle, sense) @ np.array(self.parts))
+
+
+def fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
+    """The model fitted to the paths without waves of the motors' torque, and these waves."""
+    found, waves = fit(circle, paths), list[Wave]()
+    plain = found
+    while len(waves) < MAX_WAVES and (wave := strongest(circle, found)) is not None:
+        waves.append(wave)
+        found = fit(circle, without(circle, paths, waves))
+        waves = settled(circle, found, waves)
+    return (found, waves) if stand_out(plain, found) else (plain, [])
 
 
 def without(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequence[Wave]) -> list[TurnedPath]:

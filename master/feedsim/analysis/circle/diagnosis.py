@@ -11,9 +11,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.cogging import MAX_WAVES, Wave, settled, stand_out, strongest, without
+from feedsim.analysis.circle.cogging import fitted, without
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
-from feedsim.analysis.circle.model import Fit, fit
+from feedsim.analysis.circle.model import Fit
 from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
 from feedsim.analysis.figures import Array
@@ -146,7 +146,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     centred: the centre is that of the measurement's set-up and no error of the machine; G is then about the fitted one.
     """
     whole, paths = paths, [path.thinned() for path in paths]
-    found, waves = _fitted(circle, paths)
+    found, waves = fitted(circle, paths)
     circle = replace(circle, response=None)  # a result is data
     curves = _curves(found, paths, circle)
     total = [path.deviation for path in paths]
@@ -208,17 +208,6 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
             (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
         ),
     )
-
-
-def _fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
-    """The model fitted to the paths without waves of the motors' torque, and these waves."""
-    found, waves = fit(circle, paths), list[Wave]()
-    plain = found
-    while len(waves) < MAX_WAVES and (wave := strongest(circle, found)) is not None:
-        waves.append(wave)
-        found = fit(circle, without(circle, paths, waves))
-        waves = settled(circle, found, waves)
-    return (found, waves) if stand_out(plain, found) else (plain, [])
 
 
 def _lag(circle: CircleUnderTest) -> float | None:

@@ -88,7 +88,7 @@ fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml
 # What the master knows of the units' variables.
 VARIABLES := master/feedsim/variables.json
 fmus: $(VARIABLES)
-$(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h $(foreach unit,$(UNITS),$(wildcard src/$(unit)_fmu/*.def src/$(unit)_fmu/identity.h))
+$(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h src/machine_fmu/cycle.h $(foreach unit,$(UNITS),$(wildcard src/$(unit)_fmu/*.def src/$(unit)_fmu/identity.h))
 	$(PY) -m feedsim_packager variables --out $@
 
 # The native cycle loop lies beside the archives.

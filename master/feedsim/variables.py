@@ -66,10 +66,16 @@ def parameters(unit: str) -> Mapping[str, Variable]:
     return {name: variable for name, variable in table(unit).items() if variable.causality == "parameter"}
 
 
+def cycle() -> Mapping[str, list[list[Any]]]:
+    """Rows of the control cycle by their tables (src/machine_fmu/cycle.h, which says what they mean)."""
+    rows: dict[str, list[list[Any]]] = _read()["machine/cycle"]
+    return rows
+
+
 @cache
-def _read() -> dict[str, dict[str, dict[str, Any]]]:
+def _read() -> dict[str, Any]:
     try:
-        content: dict[str, dict[str, dict[str, Any]]] = json.loads(FILE.read_bytes())
+        content: dict[str, Any] = json.loads(FILE.read_bytes())
     except FileNotFoundError:
         raise InputError(f"{FILE} is missing; {mend('it from the tables of the units')}") from None
     return content

@@ -8,23 +8,9 @@
 
 #define ALIGNED(size) (((size) + 15) / 16 * 16)
 
-const Scheme machine_schemes[SCHEMES] = {
-    {.name = "extrapolated", .speed = SPEED_WITHIN, .torque_ramp = true, .friction_ramp = true, .passes = 1},
-    {.name = "iterated", .speed = SPEED_WITHIN, .torque_ramp = true, .friction_ramp = true, .passes = 2},
-    {.name = "gauss_seidel", .speed = SPEED_AT_END, .torque_ramp = true, .passes = 1},
-    {.name = "gauss_seidel_friction_first",
-     .speed = SPEED_AT_START,
-     .torque_ramp = true,
-     .friction_first = true,
-     .passes = 1},
-    {.name = "jacobi", .speed = SPEED_AT_START, .torque_ramp = true, .passes = 1},
-    {.name = "jacobi_extrapolated",
-     .speed = SPEED_EXTRAPOLATED,
-     .torque_ramp = true,
-     .friction_ramp = true,
-     .passes = 1},
-    {.name = "parallel", .speed = SPEED_AT_START, .passes = 1},
-};
+#define SCHEME(number, name, stable, speed, ...) [number] = {SPEED_##speed, __VA_ARGS__},
+const Scheme machine_schemes[LAST_SCHEME + 1] = {SCHEMES(SCHEME)};
+#undef SCHEME
 
 /* --- where the parts find theirs */
 

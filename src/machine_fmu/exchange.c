@@ -1,8 +1,5 @@
-/* One control cycle: who steps when, and what each part is told of its inputs within the step. It is the cycle of the
- * master (feedsim/cosim/schedule.py), operation by operation and rounding by rounding, so that both give the same bits.
- *
- * The drives sample at t_k and run first. The stiff bond is plant <-> friction; a Scheme says how the two see each
- * other within an exchange step. */
+/* One control cycle: the rows of cycle.h on the parts of the machine. The master works the same rows on units of their
+ * own (feedsim/cosim/schedule.py), so that both give the same bits. */
 #include <string.h>
 
 #include "machine.h"
@@ -13,7 +10,8 @@ typedef struct Exchange {
     Machine *machine;
     const Scheme *scheme;
     AxisState *axes;
-    double h; /* [s] */
+    double t, t_k; /* start of the communication step and of the cycle [s] */
+    double h;      /* [s] */
     double *M_a, *M_a_start, *M_a_slope, *M_fr_start, *n_start, *n, *n_slope;
     double *forces; /* as the importer has set them */
 } Exchange;
@@ -133,29 +131,20 @@ static void tell_drive(Unit *unit, size_t i, double t, double t_k) {
 
 /* --- drives */
 
-static bool step_drives(const Exchange *x, double t, double t_k) {
-    const double T_c = x->machine->T_c;
+static bool step_drives(const Exchange *x) {
     for (size_t i = 0; i < x->machine->axes; i++) {
         Part *drive = &x->machine->drives[i];
         AxisState *own = &x->axes[i];
         const AxisBlock *axis = unit_axis(x->unit, i);
-        tell_drive(x->unit, i, t, t_k);
-        if (!controller_part.step(drive, t_k, T_c)) {
+        tell_drive(x->unit, i, x->t, x->t_k);
+        if (!controller_part.step(drive, x->t_k, x->machine->T_c)) {
             return false;
         }
         own->M_a = axis->drive_M_a;
         own->i_d = axis->drive_i_d;
         own->i_q = axis->drive_i_q;
         own->M_a_slope = controller_part.output_derivative(drive, AXIS_VR_drive_M_a - DRIVE_FIRST);
-        if (x->scheme->torque_ramp) {
-            /* From the end backwards: a drive whose torque jumps at t_k then acts as it does, without a delay. */
-            x->M_a_slope[i] = own->M_a_slope;
-            x->M_a_start[i] = own->M_a + -T_c * own->M_a_slope;
-        } else {
-            x->M_a_slope[i] = 0;
-            x->M_a_start[i] = own->M_a_before;
-            own->M_a_before = own->M_a;
-        }
+        x->M_a_slope[i] = x->scheme->torque_ramp ? own->M_a_slope : 0;
     }
     return true;
 }
@@ -175,28 +164,15 @@ static bool step_plant(const Exchange *x) {
     return plant_part.step(&machine->plant, 0, x->h); /* the structure does not change with time */
 }
 
-/* What friction learns of the speed at its contact. */
-static void tell_speed(const Exchange *x) {
-    const size_t axes = x->machine->axes;
-    const Speed speed = x->scheme->speed;
-    for (size_t i = 0; i < axes; i++) {
-        const double n_end = unit_axis(x->unit, i)->plant_n_fr, n_start = x->n_start[i];
-        const double slope = (n_end - n_start) / x->h;
-        double *last = &x->axes[i].n_slope;
-        x->n[i] = speed == SPEED_AT_END ? n_end : n_start;
-        x->n_slope[i] = speed == SPEED_WITHIN ? slope : speed == SPEED_EXTRAPOLATED ? *last : 0;
-        *last = slope;
-    }
-}
-
 static bool step_friction(const Exchange *x) {
     const size_t axes = unit_scalars(x->unit)->coupling_friction ? x->machine->axes : 0;
     const bool ramp = x->scheme->friction_ramp;
+    const bool speed_ramp = x->scheme->speed == SPEED_within || x->scheme->speed == SPEED_extrapolated;
     Part *contact = x->machine->contacts;
     for (size_t i = 0; i < axes; i++, contact++) {
         AxisBlock *axis = unit_axis(x->unit, i);
         axis->friction_n_fr = x->n[i];
-        contact->slopes[AXIS_VR_friction_n_fr - FRICTION_FIRST] = x->n_slope[i];
+        contact->slopes[AXIS_VR_friction_n_fr - FRICTION_FIRST] = speed_ramp ? x->n_slope[i] : 0;
         if (!friction_part.step(contact, 0, x->h)) { /* nor does its law */
             return false;
         }
@@ -211,7 +187,7 @@ static bool step_friction(const Exchange *x) {
 /* --- steps that are taken again */
 
 /* Copy what plant and friction are made of between the block and `kept`. */
-static void keep(const Exchange *x, bool back) {
+static bool copy_kept(const Exchange *x, bool back) {
     const Machine *machine = x->machine;
     const size_t first = machine->places[0], states = machine->places[1 + machine->axes] - first;
     const size_t axes = machine->axes * sizeof(AxisBlock);
@@ -225,53 +201,99 @@ static void keep(const Exchange *x, bool back) {
     for (size_t i = 0; i < sizeof pieces / sizeof pieces[0]; kept += pieces[i++].size) {
         memcpy(back ? pieces[i].own : kept, back ? kept : pieces[i].own, pieces[i].size);
     }
+    return true;
 }
 
-static void go_back(const Exchange *x) {
-    keep(x, true);
-    for (size_t i = 0; i < x->machine->axes; i++) {
-        x->axes[i].M_fr = x->M_fr_start[i];
-    }
+static bool step_keep(const Exchange *x) {
+    return copy_kept(x, false);
 }
 
-static bool exchange_step(const Exchange *x) {
-    const Scheme *scheme = x->scheme;
-    for (size_t i = 0; i < x->machine->axes; i++) {
-        x->n_start[i] = unit_axis(x->unit, i)->plant_n_fr;
-        x->M_fr_start[i] = x->axes[i].M_fr;
+static bool step_restore(const Exchange *x) {
+    return copy_kept(x, true);
+}
+
+/* --- the rows of cycle.h */
+
+/* a vector at axis i */
+#define AT_M_a x->M_a[i]
+#define AT_M_a_start x->M_a_start[i]
+#define AT_M_a_end x->axes[i].M_a
+#define AT_M_a_before x->axes[i].M_a_before
+#define AT_M_a_slope x->M_a_slope[i]
+#define AT_M_fr x->axes[i].M_fr
+#define AT_M_fr_start x->M_fr_start[i]
+#define AT_n x->n[i]
+#define AT_n_slope x->n_slope[i]
+#define AT_n_slope_last x->axes[i].n_slope
+#define AT_n_start x->n_start[i]
+#define AT_n_end unit_axis(x->unit, i)->plant_n_fr
+/* a number */
+#define NUMBER_back_a_cycle (-x->machine->T_c)
+#define NUMBER_since since
+#define NUMBER_h x->h
+/* when */
+#define WHEN_always true
+#define WHEN_torque_ramps x->scheme->torque_ramp
+#define WHEN_torque_constant !x->scheme->torque_ramp
+#define WHEN_two_passes x->scheme->passes > 1
+#define WHEN_second_pass pass > 0
+#define WHEN_plant_first !x->scheme->friction_first
+#define WHEN_friction_first x->scheme->friction_first
+#define WHEN_speed_end x->scheme->speed == SPEED_end
+#define WHEN_speed_start x->scheme->speed == SPEED_start
+#define WHEN_speed_within x->scheme->speed == SPEED_within
+#define WHEN_speed_extrapolated x->scheme->speed == SPEED_extrapolated
+
+#define ON_EVERY_AXIS for (size_t i = 0; i < x->machine->axes; i++)
+#define DO_copy(y, a)                                                                                                  \
+    ON_EVERY_AXIS {                                                                                                    \
+        AT_##y = AT_##a;                                                                                               \
     }
-    if (scheme->passes > 1) {
-        keep(x, false);
+#define DO_line(y, a, s, b)                                                                                            \
+    ON_EVERY_AXIS {                                                                                                    \
+        AT_##y = AT_##a + NUMBER_##s * AT_##b;                                                                         \
     }
-    for (int pass = 0; pass < scheme->passes; pass++) {
-        if (pass > 0) {
-            go_back(x);
-        }
-        if (scheme->friction_first) {
-            tell_speed(x);
-            if (!step_friction(x) || !step_plant(x)) {
-                return false;
-            }
-        } else {
-            if (!step_plant(x)) {
-                return false;
-            }
-            tell_speed(x);
-            if (!step_friction(x)) {
-                return false;
-            }
-        }
+#define DO_rate(y, a, b, s)                                                                                            \
+    ON_EVERY_AXIS {                                                                                                    \
+        AT_##y = (AT_##a - AT_##b) / NUMBER_##s;                                                                       \
+    }
+#define DO_call(what)                                                                                                  \
+    if (!step_##what(x)) {                                                                                             \
+        return false;                                                                                                  \
+    }
+#define DO(when, what, ...)                                                                                            \
+    if (WHEN_##when) {                                                                                                 \
+        DO_##what(__VA_ARGS__)                                                                                         \
+    }
+
+static bool step_speed(const Exchange *x) {
+    SPEED_GIVEN(DO)
+    return true;
+}
+
+static bool begin_cycle(const Exchange *x) {
+    CYCLE_BEGINS(DO)
+    return true;
+}
+
+/* since: the start of the exchange step after that of the cycle [s] */
+static bool exchange_step(const Exchange *x, double since) {
+    EXCHANGE_BEGINS(DO)
+    for (int pass = 0; pass < x->scheme->passes; pass++) {
+        EXCHANGE_PASS(DO)
     }
     return true;
 }
 
-static Exchange exchange_of(Unit *unit, Machine *machine) {
+static Exchange exchange_of(Unit *unit, Machine *machine, double t, double t_k) {
     double *v = machine->vectors;
     const size_t n = machine->axes;
     return (Exchange){.unit = unit,
                       .machine = machine,
                       .scheme = machine->scheme,
                       .axes = machine_axis_states(unit),
+                      .t = t,
+                      .t_k = t_k,
                       .h = machine->T_c / (double)machine->substeps,
                       .M_a = v,
                       .M_a_start = v + n,
@@ -285,16 +307,13 @@ static Exchange exchange_of(Unit *unit, Machine *machine) {
 
 bool machine_cycle(Unit *unit, double t, double t_k) {
     Machine *machine = unit_derived(unit);
-    const Exchange x = exchange_of(unit, machine);
+    const Exchange x = exchange_of(unit, machine, t, t_k);
     keep_forces(&x);
-    bool good = step_drives(&x, t, t_k);
+    bool good = begin_cycle(&x);
     for (size_t j = 0; good && j < machine->substeps; j++) {
-        const double start = (double)j * x.h;
-        for (size_t i = 0; i < machine->axes; i++) {
-            x.M_a[i] = x.M_a_start[i] + start * x.M_a_slope[i];
-        }
-        tell_forces(&x, t_k - t + start);
-        good = exchange_step(&x);
+        const double since = (double)j * x.h;
+        tell_forces(&x, t_k - t + since);
+        good = exchange_step(&x, since);
     }
     hand_back_forces(&x);
     for (size_t i = 0; i < machine->axes; i++) {

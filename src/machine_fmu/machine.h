@@ -7,25 +7,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "cycle.h"
 #include "hash.h"
 #include "instants.h"
 #include "part.h"
 #include "unit.h"
 
-/* How plant and friction see each other within an exchange step; the schemes of the master
- * (feedsim/scenario/coupling.py), where each of them is told. */
-typedef enum Speed { SPEED_WITHIN, SPEED_AT_END, SPEED_AT_START, SPEED_EXTRAPOLATED } Speed;
+/* A row of the schemes (cycle.h), as far as a cycle needs it. */
+typedef enum Speed { SPEED_within, SPEED_end, SPEED_start, SPEED_extrapolated } Speed;
 typedef struct Scheme {
-    const char *name;
-    Speed speed;         /* friction: n_fr linear within the step, held at its end or its start, or extrapolated */
-    bool torque_ramp;    /* plant: M_a runs linearly over the control cycle; else M_a(t_k) is held */
-    bool friction_ramp;  /* plant: M_fr is extrapolated with the slope of its last step; else held */
-    bool friction_first; /* friction steps ahead of the plant, which holds the torque found; else the plant does */
-    int passes;          /* plant and friction go back and take the step again, with the slope of M_fr found */
+    Speed speed;
+    bool torque_ramp, friction_ramp;
+    int passes;
+    bool friction_first;
 } Scheme;
-
-enum { SCHEMES = 7 };
-extern const Scheme machine_schemes[SCHEMES]; /* in the order of the parameter coupling.scheme */
+extern const Scheme machine_schemes[LAST_SCHEME + 1];
 
 /* Derived data. */
 typedef struct Machine {

@@ -74,6 +74,11 @@
 #define ENTRY_ROW(kind, field, name, c, v, start, st, unit, display, min, mint, max, maxt, depends, text)              \
     ENTRY_##c(kind, field, name, v, start, st, unit, display, min, mint, max, maxt, text)
 
+/* --- a row with what macros expand to; the schemes as words of its text */
+
+#define INTEGER_EXPANDED(...) INTEGER_OF(__VA_ARGS__)
+#define SCHEME_TEXT(number, name, ...) "; " #number " " #name
+
 /* --- plant */
 
 #define PLANT_parameter(row, kind, field, name, v, start, st, unit, display, min, mint, max, maxt, text)               \

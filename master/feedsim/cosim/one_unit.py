@@ -94,7 +94,7 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
             ],
         )
     values: dict[str, Parameter] = {
-        "coupling.scheme": list(SCHEMES).index(coupling.scheme),
+        "coupling.scheme": SCHEMES[coupling.scheme].number,
         "coupling.substeps": coupling.substeps,
         "motion.built_in": built_in,
     }

@@ -1,24 +1,25 @@
-"""One control cycle of the coupled system: who steps when, and what each unit is given of its inputs within the step.
+"""One control cycle of the coupled system as a list of operations, which feedsim.cosim.operations executes.
 
-It is written down here, once, as a list of operations, and executed elsewhere (feedsim.cosim.operations).
-
-The controllers sample at t_k and run first; they add no error. The stiff bond is plant <-> friction; a :class:`Scheme`
-(feedsim.scenario.coupling) says how the two see each other within a step.
+What is done in which order are the rows of src/machine_fmu/cycle.h. The unit `machine` works the same rows on its
+parts. Here they become calls of units, with the ports and slopes that those have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from feedsim import variables
 from feedsim.cosim import operations as op
 from feedsim.cosim.operations import Bond, Operation
 from feedsim.cosim.roles import RoleUnit, check_step
 from feedsim.cosim.system import System
-from feedsim.cosim.unit import Floats
+from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError
 from feedsim.scenario.coupling import SCHEMES, Scheme
+
+ARITHMETIC: dict[str, Callable[..., Operation]] = {"copy": op.copy, "line": op.line, "rate": op.rate}
 
 
 def lacking(role: RoleUnit, scheme: Scheme) -> str:
@@ -90,47 +91,56 @@ class Cycle:
 
     def operations(self) -> Iterator[Operation]:
         """The whole system from k T_c to (k + 1) T_c."""
-        system = self.system
-        for control in system.controllers:
+        yield from self._rows("CYCLE_BEGINS")
+        for j in range(self.substeps):
+            yield from self._rows("EXCHANGE_BEGINS", j * self.step)
+            for index in range(self.scheme.passes):
+                yield from self._rows("EXCHANGE_PASS", j * self.step, second_pass=index > 0)
+            yield op.exchange_energy(self.bond, self.step)
+
+    def _rows(self, table: str, since: float = 0.0, second_pass: bool = False) -> Iterator[Operation]:
+        """Operations of a table's rows; since: the start of the exchange step after that of the cycle [s]."""
+        scheme = self.scheme
+        due = {
+            "always",
+            "torque_ramps" if scheme.torque_ramp else "torque_constant",
+            "two_passes" if scheme.passes > 1 else "one_pass",
+            "second_pass" if second_pass else "first_pass",
+            "friction_first" if scheme.friction_first else "plant_first",
+            f"speed_{scheme.speed}",
+        }
+        numbers = {"back_a_cycle": -self.cycle, "since": since, "h": self.step}
+        for when, what, *words in variables.cycle()[table]:
+            if when not in due:
+                continue
+            if what == "call":
+                yield from getattr(self, f"_{words[0]}")(since)
+            else:
+                yield ARITHMETIC[what](*(numbers[word] if word in numbers else self._vector(word) for word in words))
+
+    def _vector(self, name: str) -> Floats:
+        vector: Floats = getattr(self if name in ("M_fr_start", "M_a_before") else self.system, name)
+        return vector
+
+    def _drives(self, _: float) -> Iterator[Operation]:
+        for control in self.system.controllers:
             yield from op.set_real(control.measured)
             yield op.do_step(control.unit, 0.0, self.cycle)
             yield from op.get_real(control.torque)
-            if self.scheme.torque_ramp and control.role.gives_slopes:  # of another drive, M_a is held as it is found
+            if self.scheme.torque_ramp and control.role.gives_slopes:  # of another drive, M_a is constant
                 yield from op.get_slopes(control.torque)
-        if self.scheme.torque_ramp:
-            # From the end backwards: a drive whose torque jumps at t_k then acts as it does, without a cycle's delay.
-            yield op.line(system.M_a_start, system.M_a_end, -self.cycle, system.M_a_slope)
-        else:
-            yield op.copy(system.M_a_start, self.M_a_before)
-            yield op.copy(self.M_a_before, system.M_a_end)
-        for j in range(self.substeps):
-            yield op.line(system.M_a, system.M_a_start, j * self.step, system.M_a_slope)
-            yield from self._exchange_step(j * self.step)
 
-    def _exchange_step(self, start: float) -> Iterator[Operation]:
-        """Plant and friction over the step that begins `start` [s] after the cycle; the scheme says who goes first."""
-        system, scheme = self.system, self.scheme
-        units = [system.plant, *(contact.unit for contact in system.contacts)]
-        yield op.copy(system.n_start, system.n_end)
-        if scheme.passes > 1:
-            yield op.copy(self.M_fr_start, system.M_fr)
-            yield from map(op.get_state, units)
-        for again in range(scheme.passes):
-            if again:
-                yield from map(op.set_state, units)
-                yield op.copy(system.M_fr, self.M_fr_start)
-            if scheme.friction_first:
-                yield from self._tell_speed()
-                yield from self._step_friction(start)
-                yield from self._step_plant(start)
-            else:
-                yield from self._step_plant(start)
-                yield from self._tell_speed()
-                yield from self._step_friction(start)
-        yield op.exchange_energy(self.bond, self.step)
+    def _coupled(self) -> list[Unit]:
+        return [self.system.plant, *(contact.unit for contact in self.system.contacts)]
 
-    def _step_plant(self, start: float) -> Iterator[Operation]:
-        """With the friction torque that is at hand: that of the last step's end, or what friction has just found."""
+    def _keep(self, _: float) -> Iterator[Operation]:
+        return map(op.get_state, self._coupled())
+
+    def _restore(self, _: float) -> Iterator[Operation]:
+        return map(op.set_state, self._coupled())
+
+    def _plant(self, start: float) -> Iterator[Operation]:
+        """With the friction torque of the last step's end, or that of the friction's step just before."""
         system, scheme, h = self.system, self.scheme, self.step
         yield from op.set_real(system.plant_inputs)
         if scheme.friction_ramp:
@@ -147,18 +157,11 @@ class Cycle:
             return op.line(self.assumed_torque, self.system.M_fr, self.step, self.system.M_fr_slope)
         return op.copy(self.assumed_torque, self.system.M_fr)
 
-    def _tell_speed(self) -> Iterator[Operation]:
-        """What friction learns of the speed at its contact."""
-        system, speed = self.system, self.scheme.speed
-        yield op.copy(system.n, system.n_end if speed == "end" else system.n_start)
-        if speed == "within":
-            yield op.rate(system.n_slope, system.n_end, system.n_start, self.step)
-        elif speed == "extrapolated":
-            yield op.copy(system.n_slope, system.n_slope_last)
-            yield op.rate(system.n_slope_last, system.n_end, system.n_start, self.step)
+    def _speed(self, _: float = 0.0) -> Iterator[Operation]:
+        return self._rows("SPEED_GIVEN")
 
-    def _step_friction(self, start: float) -> Iterator[Operation]:
-        """A unit that takes no slope gets the speed of the step's end; of one that gives none the torque is held."""
+    def _friction(self, start: float) -> Iterator[Operation]:
+        """A unit that takes no slope gets the speed of the step's end. Without slopes of it the torque is constant."""
         scheme = self.scheme
         for contact in self.system.contacts:
             takes, gives = contact.role.takes_slopes, contact.role.gives_slopes

@@ -118,7 +118,7 @@ class WholeCycle(Cycle):
         yield op.do_step(system.plant, 0.0, self.cycle)
         yield op.copy(system.n_start, system.n_end)
         yield from op.get_real(system.plant_outputs)
-        yield from self._tell_speed()
+        yield from self._speed()
         if not self.scheme.friction_first:
             yield self._assume_torque()
         yield from op.get_real(system.friction_torque)

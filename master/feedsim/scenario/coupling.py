@@ -1,6 +1,7 @@
 """How plant and friction are exchanged within a control cycle: the schemes, and what a scenario says of it.
 
-What a scheme means as operations: feedsim.cosim.schedule. The unit `machine` has the same ones in the same order.
+The schemes are rows of src/machine_fmu/cycle.h, which says what their columns mean; feedsim.cosim.schedule makes
+operations of them.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StrictInt
 
+from feedsim import variables
 from feedsim.fields import Model, Quantity
 
 
@@ -17,13 +19,14 @@ from feedsim.fields import Model, Quantity
 class Scheme:
     """How the units see each other within a step."""
 
+    number: int
     name: str
-    stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; docs/theory.md derives it
-    speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
-    torque_ramp: bool = True  # plant: M_a runs linearly from M_a(t_k) to M_a(t_k+1); else M_a(t_k) is held
-    friction_ramp: bool = False  # plant: M_fr is extrapolated with the slope of its last step; else held
-    passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
-    friction_first: bool = False  # friction steps ahead of the plant, which holds the torque found; else the plant does
+    stable_share: float
+    speed: str
+    torque_ramp: bool
+    friction_ramp: bool
+    passes: int
+    friction_first: bool
 
     @property
     def speed_ramp(self) -> bool:
@@ -31,18 +34,7 @@ class Scheme:
         return self.speed in ("within", "extrapolated")
 
 
-SCHEMES = {
-    scheme.name: scheme
-    for scheme in (
-        Scheme("extrapolated", friction_ramp=True, stable_share=0.25, speed="within"),
-        Scheme("iterated", friction_ramp=True, stable_share=0.5, speed="within", passes=2),
-        Scheme("gauss_seidel", stable_share=0.5, speed="end"),
-        Scheme("gauss_seidel_friction_first", stable_share=0.5, speed="start", friction_first=True),
-        Scheme("jacobi", stable_share=0.25, speed="start"),
-        Scheme("jacobi_extrapolated", friction_ramp=True, stable_share=0.1, speed="extrapolated"),
-        Scheme("parallel", stable_share=0.25, speed="start", torque_ramp=False),
-    )
-}
+SCHEMES = {scheme.name: scheme for scheme in (Scheme(*row) for row in variables.cycle()["SCHEMES"])}
 
 
 class Coupling(Model):

@@ -23,6 +23,7 @@
     archive        files <-> deterministic zip, written whole or not at all
     build          all of the above, in order
     carried        the table as an archive carries it
+    cycle          the control cycle as data -> lists
     declared       the tables of all units as the master reads them
     repack         an archive and other resources -> the archive of that machine or motion, without a compiler
     checkout       where a checkout has what archives are made from

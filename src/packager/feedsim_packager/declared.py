@@ -4,13 +4,14 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
+from . import cycle
 from .table import Row, Table
 
 
 def dump(tables: Iterable[Table]) -> bytes:
     """Unit -> name -> what its row says; a bound that is not there is left out. Parameters that every axis has stand
-    under "unit/axis"."""
-    content = {}
+    under "unit/axis", the rows of the control cycle under "machine/cycle"."""
+    content: dict[str, Any] = {"machine/cycle": cycle.read()}
     for table in tables:
         content[table.unit] = {row.name: _entry(row) for row in table.scalars}
         if own := [row for row in table.axis_rows if row.causality == "parameter"]:

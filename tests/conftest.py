@@ -9,6 +9,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import settings
 
+# Threads wait for one another over small matrices: the command, the Makefile and the benchmarks do the same. Before
+# numpy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import page_browsers
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ Start with run.py: ``run``; then schedule.py, which says once what a control cyc
 from feedsim.cosim.binaries import executed, executing, fmus_directory
 from feedsim.cosim.loop import Progress
 from feedsim.cosim.poses import Crossings
-from feedsim.cosim.run import Run, check, follow, logged, run
+from feedsim.cosim.run import Follower, Run, check, follow, logged, run
 
 __all__ = [
-    "Crossings", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",
+    "Crossings", "Follower", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",
     "run",
 ]  # fmt: skip

@@ -17,9 +17,11 @@ from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.poses import Crossings, crossings_of, grid_of
 from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
 from feedsim.cosim.schedule import Cycle
+from feedsim.cosim.system import System
 from feedsim.cosim.whole import cycle_of, system_of
 from feedsim.errors import InputError, SimulationError
 from feedsim.nc import Program, plan
+from feedsim.owned import Closing
 from feedsim.scenario import Coupling, Logging, Machine, Scenario
 from feedsim.structure.modes import checked_modes
 from feedsim.structure.poses_file import GridAxis
@@ -202,55 +204,93 @@ def _energies(cycle: Cycle) -> dict[str, float]:
     return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(cycle.system.axes) for kind in kinds}
 
 
-def follow(
-    machine: Machine,
-    program: Program,
-    columns: Collection[str],
-    interval: float,
-    *,
-    loads: Sequence[Acting] = (),
-    coupling: Coupling | None = None,
-    fmus: Path | None = None,
-    native: bool | None = None,
-) -> Trace:
-    """The axes of a machine on setpoints from anywhere: its units, exchanged as :func:`run` does, and nothing judged.
+class Follower(Closing):
+    """The axes of machines on setpoints from anywhere: their units, exchanged as :func:`run` does, and nothing judged.
 
-    Args:
-        columns: what is recorded, by name ("Z.x_a"). interval: of the rows [s], a whole multiple of the control cycle.
-        loads: what acts on the machine meanwhile.
-
-    Raises:
-        InputError, SimulationError: as :func:`run`.
+    Units stay open: a machine that differs from the one before in values and modes alone gets them again, reset.
     """
-    coupling, fmus = coupling or Coupling(), fmus or fmus_directory()
-    given = (machine, program, columns, interval, loads, coupling, fmus, native)
-    if any_foreign(machine, fmus, coupling):
-        from feedsim.cosim import worker
 
-        return worker.call(_follow, *given, limit=coupling.call_limit)
-    return _follow(*given)
+    def __init__(
+        self, *, coupling: Coupling | None = None, fmus: Path | None = None, native: bool | None = None
+    ) -> None:
+        self._coupling, self._fmus, self._native = coupling or Coupling(), fmus or fmus_directory(), native
+        self._system: System | None = None
+
+    def follow(
+        self, machine: Machine, program: Program, columns: Collection[str], interval: float,
+        *, loads: Sequence[Acting] = (),
+    ) -> Trace:  # fmt: skip
+        """
+        Args:
+            columns: what is recorded, by name ("Z.x_a"). interval: of the rows [s], a whole multiple of the control
+                cycle.
+            loads: what acts on the machine meanwhile.
+
+        Raises:
+            InputError, SimulationError: as :func:`run`.
+        """
+        if any_foreign(machine, self._fmus, self._coupling):
+            from feedsim.cosim import worker
+
+            given = (machine, program, columns, interval, loads, self._coupling, self._fmus, self._native)
+            return worker.call(_follow, *given, limit=self._coupling.call_limit)
+        return self._follow(machine, program, columns, interval, loads)
+
+    def _follow(
+        self, machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[Acting]
+    ) -> Trace:
+        """The same in this process."""
+        cycles = machine.cycles
+        ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
+        total = (len(program.time) - 1) * ratio
+        library, _ = chosen(self._native, self._fmus, fmus_directory())
+        try:
+            system = self._opened(machine)
+            cycle = cycle_of(system, self._coupling)
+            recording = Recording(cycle, (), program, total, ratio, every, columns)
+            drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
+            before = [*drives.operations, *loading.before, *recording.operations]
+            loop = Loop(cycle, before, loading.after, library, (drives, loading, recording))
+            system.initialise(program, stop=total * cycles.T_c)
+            loop.run(total)
+            recording.record(total)
+            recording.collect(total + 1)
+            return recording.trace()
+        except BaseException:  # a unit that has failed need not serve again
+            self.close()
+            raise
+
+    def _opened(self, machine: Machine) -> System:
+        if self._system is not None and self._system.serves(machine, self._fmus):
+            self._system.renew(machine)
+        else:
+            self.close()
+            self._system = system_of(machine, self._coupling, self._fmus)
+        return self._system
+
+    def close(self) -> None:
+        if self._system is not None:
+            self._system.close()
+            self._system = None
+
+
+def follow(
+    machine: Machine, program: Program, columns: Collection[str], interval: float,
+    *, loads: Sequence[Acting] = (), coupling: Coupling | None = None, fmus: Path | None = None,
+    native: bool | None = None,
+) -> Trace:  # fmt: skip
+    """One machine on setpoints; arguments as those of :class:`Follower` and its follow()."""
+    with Follower(coupling=coupling, fmus=fmus, native=native) as follower:
+        return follower.follow(machine, program, columns, interval, loads=loads)
 
 
 def _follow(
     machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[Acting],
     coupling: Coupling, fmus: Path, native: bool | None,
 ) -> Trace:  # fmt: skip
-    """The same in this process."""
-    cycles = machine.cycles
-    ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
-    total = (len(program.time) - 1) * ratio
-    library, _ = chosen(native, fmus, fmus_directory())
-    with system_of(machine, coupling, fmus) as system:
-        cycle = cycle_of(system, coupling)
-        recording = Recording(cycle, (), program, total, ratio, every, columns)
-        drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
-        before = [*drives.operations, *loading.before, *recording.operations]
-        loop = Loop(cycle, before, loading.after, library, (drives, loading, recording))
-        system.initialise(program, stop=total * cycles.T_c)
-        loop.run(total)
-        recording.record(total)
-        recording.collect(total + 1)
-        return recording.trace()
+    """In a worker process."""
+    with Follower(coupling=coupling, fmus=fmus, native=native) as follower:
+        return follower._follow(machine, program, columns, interval, loads)
 
 
 @dataclass(frozen=True, eq=False)

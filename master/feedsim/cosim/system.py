@@ -87,7 +87,33 @@ class System(Closing):
         self.units = {name: self._instantiate(archive, name) for name, archive in instances.items()}
         self.plant = self.units[wiring.PLANT]
         self.plant_axes = axes_of(plant)
+        self._parameterise(machine)
 
+    def serves(self, machine: Machine, fmus: Path) -> bool:
+        """Whether the units of a machine are the same, whatever values they have."""
+        own = self.machine
+        return (
+            type(self) is System
+            and tuple(machine.axes) == self.axes
+            and machine.plant == own.plant
+            and (machine.plant is None or machine.modes == own.modes)
+            and all(archive_path(machine, r.axis, r.role, fmus) == r.archive.path for r in self.roles.values())
+        )
+
+    def renew(self, machine: Machine) -> None:
+        """Have the values of another machine that this system serves, as if just opened for it.
+
+        InputError: a unit refuses a value.
+        """
+        self.machine = machine
+        if machine.plant is None:
+            self.plant_modes_file = machine.modes
+        self.roles = {name: filled(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
+        for unit in self.instances.values():
+            unit.reset()
+        self._parameterise(machine)
+
+    def _parameterise(self, machine: Machine) -> None:
         self.plant.set_parameters(plant_parameters(machine, self.plant_modes_file))
         for name, role in self.roles.items():
             self.units[name].set_parameters(role.parameters)

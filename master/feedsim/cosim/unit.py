@@ -185,6 +185,12 @@ class Unit:
                     f"unit {self.name} refuses {name} = {value!r}: {self._said() or 'no message'}"
                 ) from None
 
+    def reset(self) -> None:
+        """Back to where it was instantiated: all variables have the archive's start values."""
+        self._time = 0.0
+        self.warnings.clear()
+        self._checked("fmi2Reset", self._fmu.reset)
+
     def enter_initialisation(self, start: float, stop: float) -> None:
         self._time = start
         self._checked("fmi2SetupExperiment", self._fmu.setupExperiment, None, start, stop)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from feedsim.cosim import follow
+from feedsim.cosim import Follower
 from feedsim.cosim.loads import Acting
 from feedsim.errors import InputError
 from feedsim.files.columns import Columns
@@ -25,6 +25,7 @@ from feedsim.identify import Record, Recorded
 from feedsim.identify.read import read_records
 from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
+from feedsim.owned import Closing
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.loads import MotorLoad, SlideLoad
 from feedsim.trace import Recording, read_recording
@@ -160,8 +161,10 @@ def same_time(records: Mapping[str, AxisRecord]) -> bool:
     return all(np.array_equal(first, time) for time in others)
 
 
-class Replay:
+class Replay(Closing):
     """Records of some axes of a machine, and what its units make of them; the other axes are held where they are.
+
+    Units stay open from one machine to the next, until it is closed.
 
     Attributes:
         records: axis -> its record; all over the same time.
@@ -178,7 +181,7 @@ class Replay:
         coupling: Coupling | None = None,
         fmus: Path | None = None,
     ) -> None:
-        self.records, self._coupling, self._fmus = dict(records), coupling, fmus
+        self.records, self._follower = dict(records), Follower(coupling=coupling, fmus=fmus)
         one = next(iter(records.values())).record
         self.time, self.interval = one.time, one.interval
         if not same_time(records):
@@ -261,15 +264,15 @@ class Replay:
         machine = machine.model_copy(update={"pose": machine.pose | self.pose})
         columns = [f"{axis}.{signal}" for axis in self.records for signal in signals]
         loads = [replace(load, values=load.values / scale) for load in self._loads]
-        trace = follow(
-            machine, self.program(machine), columns, self.interval / per_row,
-            loads=loads, coupling=self._coupling, fmus=self._fmus,
-        )  # fmt: skip
+        trace = self._follower.follow(machine, self.program(machine), columns, self.interval / per_row, loads=loads)
         first = round(self.lead / self.interval) * per_row
         rows = slice(first, first + (len(self.time) - 1) * per_row + 1)
         return {
             axis: {signal: np.array(trace[f"{axis}.{signal}"][rows]) for signal in signals} for axis in self.records
         }
+
+    def close(self) -> None:
+        self._follower.close()
 
 
 def per_row_of(interval: float, machine: Machine) -> int:

@@ -178,12 +178,12 @@ def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | N
     By how much a control logs its torque later than its position is not known ahead: the delay with which it agrees
     best is taken out, and reported.
     """
-    replay = Replay(machine, records, fmus=fmus)
-    per_row = per_row_of(replay.interval, machine)
+    per_row = per_row_of(next(iter(records.values())).record.interval, machine)
     limits = {axis: each.drive.M_max for axis, each in machine.axes.items() if isinstance(each.drive, Drive)}
     # A drive of another maker need not say when it is at its limit.
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
-    found = replay.follow(machine, signals, per_row)
+    with Replay(machine, records, fmus=fmus) as replay:
+        found = replay.follow(machine, signals, per_row)
     return {axis: compared(each, found[axis], per_row, limits.get(axis, inf)) for axis, each in records.items()}
 
 

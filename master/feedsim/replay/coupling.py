@@ -27,7 +27,7 @@ from feedsim.replay.elastic import RINGS, Beside
 from feedsim.replay.outside import DIES_AWAY, detrended
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
-from feedsim.structure.modes import write_modes
+from feedsim.structure.modes import modes_text
 from feedsim.trace.trace import Array
 
 Rows = NDArray[np.int64]
@@ -51,28 +51,28 @@ def coupled(
     """
     table = checked_modes(machine)
     modes = {axis: np.flatnonzero(~table.rigid & (table.ports[f"n_{axis}"] != 0)) for axis in records}
-    replay = Replay(machine, records, fmus=fmus)
     found: dict[tuple[int, str], Beside] = {}
     plain = None
-    for mover, own in modes.items():
-        for still, each in records.items():
-            stretches = _at_rest(each, records[mover]) if still != mover and len(own) else []
-            if sum(map(len, stretches)) < FEWEST_ROWS:
-                continue
-            if plain is None:
-                plain = replay.follow(machine, ("x_a",))
-            columns = []
-            for k in own:
-                tried = replay.follow(_with_trial(machine, int(k), mover, still), ("x_a",))[still]["x_a"]
-                columns.append((tried - plain[still]["x_a"]) / TRIAL)
-            left = each.position - plain[still]["x_a"]
-            D, e = (
-                np.concatenate([detrended(signal, rows) for rows in stretches])
-                for signal in (np.column_stack(columns), left)
-            )
-            for k, shape in zip(own, _shapes(D, e), strict=True):
-                if shape is not None:
-                    found[int(k), still] = Beside(still, *shape)
+    with Replay(machine, records, fmus=fmus) as replay:
+        for mover, own in modes.items():
+            for still, each in records.items():
+                stretches = _at_rest(each, records[mover]) if still != mover and len(own) else []
+                if sum(map(len, stretches)) < FEWEST_ROWS:
+                    continue
+                if plain is None:
+                    plain = replay.follow(machine, ("x_a",))
+                columns = []
+                for k in own:
+                    tried = replay.follow(_with_trial(machine, int(k), mover, still), ("x_a",))[still]["x_a"]
+                    columns.append((tried - plain[still]["x_a"]) / TRIAL)
+                left = each.position - plain[still]["x_a"]
+                D, e = (
+                    np.concatenate([detrended(signal, rows) for rows in stretches])
+                    for signal in (np.column_stack(columns), left)
+                )
+                for k, shape in zip(own, _shapes(D, e), strict=True):
+                    if shape is not None:
+                        found[int(k), still] = Beside(still, *shape)
     return found
 
 
@@ -95,7 +95,7 @@ def _with_trial(machine: Machine, k: int, mover: str, still: str) -> Machine:
     ports = {port: np.array(column) for port, column in table.ports.items()}
     ports[f"x_{still}"][k] += size
     path = machine.modes.parent / f"modes_trial_{k}_{still}.csv"
-    write_modes(path, replace(table, ports=ports))
+    path.write_text(modes_text(replace(table, ports=ports)), encoding="utf-8")
     return machine.model_copy(update={"modes": path})
 
 

@@ -18,7 +18,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import log, nan
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -104,19 +103,19 @@ def identify_drive(
     machine: Machine,
     each: AxisRecord,
     records: Sequence[Record],
+    replay: Replay,
     *,
     structure_known: bool,
     begin: Begin | None = None,
     other_cycle: float | None = None,
     modes: int | None = 0,
     progress: Progress = lambda what, done, total: None,
-    fmus: Path | None = None,
 ) -> DriveFound:
     """Identify the drive of `each.axis`, with inertia (unless the structure is known) and friction.
 
     Args:
         machine: begins with its values; its cycles, structure and what is not identified stay.
-        each: the stretch that is fitted. records: all stretches, for the regression.
+        each: the stretch that is fitted. records: all stretches, for the regression. replay: of that stretch.
         structure_known: the inertia is that of the machine's modes, and the friction has the parts that it has there.
         begin: what the record alone says, in place of the machine's values: a fit begins at each of its starts, and
             the best goes on.
@@ -150,10 +149,7 @@ def identify_drive(
             f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {MIN_MOVING_ROWS} are "
             "needed"
         )
-    problem = Problem(
-        machine, each, Replay(machine, {each.axis: each}, fmus=fmus), candidates[0], total, J,
-        _first_weights(each), rows,
-    )  # fmt: skip
+    problem = Problem(machine, each, replay, candidates[0], total, J, _first_weights(each), rows)
     driven = each.record.driven
     free = ["K_p", "K_i", "T_sym", "k_ffw"]
     # Without a torque friction and load are the machine's: what they do to the position, the speed controller may, too.

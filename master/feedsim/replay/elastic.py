@@ -24,7 +24,7 @@ from scipy.signal import cont2discrete, lfilter, ss2tf
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
-from feedsim.structure.modes import Modes, write_modes
+from feedsim.structure.modes import Modes, modes_text
 from feedsim.trace.trace import Array
 
 MOST_MODES = 5
@@ -129,7 +129,7 @@ def with_modes(machine: Machine, axis: str, modes: Sequence[ElasticMode]) -> Mac
     )
     name = hashlib.sha256(repr(modes).encode()).hexdigest()[:16]
     path = machine.modes.parent / f"modes_{name}.csv"
-    write_modes(path, whole)
+    path.write_text(modes_text(whole), encoding="utf-8")  # of a temporary folder: no need for a disk
     return machine.model_copy(update={"modes": path})
 
 

@@ -16,7 +16,7 @@ from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
-from feedsim.replay.closed_loop import AxisRecord, same_time
+from feedsim.replay.closed_loop import AxisRecord, Replay, same_time
 from feedsim.replay.compare import Comparison, replayed
 from feedsim.replay.coupling import coupled
 from feedsim.replay.drive import DECISIVE, DriveFound, identify_drive
@@ -102,11 +102,13 @@ def identify_drives(
 
             begin = begins[axis]
             axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
-            with _begun(machine, name, note, axes, interval, cycle) as own:
+            with (
+                _begun(machine, name, note, axes, interval, cycle) as own,
+                Replay(own, {axis: each}, fmus=fmus) as replay,
+            ):
                 found[axis] = identify_drive(
-                    own, each, read[axis].records, structure_known=machine is not None, begin=begin,
-                    other_cycle=_other(cycle, interval) if machine is None else None,
-                    modes=modes, progress=tell, fmus=fmus,
+                    own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
+                    other_cycle=_other(cycle, interval) if machine is None else None, modes=modes, progress=tell,
                 )  # fmt: skip
         return found
 

@@ -125,18 +125,23 @@ def _read(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
 
 
 def write_modes(path: Path, modes: Modes) -> None:
-    """Write a mode table: modes numbered from 0, numbers with the fewest digits that give them back exactly.
+    """Write a mode table, as :func:`modes_text` has it.
 
     Raises:
         OutputError: it cannot be written; an old file of that name is then as it was.
     """
+    with written_whole(path) as file:
+        file.write(modes_text(modes).encode())
+
+
+def modes_text(modes: Modes) -> str:
+    """A mode table: modes numbered from 0, numbers with the fewest digits that give them back exactly."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow((MODE, FREQUENCY, DAMPING, *modes.ports))
     columns = [np.asarray(column).tolist() for column in (modes.frequency, modes.damping, *modes.ports.values())]
     writer.writerows((number, *map(repr, row)) for number, row in enumerate(zip(*columns, strict=True)))
-    with written_whole(path) as file:
-        file.write(text.getvalue().encode())
+    return text.getvalue()
 
 
 def _header_problems(file: Path, header: Sequence[str], needed: Sequence[str]) -> list[str]:

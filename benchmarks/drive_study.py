@@ -6,24 +6,35 @@ drive from the log alone. A parameter that is called estimated must have its tru
 
     make drive-study                      all kinds of logs
     python benchmarks/drive_study.py --draws 3 --kinds clean,elastic
+
+Draws take turns over the kinds, a process for each core at low priority. Leaves drives.jsonl, a line for each draw, and
+table.md in build/drives. What is in drives.jsonl already is not drawn again: a study that was stopped goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import sys
 import time
-from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, field, replace
+from itertools import combinations
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead of numpy
 
 import numpy as np
 
 from feedsim.cosim import run
 from feedsim.errors import FeedsimError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
+from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import read_axes, windowed
 from feedsim.replay.elastic import ElasticMode, with_modes
 from feedsim.replay.identified import identify_drives
@@ -48,8 +59,15 @@ class Kind:
     noise: str = "M_a: 2 %, x_a: 0.1 um"
     one_way: bool = False
     torque_limit: float = 0.0  # share of the largest torque at which the record is cut off
-    position_only: bool = False
     position_cycle: str = "125 us"
+    coupled: float = 0.0  # shape of the first mode at the scale of Y, over the rigid motion of X
+    repeats: int = 1  # logs of a machine, each of other moves
+    signals: str = "x_s, x_a, x_e, n_s, n_ffw, M_a"
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """That are logged and identified."""
+        return ("X", "Y") if self.coupled else (self.axis,)
 
 
 KINDS = (
@@ -58,92 +76,180 @@ KINDS = (
     Kind("one way under a weight", axis="Y", one_way=True),
     Kind("weight both ways", axis="Y"),
     Kind("torque cut off", torque_limit=0.8),
-    Kind("position only", position_only=True),
+    Kind("position only", signals="x_s, x_a, M_a"),
     Kind("position loop of 2 ms", position_cycle="2 ms"),
     Kind("one mode", modes=(ElasticMode(27.0, 0.04, 0.3, 0.2),), noise="M_a: 5 %, x_a: 0.1 um"),
     Kind("two modes", modes=(ElasticMode(24.0, 0.03, 0.2, 0.2), ElasticMode(47.0, 0.02, 0.35, -0.3)),
          noise="M_a: 5 %, x_a: 0.1 um"),
+    Kind("coupled axes", modes=(ElasticMode(24.0, 0.03, 0.2, 0.2),), noise="M_a: 2 %, x_a: 0.05 um", coupled=0.1),
+    Kind("repeats", repeats=2),
 )  # fmt: skip
+
+
+@dataclass
+class Outcome:
+    """Of a draw.
+
+    within: parameter called estimated -> whether its interval has the truth. undetermined: the others. overlaps:
+    parameter -> whether its intervals of all repeats overlap. seconds: of one core. refused: why there is no drive.
+    """
+
+    kind: str
+    seed: int
+    draw: int
+    within: dict[str, bool] = field(default_factory=dict)
+    undetermined: list[str] = field(default_factory=list)
+    overlaps: dict[str, bool] = field(default_factory=dict)
+    seconds: float = 0.0
+    refused: str = ""
+
+    def __str__(self) -> str:
+        if self.refused:
+            return f"{self.kind:<24} {self.draw:>4} {self.seconds:5.1f}  refused: {self.refused[:90]}"
+        shown = [name if inside else f"{name}!" for name, inside in self.within.items()]
+        shown += [f"{name} of repeats!" for name, overlap in self.overlaps.items() if not overlap]
+        return f"{self.kind:<24} {self.draw:>4} {self.seconds:5.1f}  {' '.join(shown)}; {' '.join(self.undetermined)}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--draws", type=int, default=20, help="logs of each kind")
+    parser.add_argument("--draws", type=int, default=20, help="of each kind")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kinds", help="names, separated by commas (default: all)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--out", type=Path, default=Path("build/drives"), help="folder of the draws and the table")
     args = parser.parse_args()
-    wanted = None if args.kinds is None else args.kinds.split(",")
-    within: dict[str, list[bool]] = defaultdict(list)
-    print(f"{'kind of log':<24} {'draw':>4} {'s':>5}  estimated: within or outside; not determined", flush=True)
-    for number, kind in enumerate(KINDS):
-        if wanted is not None and kind.name not in wanted:
+    wanted = [kind.name for kind in KINDS] if args.kinds is None else args.kinds.split(",")
+    if unknown := [name for name in wanted if name not in {kind.name for kind in KINDS}]:
+        parser.error(f"no such kind: {', '.join(unknown)}; there is {', '.join(kind.name for kind in KINDS)}")
+    args.out.mkdir(parents=True, exist_ok=True)
+    path = args.out / "drives.jsonl"
+    done = [Outcome(**json.loads(line)) for line in path.read_text().splitlines()] if path.is_file() else []
+    known = {(each.kind, each.seed, each.draw) for each in done}
+    # One of each kind after the other: a study that is stopped has seen them all.
+    asked = [(name, args.seed, draw) for draw in range(args.draws) for name in wanted]
+    with (
+        path.open("a", encoding="utf-8") as lines,
+        ProcessPoolExecutor(args.jobs, get_context("spawn"), initializer=os.nice, initargs=(19,)) as processes,
+    ):
+        for future in as_completed([processes.submit(drawn, *each) for each in asked if each not in known]):
+            done.append(future.result())
+            print(done[-1], flush=True)
+            print(json.dumps(asdict(done[-1])), file=lines, flush=True)
+    shown = table(done)
+    print("", *shown, sep="\n")
+    (args.out / "table.md").write_text("\n".join(shown) + "\n", encoding="utf-8")
+
+
+def drawn(name: str, seed: int, draw: int) -> Outcome:
+    """A draw of the kind of that name."""
+    number = next(k for k, kind in enumerate(KINDS) if kind.name == name)
+    outcome, begun = Outcome(name, seed, draw), time.process_time()
+    try:
+        one(KINDS[number], np.random.default_rng((seed, number, draw)), draw + 1, outcome)
+    except FeedsimError as error:
+        outcome.refused = str(error)
+    outcome.seconds = time.process_time() - begun
+    return outcome
+
+
+def table(done: Sequence[Outcome]) -> list[str]:
+    """Markdown: by kind of log and parameter, how many of the intervals that are stated have the truth."""
+    names = list(dict.fromkeys(name for each in done for name in each.within))
+    every = (*KINDS, Kind("all"))
+    lines = [
+        f"| kind of log | draws | refused | {' | '.join(names)} | repeats overlap |",
+        "|---" * (len(names) + 4) + "|",
+    ]
+    for kind in every:
+        own = [each for each in done if kind.name in (each.kind, "all")]
+        if not own:
             continue
-        for draw in range(args.draws):
-            begun = time.process_time()
-            try:
-                holds, undetermined = one(kind, np.random.default_rng((args.seed, number, draw)), draw + 1)
-            except FeedsimError as error:
-                print(f"{kind.name:<24} {draw:>4} {time.process_time() - begun:5.1f}  refused: {str(error)[:90]}")
-                continue
-            for name, inside in holds.items():
-                within[name].append(inside)
-            said = " ".join(name if inside else f"{name}!" for name, inside in holds.items())
-            print(
-                f"{kind.name:<24} {draw:>4} {time.process_time() - begun:5.1f}  {said}; {' '.join(undetermined)}",
-                flush=True,
-            )
-    print(f"\n{'parameter':<12} {'estimated':>9} {'within':>7}")
-    for name, held in within.items():
-        print(f"{name:<12} {len(held):>9} {100 * np.mean(held):6.0f}%")
+        stated = [[each.within[name] for each in own if name in each.within] for name in names]
+        overlap = [inside for each in own for inside in each.overlaps.values()]
+        cells = [f"{sum(inside)}/{len(inside)}" if inside else "-" for inside in (*stated, overlap)]
+        refused = sum(bool(each.refused) for each in own)
+        lines.append(f"| {kind.name} | {len(own)} | {refused or '-'} | {' | '.join(cells)} |")
+    return lines
 
 
-def one(kind: Kind, random: np.random.Generator, seed: int) -> tuple[dict[str, bool], list[str]]:
-    """Of a log: parameter -> whether the interval of an estimated one has the truth; those that are not determined."""
+def one(kind: Kind, random: np.random.Generator, seed: int, outcome: Outcome) -> None:
+    """Draw a machine, log and identify it as often as its kind says, and judge that."""
     with TemporaryDirectory() as place:
         folder = Path(place)
         own = load_machine(MACHINE)
-        table = checked_modes(own)
-        J = table.J_tot(kind.axis) * spread(random)
-        rigid = table.rigid
-        n = table.ports[f"n_{kind.axis}"]
-        scale = np.where(n != 0, np.sqrt(table.J_tot(kind.axis) / J), 1.0)
-        ports = {port: (column * scale)[rigid] for port, column in table.ports.items()}
-        write_modes(
-            folder / "modes.csv",
-            replace(table, frequency=table.frequency[rigid], damping=table.damping[rigid], ports=ports),
-        )
+        write_table(own, kind, spread(random), folder / "modes.csv")
         changes = [f"machine.modes={folder / 'modes.csv'}", *changed(own, kind, random)]
-        (folder / "moves.yaml").write_text(scenario(kind, random, seed))
-        known = load(folder / "moves.yaml", changes).machine
-        true = truth(known, kind.axis)
-        if kind.modes:
-            elastic = with_modes(known, kind.axis, kind.modes)
-            changes = [f"machine.modes={elastic.modes}", *changes[1:]]
-        log = run(load(folder / "moves.yaml", changes)).log
-        assert log is not None
-        M = f"{kind.axis}.M_a"
-        if kind.torque_limit:
-            most = kind.torque_limit * float(np.max(np.abs(log.columns[M])))
-            log = replace(log, columns={**log.columns, M: np.clip(log.columns[M], -most, most)})
-        write_csv(folder / "log.csv", log)
-        (folder / "columns.yaml").write_text(columns(kind))
-        read = read_axes(folder / "log.csv", [kind.axis], None, load_columns(folder / "columns.yaml"))
-        records = {kind.axis: windowed(kind.axis, read[kind.axis], None)}
-        modes = None if kind.modes else 0
-        found = identify_drives(read, records, None, [], "made", "made", modes=modes).drives[kind.axis]
-    holds, undetermined = {}, []
+        intervals: dict[str, list[tuple[float, float]]] = {}
+        for repeat in range(kind.repeats):
+            (folder / "moves.yaml").write_text(scenario(kind, random, seed + 1000 * repeat))
+            known = load(folder / "moves.yaml", changes).machine
+            for name, each in identified(kind, known, changes, folder, outcome).items():
+                intervals.setdefault(name, []).append(each.interval)
+    for name, stated in intervals.items():
+        if len(stated) > 1:
+            outcome.overlaps[name] = all(a[0] <= b[1] and b[0] <= a[1] for a, b in combinations(stated, 2))
+
+
+def write_table(own: Machine, kind: Kind, factor: float, path: Path) -> None:
+    """The rigid modes of the machine, with so many times the inertia of the axis."""
+    table = checked_modes(own)
+    rigid = table.rigid
+    n = table.ports[f"n_{kind.axis}"]
+    scale = np.where(n != 0, 1 / np.sqrt(factor), 1.0)
+    ports = {port: (column * scale)[rigid] for port, column in table.ports.items()}
+    write_modes(path, replace(table, frequency=table.frequency[rigid], damping=table.damping[rigid], ports=ports))
+
+
+def identified(
+    kind: Kind, known: Machine, changes: Sequence[str], folder: Path, outcome: Outcome
+) -> dict[str, Estimate]:
+    """Log the machine, identify it and judge that; what is estimated of the axis."""
+    if kind.modes:
+        elastic = with_modes(known, kind.axis, kind.modes)
+        if kind.coupled:
+            table = checked_modes(elastic)
+            shape = kind.coupled * float(np.max(np.abs(table.ports[f"x_{kind.axis}"][table.rigid])))
+            first = len(table.frequency) - len(kind.modes)
+            ports = {port: np.array(column) for port, column in table.ports.items()}
+            ports["x_Y"][first] = ports["tcp_Y"][first] = shape
+            write_modes(elastic.modes, replace(table, ports=ports))
+        changes = [f"machine.modes={elastic.modes}", *changes[1:]]
+    log = run(load(folder / "moves.yaml", changes)).log
+    assert log is not None
+    M = f"{kind.axis}.M_a"
+    if kind.torque_limit:
+        most = kind.torque_limit * float(np.max(np.abs(log.columns[M])))
+        log = replace(log, columns={**log.columns, M: np.clip(log.columns[M], -most, most)})
+    write_csv(folder / "log.csv", log)
+    read = {}
+    for axis in kind.axes:
+        (folder / "columns.yaml").write_text(columns(kind, axis))
+        read |= read_axes(folder / "log.csv", [axis], None, load_columns(folder / "columns.yaml"))
+    records = {axis: windowed(axis, read[axis], None) for axis in kind.axes}
+    modes = None if kind.modes else 0
+    found = identify_drives(read, records, None, [], "made", "made", modes=modes).drives[kind.axis]
+    true, estimated = truth(known, kind.axis), {}
+
+    def judge(name: str, holds: bool) -> None:
+        outcome.within[name] = outcome.within.get(name, True) and bool(holds)
+
     for name, each in found.estimates.items():
-        if name not in true:
-            continue
-        if each.status == "estimated":
-            holds[name] = bool(each.interval[0] <= true[name] <= each.interval[1])
-        else:
-            undetermined.append(name)
-    for k, mode in enumerate(kind.modes):
+        if name in true and each.status == "estimated":
+            estimated[name] = each
+            judge(name, each.interval[0] <= true[name] <= each.interval[1])
+        elif name in true:
+            outcome.undetermined.append(name)
+    for k, mode in enumerate(kind.modes, 1):
         near = [each for each in found.modes if abs(each.frequency / mode.frequency - 1) < 0.15]
-        holds[f"mode {k + 1} f"] = any(abs(each.frequency - mode.frequency) <= 1.96 * each.sigma[0] for each in near)
-        holds[f"mode {k + 1} 2 %"] = any(abs(each.frequency / mode.frequency - 1) <= 0.02 for each in near)
-    return holds, undetermined
+        judge(f"mode {k} f", any(abs(each.frequency - mode.frequency) <= NORMAL_95 * each.sigma[0] for each in near))
+        judge(f"mode {k} 2 %", any(abs(each.frequency / mode.frequency - 1) <= 0.02 for each in near))
+        if kind.coupled and near and near[0].beside:
+            (beside,) = near[0].beside
+            judge("shape at Y", abs(beside.shape - kind.coupled) <= NORMAL_95 * beside.sigma)
+        elif kind.coupled:
+            outcome.undetermined.append("shape at Y")
+    return estimated
 
 
 def spread(random: np.random.Generator) -> float:
@@ -180,21 +286,22 @@ def scenario(kind: Kind, random: np.random.Generator, seed: int) -> str:
         f"  - {{kind: dwell, duration: {0.2 if kind.modes else 0.12} s}}\n"
         for by, feed in zip(way, random.uniform((8000, 4000, 1500), (12000, 8000, 3000)), strict=True)
     )
-    signals = "x_s, x_a, M_a" if kind.position_only else "x_s, x_a, x_e, n_s, n_ffw, M_a"
+    # The other axis moves as well, where the record is of two.
+    moves += "".join(f"  - {{kind: move, by: {{{axis}: 15 mm}}, feed: 6000 mm/min}}\n" for axis in kind.axes[1:])
     return (
         f"name: log\nmachine: {MACHINE}\nmotions:\n  - {{kind: dwell, duration: 0.12 s}}\n{moves}"
-        f"recording: {{interval: 1 ms}}\nlogging: {{interval: 2 ms, axes: [{kind.axis}], signals: [{signals}], "
-        f"noise: {{{kind.noise}}}, seed: {seed}}}\n"
+        f"recording: {{interval: 1 ms}}\nlogging: {{interval: 2 ms, axes: [{', '.join(kind.axes)}], "
+        f"signals: [{kind.signals}], noise: {{{kind.noise}}}, seed: {seed}}}\n"
     )
 
 
-def columns(kind: Kind) -> str:
+def columns(kind: Kind, axis: str) -> str:
     """The mapping file."""
-    roles = {"position": "x_a", "setpoint": "x_s", "torque": "M_a"}
-    if not kind.position_only:
-        roles |= {"deviation": "x_e", "speed_setpoint": "n_s", "feedforward": "n_ffw"}
-    lines = [f"axis: {kind.axis}", "pitch: 10 mm", "time: {column: time}"]
-    return "\n".join([*lines, *(f"{role}: {{column: {kind.axis}.{name}}}" for role, name in roles.items())]) + "\n"
+    roles = {"x_a": "position", "x_s": "setpoint", "M_a": "torque", "x_e": "deviation", "n_s": "speed_setpoint",
+             "n_ffw": "feedforward"}  # fmt: skip
+    lines = [f"axis: {axis}", "pitch: 10 mm", "time: {column: time}"]
+    lines += (f"{roles[name]}: {{column: {axis}.{name}}}" for name in kind.signals.split(", "))
+    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from feedsim.tune.drive import EVALUATIONS
 from feedsim.tune.drive import tune_drive as tune
 from feedsim.tune.drive_program import check_axis
 from feedsim.tune.drive_result import Limits, Tuned
+from feedsim.uncertainty import check_count, cloud_of
 
 LEAST_EVALUATIONS = 10
 
@@ -108,6 +109,7 @@ def tune_drive(
     encoder_noise: Value = 10e-6,
     at: Sequence[str] = (),
     evaluations: int = EVALUATIONS,
+    uncertain: int = 0,
     set: Changes = None,
     fmus: File | None = None,
     out: File | None = None,
@@ -129,6 +131,8 @@ def tune_drive(
             stays below 2 % of the torque limit, or below what it is with the present drive.
         at: further poses at which the margins hold, such as "X=100mm,Z=600mm"; the machine names its structure.
         evaluations: candidates per start of the search, of which there are three.
+        uncertain: draws of the machine from the intervals of its identified values, 19 or more, which the drive is
+            judged on; it is found on a few other ones. 0: none.
         set: changes of the scenario, as behind ``--set``.
         fmus: folder of the archives.
         out: folder that the result is written to; None: :meth:`Result.save` does it.
@@ -137,7 +141,8 @@ def tune_drive(
         watch: who hears how far the job is.
 
     Raises:
-        InputError: a faulty file, no such axis, units of other makers, a pose that cannot be had.
+        InputError: a faulty file, no such axis, units of other makers, a pose that cannot be had, no
+            identified values to draw.
         SimulationError: a unit failed.
         OutputError: `out` cannot be written.
 
@@ -159,10 +164,14 @@ def tune_drive(
         check_axis(plan, axis)
     except InputError as error:
         raise InputError(f"{spelt('axis')} {axis}: {error}") from None
+    cloud = None
+    if uncertain:
+        check_count(uncertain)
+        cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
     axes = list(plan.machine.axes)
     places = _places(plan.machine, at)
-    asked = _asked(axis, limits, at, evaluations)
+    asked = _asked(axis, limits, at, evaluations, uncertain)
 
     def check(folder: Path, inputs: Sequence[Path]) -> None:
         page.check_writable(folder, axes, inputs)
@@ -173,7 +182,10 @@ def tune_drive(
     ):  # fmt: skip
         announce(watch, plan.machine, archives, plan.coupling)
         poses = _poses(plan.machine, places, watch)
-        tuned = tune(plan, axis, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations)
+        tuned = tune(
+            plan, axis, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations, cloud=cloud,
+            count=uncertain,
+        )  # fmt: skip
         result = TuneDriveResult(tuned, control, asked, "" if out is None else str(out))
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
@@ -197,7 +209,7 @@ def _decibels(value: Value, name: str) -> float:
         raise InputError(f"{spelt(name)} {value}: a number of dB is needed, e.g. 8 dB") from None
 
 
-def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int) -> dict[str, str]:
+def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int, uncertain: int) -> dict[str, str]:
     """What was asked for besides changes of the scenario, the same text for the same value."""
     found = {
         "axis": axis,
@@ -206,7 +218,8 @@ def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int) -> di
         "encoder_noise": f"{1e6 * limits.encoder_noise:g} urad",
         "evaluations": str(evaluations),
     }
-    return {**found, "at": "; ".join(at)} if at else found
+    found |= {"at": "; ".join(at)} if at else {}
+    return found | ({"uncertain": str(uncertain)} if uncertain else {})
 
 
 def _places(machine: Machine, texts: Sequence[str]) -> dict[str, dict[str, float]]:

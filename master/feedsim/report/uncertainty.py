@@ -22,7 +22,7 @@ from feedsim.report.style import SIMULATED
 
 if TYPE_CHECKING:
     from feedsim.uncertainty import Band as Spread
-    from feedsim.uncertainty import Uncertainty
+    from feedsim.uncertainty import Cloud, Known, Uncertainty
 
 BANDS = "bands.csv"
 
@@ -41,17 +41,21 @@ def intervals_section(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -
     )
     return Section(
         "What identification leaves open",
-        [Table("lrrrl", ("Figure", "Value", "From", "To", "Unit"), rows, note), _drawn(uncertainty)],
+        [
+            Table("lrrrl", ("Figure", "Value", "From", "To", "Unit"), rows, note),
+            drawn_values(uncertainty.cloud, uncertainty.sets),
+        ],
     )
 
 
-def _drawn(uncertainty: Uncertainty) -> Table:
+def drawn_values(cloud: Cloud, sets: Mapping[str, Known] | None = None) -> Table:
+    """What was drawn. sets: axis -> what is known of the set that compensates, where that is drawn too."""
     from feedsim.uncertainty.draws import unit_of  # a run without draws does not load them
 
     rows: list[tuple[Text, ...]] = []
     known_ones = [
-        *uncertainty.cloud.known.items(),
-        *((f"{axis}, compensation", known) for axis, known in uncertainty.sets.items()),
+        *cloud.known.items(),
+        *((f"{axis}, compensation", known) for axis, known in (sets or {}).items()),
     ]
     for axis, known in known_ones:
         for name, mean, sigma in zip(known.names, known.mean, known.sigma, strict=True):

@@ -16,10 +16,7 @@ from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
 from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table, together, without
 from feedsim.tune.effects import Effect, effects_of
-from feedsim.uncertainty import Cloud, torque_scale
-
-SEARCHED = 4  # draws that values are found on besides the machine as it is
-SEED = 2  # of the draws that the result is judged on: other ones than those it was found on
+from feedsim.uncertainty import JUDGE_SEED, SEARCH_DRAWS, SEARCH_SEED, Cloud, draw_named, torque_scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +91,7 @@ def tune(
     def draws(count: int, seed: int) -> Iterator[Machine]:
         return (without(each, kind, axes) for each in cloud.draws(count, seed)) if cloud is not None else iter(())
 
-    machines = [machine, *(draws(SEARCHED, SEED - 1) if kind != "model" else ())]
+    machines = [machine, *(draws(SEARCH_DRAWS, SEARCH_SEED) if kind != "model" else ())]
     found = _found(on, machines, kind, axes, objective, fmus, progress)
 
     def errors(circles: Circles, own: Machine, *, compensated: bool) -> Array:
@@ -119,11 +116,14 @@ def tune(
     tuned_before, tuned_after = (errors(on, machine, compensated=each) for each in (False, True))
     held_before, held_after = both(machine)
     changed = {effect: both(own) for effect, own in names}
-    drawn = np.array([both(own) for own in draws(count, SEED)]) if cloud is not None else None
+    drawn = []
+    for k, own in enumerate(draws(count, JUDGE_SEED)):
+        with draw_named(k, count):
+            drawn.append(both(own))
     progress("judging", total, total)
     return Judged(
         scenario, plane, tuple(axes), objective, found, tuple(tuned), tuple(held), tuned_before, tuned_after,
-        held_before, held_after, changed, drawn, cloud,
+        held_before, held_after, changed, np.array(drawn) if drawn else None, cloud,
     )  # fmt: skip
 
 

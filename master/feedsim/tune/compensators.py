@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from feedsim.errors import InputError
 from feedsim.scenario import Drive, Machine
 from feedsim.tune.circles import Circles, size
 from feedsim.tune.closed_forms import axis_lag
-from feedsim.uncertainty import torque_scale
+from feedsim.uncertainty import draw_named, torque_scale
 
 COMPENSATOR_KINDS = ("pulse", "pulse_characteristic", "table", "model")
 OBJECTIVES = ("ratio", "worst", "largest")
@@ -171,9 +172,10 @@ def _over(
     machines: the first one, and draws of it.
     """
     found = []
-    for machine in machines:
+    for k, machine in enumerate(machines):
         own = with_groups(machine, machines[0], group, values or {})
-        found.append(circles.errors(own, fmus=fmus))
+        with draw_named(k - 1, len(machines) - 1, "which the values are found on") if k else nullcontext():
+            found.append(circles.errors(own, fmus=fmus))
     return np.concatenate(found)
 
 

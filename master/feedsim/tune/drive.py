@@ -18,21 +18,29 @@ import numpy as np
 from feedsim.analysis.figures import Array
 from feedsim.arguments import spelt
 from feedsim.cosim.plant import plant_modes
-from feedsim.linear.candidates import Candidates, Judged
-from feedsim.linear.judgement import Loop, judge
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.structure import Modes
 from feedsim.structure.modes import with_transmissions, write_modes
+from feedsim.tune.drive_margins import (
+    FREQUENCY_FACTORS,
+    Judge,
+    checked,
+    judges_of,
+    margins_of,
+    percent,
+    scaled,
+    worse_of,
+)
 from feedsim.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
-from feedsim.tune.drive_result import ERROR_FLOOR, WORSE, Case, Limits, Margins, Point, Tuned, decibels
+from feedsim.tune.drive_result import ERROR_FLOOR, WORSE, Case, Drawn, Limits, Margins, Point, Tuned, decibels
 from feedsim.tune.effects import Effect, effects_of
 from feedsim.tune.knobs import Knobs, matched
 from feedsim.tune.search import Rank, least
+from feedsim.uncertainty import JUDGE_SEED, SEARCH_DRAWS, SEARCH_SEED, Cloud, draw_named, torque_scale, typed_on
 
 Progress = Callable[[str, int, int], None]
 
-FREQUENCY_FACTORS = (1.0, 0.9, 1.1)  # factors on the frequencies of elastic modes
 # Moves as distance [m] and feed [m/s], circles as radius [m] and feed [m/s]: to search on, to choose on, to judge on.
 _MM, _MPM = 1e-3, 1 / 60
 SEARCHED = (((1 * _MM, 2 * _MPM), (10 * _MM, 5 * _MPM), (100 * _MM, 10 * _MPM)),
@@ -51,26 +59,31 @@ BACK = (1.0, 0.8, 0.6, 0.4, 0.2)  # ways back to the present drive that are trie
 FINALISTS = 4
 FASTER = {"K_p": 4.0, "T_n": 0.15, "K_v": 2.0, "omega_0": 3.0}  # direction of the closed-form start
 HALVINGS = 5
+RUN_DRAWS = 2  # of the draws that values are found on: these run as well, the others have closed forms alone
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A program, and the factor on the frequencies of elastic modes with which it is run."""
+    """A program, the factor on the frequencies of elastic modes with which it is run, and on which draw of the machine,
+    from 1; 0: the machine as it is."""
 
     program: DriveProgram
     factor: float
+    draw: int = 0
 
 
 def tune_drive(
     scenario: Scenario, axis: str, limits: Limits, poses: Mapping[str, Modes] | None = None, *,
-    fmus: Path | None, progress: Progress, evaluations: int = EVALUATIONS,
+    fmus: Path | None, progress: Progress, evaluations: int = EVALUATIONS, cloud: Cloud | None = None, count: int = 0,
 ) -> Tuned:  # fmt: skip
-    """Find a better drive of an axis and judge it. poses: further ones, name -> modes.
+    """Find a better drive of an axis and judge it. poses: further ones, name -> modes. cloud: draws of the machine that
+    it is good for; it is found on a few, and judged on `count` other ones.
 
     Raises InputError, and as :func:`feedsim.cosim.run`.
     """
-    with _Search.begun(scenario, axis, limits, poses or {}, fmus, progress, evaluations) as search:
-        return search.tuned()
+    with _Search.begun(scenario, axis, limits, poses or {}, fmus, progress, evaluations, cloud) as search:
+        tuned = search.tuned()
+        return tuned if cloud is None else replace(tuned, drawn=search.drawn(tuned, cloud, count))
 
 
 @dataclass(eq=False)
@@ -85,9 +98,11 @@ class _Search:
     progress: Progress
     evaluations: int
     knobs: Knobs
-    judges: Mapping[str, Candidates]
-    poses: tuple[str, ...]
-    scaled: Mapping[float, Path]
+    judges: Mapping[str, Judge]
+    structures: Mapping[str, Modes]
+    draws: tuple[Machine, ...]
+    drawn_judges: Mapping[str, Judge]
+    scaled_files: Mapping[float, Path]
     parts: tuple[Part, ...]
     before: tuple[Errors, ...]
     margins_before: Margins
@@ -101,28 +116,29 @@ class _Search:
     @contextmanager
     def begun(
         cls, scenario: Scenario, axis: str, limits: Limits, poses: Mapping[str, Modes], fmus: Path | None,
-        progress: Progress, evaluations: int,
+        progress: Progress, evaluations: int, cloud: Cloud | None = None,
     ) -> Iterator[_Search]:  # fmt: skip
         """Plan, judge and run the drive as it is."""
         machine = scenario.machine
         own, _ = plant_modes(_without_transmissions(machine))  # tables hold structures; contacts come behind
         partner = partner_of(scenario, axis)
         with TemporaryFolder() as folder:
-            scaled = {1.0: machine.modes}
+            scaled_files = {1.0: machine.modes}
             for factor in FREQUENCY_FACTORS[1:]:
-                scaled[factor] = folder / f"modes_{factor}.csv"
-                write_modes(scaled[factor], _scaled(own, factor))
-            judges = {}
-            for name, modes in {"pose of the machine file": own, **poses}.items():
-                for factor in FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]:
-                    what = name if factor == 1 else f"{name}, {_percent('modes', factor)}"
-                    judges[what] = Candidates(machine, with_transmissions(machine, _scaled(modes, factor)), axis)
+                scaled_files[factor] = folder / f"modes_{factor}.csv"
+                write_modes(scaled_files[factor], scaled(own, factor))
+            structures = {"pose of the machine file": own, **poses}
+            factors = FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]
+            judges = judges_of(machine, axis, structures, factors)
+            draws = tuple(cloud.draws(SEARCH_DRAWS, SEARCH_SEED)) if cloud is not None else ()
+            drawn_judges: dict[str, Judge] = {}
+            for k, draw in enumerate(draws, start=1):
+                drawn_judges |= judges_of(machine, axis, structures, factors, draw, f"draw {k} of {len(draws)}")
             elastic = not with_transmissions(machine, own).rigid.all()
             knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis), elastic)
             search = cls(
-                scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges,
-                ("pose of the machine file", *poses), scaled, (), (),
-                _margins(judges, knobs.drive), [], [], [],
+                scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges, structures, draws,
+                drawn_judges, scaled_files, (), (), margins_of(judges, knobs.drive), [], [], [],
             )  # fmt: skip
             search.parts = search.of(SEARCHED)
             search.before = search.errors(search.parts, machine)
@@ -130,16 +146,34 @@ class _Search:
 
     def of(self, wanted: tuple[Sequence[tuple[float, float]], ...]) -> tuple[Part, ...]:
         """Moves with every factor on the modes, which shake most behind a stop, and circles with the modes as they
-        are."""
+        are; both on draws of the machine, too."""
         stops, circles = wanted
         moves = _program(self.scenario, self.axis, self.partner, (stops, ()))
-        factors = FREQUENCY_FACTORS if len(self.judges) > len(self.poses) else FREQUENCY_FACTORS[:1]
         turns = _program(self.scenario, self.axis, self.partner, ((), circles))
-        return (Part(turns, 1.0), *(Part(moves, factor) for factor in factors))
+        drawn = [Part(each, 1.0, k + 1) for k in range(min(RUN_DRAWS, len(self.draws))) for each in (turns, moves)]
+        return (Part(turns, 1.0), *(Part(moves, factor) for factor in self.factors), *drawn)
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """On the frequencies of elastic modes; 1 where there are none."""
+        return FREQUENCY_FACTORS if len(self.judges) > len(self.structures) else FREQUENCY_FACTORS[:1]
 
     def errors(self, parts: Sequence[Part], machine: Machine) -> tuple[Errors, ...]:
         """What a machine makes of every part."""
-        return tuple(each.program.errors(self.with_modes(machine, each.factor), fmus=self.fmus) for each in parts)
+        found = []
+        for each in parts:
+            if not each.draw:
+                found.append(each.program.errors(self.with_modes(machine, each.factor), fmus=self.fmus))
+                continue
+            with draw_named(each.draw - 1, len(self.draws), "which the values are found on"):
+                found.append(self.errors_on(self.draws[each.draw - 1], each.program, machine))
+        return tuple(found)
+
+    def errors_on(self, draw: Machine, program: DriveProgram, machine: Machine) -> Errors:
+        """What a draw makes of a program with the drives of `machine`; the torque as the machine itself has it."""
+        before = self.scenario.machine
+        found = program.errors(typed_on(draw, before, machine), fmus=self.fmus)
+        return replace(found, torque=found.torque / torque_scale(before, draw, self.axis))
 
     # --- a candidate ------------------------------------------------------------------------------------------------
 
@@ -158,18 +192,17 @@ class _Search:
         return found
 
     def margins(self, drive: Drive) -> Margins:
-        """Of a candidate, which is counted."""
-        found = _margins(self.judges, drive)
+        """Of a candidate, which is counted; over draws, too, where the machine itself allows it to run."""
+        found = margins_of(self.judges, drive)
+        if self.drawn_judges and not self.too_little(found):
+            found = worse_of(found, margins_of(self.drawn_judges, drive))
         self.closed += 1
         self.seen.append(found)
         return found
 
     def _rank(self, drive: Drive, margins: Margins) -> Rank:
         violation = self.violation(margins)
-        if violation > 0 and (
-            margins.gain < MARGIN_SHARE * self.limits.gain_margin
-            or margins.phase < MARGIN_SHARE * self.limits.phase_margin
-        ):
+        if violation > 0 and self.too_little(margins):
             return violation, math.inf
         errors = self.errors(self.parts, self.machine_with(drive))
         self.runs += 1
@@ -179,6 +212,11 @@ class _Search:
         violation += max(0.0, torque / most - 1) + float(np.maximum(ratios / WORSE - 1, 0).sum())
         self.points.append(Point(margins, ratio, float(errors[0].peak.max()), violation == 0))
         return violation, ratio
+
+    def too_little(self, margins: Margins) -> bool:
+        """Whether a candidate with these margins does not run, not even for the picture."""
+        limits = self.limits
+        return margins.gain < MARGIN_SHARE * limits.gain_margin or margins.phase < MARGIN_SHARE * limits.phase_margin
 
     def violation(self, margins: Margins) -> float:
         """0 where the limits are kept: shares that are missing of the margins, and of the noise that is too much."""
@@ -198,12 +236,12 @@ class _Search:
         """Search, choose, judge."""
         drive, kept = self.chosen(self.searched())
         machine = self.machine_with(drive) if not kept else self.scenario.machine
-        after = self._checked(machine) if not kept else self.margins_before
+        after = checked(self.judges, machine, self.axis) if not kept else self.margins_before
         return Tuned(
             self.scenario, self.axis, self.partner, self.limits, machine, self.margins_before, after,
             self._searched_case(machine),
-            tuple(self.judged(machine)), tuple(self.points), (self.closed, self.runs), kept, self.poses,
-            len(self.judges) > len(self.poses),
+            tuple(self.judged(machine)), tuple(self.points), (self.closed, self.runs), kept, tuple(self.structures),
+            len(self.factors) > 1,
         )  # fmt: skip
 
     def searched(self) -> list[Array]:
@@ -303,8 +341,8 @@ class _Search:
         """Moves and circles that nothing was chosen by: as the machine is, modes changed, friction changed."""
         program = _program(self.scenario, self.axis, self.partner, HELD)
         cases: dict[str, Callable[[Machine], Machine]] = {"as the machine file has it": lambda own: own}
-        if len(self.judges) > len(self.poses):
-            cases |= {_percent("modes", f): partial(self.with_modes, factor=f) for f in FREQUENCY_FACTORS[1:]}
+        if len(self.factors) > 1:
+            cases |= {percent("modes", f): partial(self.with_modes, factor=f) for f in FREQUENCY_FACTORS[1:]}
         cases |= {
             effect.words: partial(_effect_on, effect=effect, axis=self.axis)
             for effect, _ in effects_of(self.scenario.machine, [self.axis])
@@ -316,6 +354,22 @@ class _Search:
             yield Case(name, program, before, after)
         self.progress("judging", len(cases), len(cases))
 
+    def drawn(self, tuned: Tuned, cloud: Cloud, count: int) -> Drawn:
+        """Margins and motions on draws that nothing was chosen by; a drive that stays as it is has margins alone."""
+        program, before = tuned.judged[0].program, self.scenario.machine
+        margins, cases = [], []
+        for k, draw in enumerate(cloud.draws(count, JUDGE_SEED)):
+            self.progress("draws", k, count)
+            name = f"draw {k + 1} of {count}"
+            with draw_named(k, count):
+                judges = judges_of(before, self.axis, self.structures, self.factors, draw, name)
+                margins.append(margins_of(judges, tuned.machine.shipped_drive(self.axis, "tuning")))
+                if not tuned.kept:
+                    without, with_it = (self.errors_on(draw, program, each) for each in (before, tuned.machine))
+                    cases.append(Case(name, program, without, with_it))
+        self.progress("draws", count, count)
+        return Drawn(cloud, tuple(margins), tuple(cases))
+
     def _searched_case(self, machine: Machine) -> Case:
         circles = self.parts[0].program
         return Case("searched on", circles, self.before[0], circles.errors(machine, fmus=self.fmus))
@@ -324,16 +378,7 @@ class _Search:
         """A machine whose elastic modes have other frequencies."""
         if factor == 1:
             return machine
-        return machine.model_copy(update={"modes": self.scaled[factor], "plant": None, "structure": None})
-
-    def _checked(self, machine: Machine) -> Margins:
-        """The margins of the result, by a second judgement that keeps nothing and knows nothing of the search."""
-        found = {
-            name: _least_of([loop for loop in judge(machine, each.modes) if loop.axis == self.axis])
-            for name, each in self.judges.items()
-        }
-        noise = _margins(self.judges, machine.shipped_drive(self.axis, "tuning")).noise
-        return _over(found, noise)
+        return machine.model_copy(update={"modes": self.scaled_files[factor], "plant": None, "structure": None})
 
 
 def _program(
@@ -360,41 +405,9 @@ def _ratios(before: Sequence[Errors], after: Sequence[Errors]) -> tuple[Array, f
     return np.concatenate(groups), float(mean ** (1 / WEIGHT))
 
 
-def _margins(judges: Mapping[str, Candidates], drive: Drive) -> Margins:
-    found: dict[str, Judged] = {name: each.judge(drive) for name, each in judges.items()}
-    noise = max(each.noise for each in found.values())
-    return _over({name: _least_of(each.loops) for name, each in found.items()}, noise)
-
-
-def _least_of(loops: Sequence[Loop]) -> tuple[tuple[float, str], tuple[float, str]]:
-    """Least gain margin [dB] and phase margin [deg] of loops, each with the loop."""
-    if any(loop.growing for loop in loops):
-        return (-math.inf, "unstable"), (-math.inf, "unstable")
-    gain = min(loops, key=lambda loop: loop.gain_margin)
-    phase = min(loops, key=lambda loop: loop.phase_margin)
-    size = 20 * math.log10(gain.gain_margin) if math.isfinite(gain.gain_margin) else math.inf
-    return (size, f"{gain.kind} loop {gain.state}"), (phase.phase_margin, f"{phase.kind} loop {phase.state}")
-
-
-def _over(found: Mapping[str, tuple[tuple[float, str], tuple[float, str]]], noise: float) -> Margins:
-    gain = min(found, key=lambda name: found[name][0][0])
-    phase = min(found, key=lambda name: found[name][1][0])
-    return Margins(
-        found[gain][0][0], found[phase][1][0], f"{found[gain][0][1]}, {gain}", f"{found[phase][1][1]}, {phase}", noise
-    )
-
-
-def _scaled(modes: Modes, factor: float) -> Modes:
-    return modes if factor == 1 else replace(modes, frequency=modes.frequency * factor)
-
-
 def _without_transmissions(machine: Machine) -> Machine:
     axes = {name: axis.model_copy(update={"transmission": None}) for name, axis in machine.axes.items()}
     return machine.model_copy(update={"axes": axes})
-
-
-def _percent(what: str, factor: float) -> str:
-    return f"{what} {abs(100 * (factor - 1)):.0f} % {'higher' if factor > 1 else 'lower'}"
 
 
 def _effect_on(machine: Machine, effect: Effect, axis: str) -> Machine:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from feedsim.scenario import Machine, Scenario
 from feedsim.tune.changed import Changed, changed_values
 from feedsim.tune.drive_program import DriveProgram, Errors
+from feedsim.uncertainty import Cloud
 
 WORSE = 1.05  # of an error, from where on it counts as worse
 ERROR_FLOOR = 0.05e-6  # [m] of an error: below it nothing counts
@@ -73,12 +74,30 @@ class Case:
 
 
 @dataclass(frozen=True, eq=False)
+class Drawn:
+    """What the drive does on draws of the machine from the intervals of its identified values.
+
+    margins: of every draw, over all poses and modes. cases: motions of every draw; none where the drive stays as it is.
+    """
+
+    cloud: Cloud
+    margins: tuple[Margins, ...]
+    cases: tuple[Case, ...]
+
+    @property
+    def count(self) -> int:
+        """Draws."""
+        return len(self.margins)
+
+
+@dataclass(frozen=True, eq=False)
 class Tuned:
     """A drive and what it does.
 
     machine: with it. before, after: margins. searched: what it was searched on. judged: what it was judged on, as the
     machine is first. points: of the search.
     evaluations: closed forms, runs. kept: why the drive stays as it is; "" where it changes. poses: in words.
+    drawn: what it does on draws of the machine, where they were asked for.
     """
 
     scenario: Scenario
@@ -95,6 +114,7 @@ class Tuned:
     kept: str
     poses: tuple[str, ...]
     elastic: bool
+    drawn: Drawn | None = None
 
     @property
     def changes(self) -> tuple[Changed, ...]:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, SimulationError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.fields import Quantity
 from feedsim.scenario import Drive, Friction, Machine, Scenario
@@ -33,6 +34,8 @@ from feedsim.scenario.parameter_group import ParameterGroup
 Array = NDArray[np.float64]
 SAME_VALUE_SHARE = 1e-3  # of the standard deviation: a value that is nearer to that of its identification is that value
 ATTEMPTS = 10_000  # draws until one is possible
+SEARCH_DRAWS = 4  # draws that values are found on besides the machine as it is
+SEARCH_SEED, JUDGE_SEED = 1, 2  # of draws that values are found on, and of others that they are judged on
 LOAD, INERTIA = "constant_load", "inertia"
 # Symbol of the correlation matrix -> key of the group `identified`, of what is no parameter of the friction.
 BESIDE = {"M_0": LOAD, "J": INERTIA}
@@ -178,6 +181,18 @@ def unit_of(name: str) -> str:
     return quantity.unit if quantity is not None else units.DIMENSIONLESS
 
 
+@contextmanager
+def draw_named(k: int, count: int, use: str = "") -> Iterator[None]:
+    """Name the draw that is refused or fails, the k-th of `count` from 0: the machine as it is has run. use: what for.
+
+    Raises InputError or SimulationError, as what it is about.
+    """
+    try:
+        yield
+    except (InputError, SimulationError) as error:
+        raise type(error)(f"draw {k + 1} of {count} of the machine{use and f', {use}'}: {error}") from error
+
+
 def torque_scale(machine: Machine, drawn: Machine, axis: str) -> float:
     """Inertia of an axis of a machine over that of a draw of it: what multiplies all torques of that axis.
 
@@ -187,6 +202,27 @@ def torque_scale(machine: Machine, drawn: Machine, axis: str) -> float:
     if not (isinstance(before, Drive) and isinstance(after, Drive) and before.M_max):
         return 1.0
     return after.M_max / before.M_max  # the limit is never drawn itself
+
+
+def typed_drive(draw: Machine, machine: Machine, axis: str, drive: Drive) -> Drive:
+    """The drive of a draw of a machine where somebody has typed the values of `drive` that differ from the machine's.
+
+    What is typed does not vary; like all torques of a draw, a gain is multiplied by :func:`torque_scale`.
+    """
+    own, before = draw.shipped_drive(axis, "a draw"), machine.shipped_drive(axis, "a draw")
+    values = {name: value for name in Drive.model_fields if (value := getattr(drive, name)) != getattr(before, name)}
+    if "K_p" in values:
+        values["K_p"] *= torque_scale(machine, draw, axis)
+    return own.model_copy(update=values)
+
+
+def typed_on(draw: Machine, machine: Machine, changed: Machine) -> Machine:
+    """A draw of a machine with the drives of `changed`, as :func:`typed_drive`."""
+    axes = dict(draw.axes)
+    for name, axis in axes.items():
+        if isinstance(drive := changed.axes[name].drive, Drive):
+            axes[name] = axis.model_copy(update={"drive": typed_drive(draw, machine, name, drive)})
+    return draw.model_copy(update={"axes": axes})
 
 
 def on_draw(scenario: Scenario, drawn: Machine) -> Scenario:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,9 +17,8 @@ from feedsim.analysis.evaluate import Result
 from feedsim.cosim.feedforward import friction_feedforward
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.run import run
-from feedsim.errors import InputError, SimulationError
 from feedsim.scenario import Recording
-from feedsim.uncertainty.draws import Cloud, Known, drawn_friction, on_draw, torque_scale
+from feedsim.uncertainty.draws import Cloud, Known, draw_named, drawn_friction, on_draw, torque_scale
 from feedsim.uncertainty.spread import interval, share_of
 
 Array = NDArray[np.float64]
@@ -84,7 +82,7 @@ def of_run(
     curves: list[dict[tuple[str, str], Array]] = []
     for k, machine in enumerate(cloud.draws(count, seed)):
         progress("draws", k, count)
-        with _draw(k, count):
+        with draw_named(k, count):
             done = run(on_draw(scenario, machine), program=program, fmus=fmus)
         figures.append(evaluate(done))
         curves.append({key: y for key, (_, y) in curves_of(done).items()})
@@ -126,7 +124,7 @@ def of_compensation(
                 for axis, each in friction_feedforward(machine, program, sets, found.delays, law).items()
             }
             plan = on_draw(lean, machine)
-            with _draw(k, count):
+            with draw_named(k, count):
                 before = run(plan, program=program, fmus=fmus)
                 after = run(plan, program=program, fmus=fmus, torque_feedforward=torque)
             figures.append(circle_figures(turn, before.trace, after.trace))
@@ -139,15 +137,6 @@ def of_compensation(
     )
     names = {name: figure for name, figure in found.figures.items() if name in figures[0]}
     return Uncertainty(cloud or Cloud(scenario.machine, {}), count, intervals_of(names, figures), bands, known)
-
-
-@contextmanager
-def _draw(k: int, count: int) -> Iterator[None]:
-    """Say of a draw that is refused or fails that it is one: the machine as it is has run."""
-    try:
-        yield
-    except (InputError, SimulationError) as error:
-        raise type(error)(f"draw {k + 1} of {count} of the machine: {error}") from error
 
 
 def intervals_of(names: Mapping[str, object], draws: list[Mapping[str, Figure]]) -> dict[str, tuple[float, float]]:

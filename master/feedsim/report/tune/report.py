@@ -19,6 +19,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, BEFORE
+from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensation import Judged
 from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, amplitude
@@ -245,7 +246,8 @@ def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:
             )
     note = f"The same values on a changed machine. The sizes are usual ones, not measured ones. {WITHOUT_PLAY}"
     heads = ("Machine", "Median reduction [%]", "Least reduction [%]")
-    return Section("With other effects of the machine", [Table("lrr", heads, lines, note)], "effects")
+    drawn = [] if judged.cloud is None else [drawn_values(judged.cloud)]
+    return Section("With other effects of the machine", [Table("lrr", heads, lines, note), *drawn], "effects")
 
 
 def _both(figures: Mapping[str, Figure], name: str) -> tuple[str, str]:

@@ -10,8 +10,8 @@ double corrections_step(const Corrections *p, CorrectionsState *x, double x_s) {
     }
     x->x_s = x_s;
     x->started = 1;
-    const double left = x->direction - x->s;
-    x->s = fabs(left) <= p->change ? x->direction : x->s + (left > 0.0 ? p->change : -p->change);
+    const double remaining = x->direction - x->s;
+    x->s = fabs(remaining) <= p->change ? x->direction : x->s + (remaining > 0.0 ? p->change : -p->change);
     double corrected = x_s + 0.5 * x->s * p->backlash;
     if (p->leadscrew.used) {
         const double plus = points_value(&p->leadscrew, x_s);

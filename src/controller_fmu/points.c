@@ -16,7 +16,7 @@ double points_value(const Points *p, double x) {
     if (place >= POINTS - 1) {
         return p->at[POINTS - 1];
     }
-    const int left = (int)place;
-    const double share = place - left;
-    return p->at[left] + share * (p->at[left + 1] - p->at[left]);
+    const int below = (int)place;
+    const double share = place - below;
+    return p->at[below] + share * (p->at[below + 1] - p->at[below]);
 }

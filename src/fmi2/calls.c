@@ -6,19 +6,12 @@
 #include "log.h"
 #include "shell.h"
 
-#define CALL_ROW(name, phases) {"fmi2" #name, phases},
-static const struct {
-    const char *name;
-    unsigned phases;
-} calls[] = {CALLS(CALL_ROW)};
+#define CALL_ROW(name, phases) phases,
+static const unsigned phases_of[] = {CALLS(CALL_ROW)};
 #undef CALL_ROW
 
 static const char *const phase_names[] = {"'instantiated'", "'initialization mode'", "'step complete'", "'terminated'",
                                           "'error'"};
-
-const char *call_name(Call call) {
-    return calls[call].name;
-}
 
 void call_tell(Unit *unit, Call call, const char *format, ...) {
     va_list arguments;
@@ -34,15 +27,15 @@ bool call_begin(Unit *unit, Call call) {
     }
     unit->call = call;
     Phase phase = (Phase)unit_header(unit)->phase;
-    if (calls[call].phases & 1u << phase) {
+    if (phases_of[call] & 1u << phase) {
         return true;
     }
-    if (calls[call].phases == 0) {
+    if (phases_of[call] == 0) {
         return unit_fail(unit, "not allowed in any state: steps are never asynchronous, so none can be in progress");
     }
     char allowed[128] = "";
     for (unsigned i = 0; i < PHASE_COUNT; i++) {
-        if (calls[call].phases & 1u << i) {
+        if (phases_of[call] & 1u << i) {
             strcat(allowed, *allowed ? ", " : "");
             strcat(allowed, phase_names[i]);
         }

@@ -72,7 +72,12 @@ enum { CALLS(CALL_PHASES) };
 #undef CALL_PHASES
 
 /* "fmi2DoStep" */
-const char *call_name(Call call);
+#define CALL_TEXT(name, phases) "fmi2" #name,
+static inline const char *call_name(Call call) {
+    static const char *const names[] = {CALLS(CALL_TEXT)};
+    return names[call];
+}
+#undef CALL_TEXT
 
 /* Note that `call` begins, for messages, and check that it is allowed in the state the instance is in; false with an
  * error logged where it is not, or where there is no instance. */

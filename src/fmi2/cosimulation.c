@@ -51,19 +51,19 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
     return fmi2Error;
 }
 
-/* --- status: what cannot be told is answered by fmi2Discard, as the standard says */
+/* --- status: what is not known is answered by fmi2Discard, as the standard says */
 
 static const char *const status_kinds[] = {"fmi2DoStepStatus", "fmi2PendingStatus", "fmi2LastSuccessfulTime",
                                            "fmi2Terminated"};
 
-static bool asks_for(Unit *unit, fmi2StatusKind asked, fmi2StatusKind told, const void *value) {
-    if (asked == told && value != NULL) {
+static bool asks_for(Unit *unit, fmi2StatusKind asked, fmi2StatusKind known, const void *value) {
+    if (asked == known && value != NULL) {
         return true;
     }
-    unit_warn(unit, "%s cannot be told here (only %s can, and needs a place to put it)",
+    unit_warn(unit, "%s is not known here; allowed is %s, with a pointer to where its value goes",
               (unsigned)asked < sizeof status_kinds / sizeof *status_kinds ? status_kinds[asked]
                                                                            : "an unknown status kind",
-              status_kinds[told]);
+              status_kinds[known]);
     return false;
 }
 

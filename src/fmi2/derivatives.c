@@ -9,7 +9,7 @@ RARE static bool is_another(Unit *unit, fmi2ValueReference reference, Causality 
     const Variable *variable = &unit->variables[reference];
     char name[VARIABLE_NAME_SIZE];
     return unit_fail(unit, "%s %s, but value reference %u is the %s '%s'", purpose, table_causality(causality),
-                     reference, table_causality(variable->info->causality), values_name(unit, variable, name));
+                     reference, table_causality(variable->info->causality), table_name(unit, variable, name));
 }
 
 static inline bool is(Unit *unit, fmi2ValueReference reference, Causality causality, const char *purpose) {
@@ -21,7 +21,7 @@ static inline bool is(Unit *unit, fmi2ValueReference reference, Causality causal
 RARE static bool another_order(Unit *unit, fmi2ValueReference reference, int order, const char *limit) {
     char name[VARIABLE_NAME_SIZE];
     return unit_fail(unit, "derivative of order %d asked for '%s'; allowed is order 1 (%s)", order,
-                     values_name(unit, &unit->variables[reference], name), limit);
+                     table_name(unit, &unit->variables[reference], name), limit);
 }
 
 static inline bool first_order(Unit *unit, fmi2ValueReference reference, int order, const char *limit) {
@@ -43,7 +43,7 @@ bool derivatives_set_inputs(Unit *unit, size_t count, const fmi2ValueReference r
         if (!isfinite(values[i])) {
             char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
             return unit_fail(unit, "the slope of input '%s' is not finite: %s",
-                             values_name(unit, &unit->variables[references[i]], name), number_text(text, values[i]));
+                             table_name(unit, &unit->variables[references[i]], name), number_text(text, values[i]));
         }
     }
     for (size_t i = 0; i < count; i++) {
@@ -65,7 +65,7 @@ bool derivatives_inputs_finite_now(Unit *unit, double h) {
         if (!isfinite(value + slope * h)) {
             char name[VARIABLE_NAME_SIZE], text[2][NUMBER_TEXT_SIZE];
             return unit_fail(unit, "input '%s' does not stay finite over the step: value %s, slope %s/s",
-                             values_name(unit, variable, name), number_text(text[0], value),
+                             table_name(unit, variable, name), number_text(text[0], value),
                              number_text(text[1], slope));
         }
         probe += number_probe_tame(value) + number_probe_tame(slope);

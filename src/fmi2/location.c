@@ -31,8 +31,8 @@ static bool spells(const char *text, size_t length, const char *word) {
 }
 
 static int hexadecimal(char c) {
-    const char *digits = "0123456789abcdef0123456789ABCDEF", *found = c ? strchr(digits, c) : NULL;
-    return found != NULL ? (int)((found - digits) % 16) : -1;
+    const char *digits = "0123456789abcdef0123456789ABCDEF", *digit = c ? strchr(digits, c) : NULL;
+    return digit != NULL ? (int)((digit - digits) % 16) : -1;
 }
 
 /* A percent sign that is no valid sequence (or would cut the path short with a zero) stands for itself. */

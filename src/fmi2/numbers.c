@@ -85,10 +85,10 @@ char *number_text(char *text, double value) {
     }
     char separator[SEPARATOR_SIZE];
     const size_t width = separator_of_locale(separator);
-    char *found = width > 0 ? strstr(text, separator) : NULL;
-    if (found != NULL) {
-        *found = '.';
-        memmove(found + 1, found + width, strlen(found + width) + 1);
+    char *point = width > 0 ? strstr(text, separator) : NULL;
+    if (point != NULL) {
+        *point = '.';
+        memmove(point + 1, point + width, strlen(point + width) + 1);
     }
     return text;
 }

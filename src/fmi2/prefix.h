@@ -44,8 +44,8 @@
 #define table_axis PREFIXED(table_axis)
 #define table_hash PREFIXED(table_hash)
 #define table_causality PREFIXED(table_causality)
+#define table_name PREFIXED(table_name)
 
-#define call_name PREFIXED(call_name)
 #define call_begin PREFIXED(call_begin)
 #define call_tell PREFIXED(call_tell)
 
@@ -54,7 +54,6 @@
 #define log_select PREFIXED(log_select)
 
 #define values_missing PREFIXED(values_missing)
-#define values_name PREFIXED(values_name)
 #define values_no_arrays PREFIXED(values_no_arrays)
 #define values_sound PREFIXED(values_sound)
 #define values_get_real PREFIXED(values_get_real)

@@ -68,7 +68,7 @@ static double result(const Unit *unit, size_t offset) {
 RARE static bool not_finite(Unit *unit, const Variable *variable) {
     char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
     return unit_fail(unit, "%s '%s' is not finite: %s", table_causality(variable->info->causality),
-                     values_name(unit, variable, name), number_text(text, result(unit, variable->offset)));
+                     table_name(unit, variable, name), number_text(text, result(unit, variable->offset)));
 }
 
 /* The first of the results that is not. */
@@ -95,13 +95,13 @@ static inline bool results_finite(Unit *unit) {
     const Stretch *const end = unit->results + unit->result_count;
     for (const Stretch *at = unit->results; at < end; at++) {
         const double *y = (const double *)(const void *)(unit->block + at->offset);
-        size_t left = at->count;
-        for (; left >= 3; left -= 3, y += 3) {
+        size_t remaining = at->count;
+        for (; remaining >= 3; remaining -= 3, y += 3) {
             probe += number_probe(y[0]);
             second += number_probe(y[1]);
             third += number_probe(y[2]);
         }
-        for (; left > 0; left--, y++) {
+        for (; remaining > 0; remaining--, y++) {
             probe += number_probe(*y);
         }
     }
@@ -124,7 +124,7 @@ bool run_show_late(Unit *unit) {
     if (!unit->derived_valid) { /* the coefficients may be anything, of another size of the state even */
         char name[VARIABLE_NAME_SIZE];
         return unit_fail(unit, "output '%s' cannot be computed: the present parameters were refused",
-                         values_name(unit, &unit->variables[MODEL.late_first], name));
+                         table_name(unit, &unit->variables[MODEL.late_first], name));
     }
     MODEL.show_late(unit);
     unit->late = !late_finite(unit);

@@ -104,6 +104,9 @@ extern const VariableInfo table_scalars[SCALAR_ROWS + 1];
 extern const VariableInfo table_axis[AXIS_ROWS + 1];
 char *table_hash(char *text); /* text[HASH_TEXT_SIZE], which is returned */
 const char *table_causality(Causality causality);
+#define VARIABLE_NAME_SIZE 256
+/* "F_S", or "X.M_a" for a row of axis X, written to name[VARIABLE_NAME_SIZE]; returns name. */
+char *table_name(const Unit *unit, const Variable *variable, char *name);
 
 /* --- unit.c */
 Unit *unit_create(const fmi2CallbackFunctions *callbacks, const char *name);

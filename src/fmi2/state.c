@@ -215,7 +215,7 @@ static bool slopes_sound(Unit *unit, const Header *header, const unsigned char *
         if (!isfinite(slope) || !(none || header->sloped)) {
             char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
             return unit_fail(unit, "the slope of input '%s' is %s; allowed is a finite one, and 0 where none was set",
-                             values_name(unit, &unit->variables[unit->inputs[i]], name), number_text(text, slope));
+                             table_name(unit, &unit->variables[unit->inputs[i]], name), number_text(text, slope));
         }
     }
     return true;
@@ -247,11 +247,11 @@ bool state_deserialize(Unit *unit, const fmi2Byte bytes[], size_t size, Snapshot
         return unit_fail(unit, "the serialized state has %.0f bytes, its heading speaks of %.0f", (double)size,
                          (double)heading.size);
     }
-    uint64_t found = hash_bytes(HASH_OF_NOTHING, bytes + sizeof heading, (size_t)heading.size - sizeof heading);
-    if (found != heading.checksum) {
+    uint64_t checksum = hash_bytes(HASH_OF_NOTHING, bytes + sizeof heading, (size_t)heading.size - sizeof heading);
+    if (checksum != heading.checksum) {
         char text[2][HASH_TEXT_SIZE];
         return unit_fail(unit, "the serialized state is damaged: checksum %s, its heading says %s",
-                         hash_text(text[0], found), hash_text(text[1], heading.checksum));
+                         hash_text(text[0], checksum), hash_text(text[1], heading.checksum));
     }
     if (!block_sound(unit, (const unsigned char *)bytes + sizeof heading)) {
         return false;

@@ -1,4 +1,5 @@
 /* The info table: one VariableInfo per row of variables.def, and the hash that stands for the whole table. */
+#include <stdio.h>
 #include <string.h>
 
 #include "hash.h"
@@ -61,4 +62,14 @@ char *table_hash(char *text) {
 
 const char *table_causality(Causality causality) {
     return causalities[causality];
+}
+
+char *table_name(const Unit *unit, const Variable *variable, char *name) {
+    if (variable->offset < AXES_AT) {
+        snprintf(name, VARIABLE_NAME_SIZE, "%s", variable->info->name);
+    } else {
+        snprintf(name, VARIABLE_NAME_SIZE, "%s.%s", unit->axis_names[(variable->offset - AXES_AT) / sizeof(AxisBlock)],
+                 variable->info->name);
+    }
+    return name;
 }

@@ -38,13 +38,13 @@ static bool controls(const char *text) {
 void text_mend(char *text) {
     while (*text != '\0') {
         const int bytes = bytes_of(*text);
-        int found = bytes > 0 && !controls(text);
-        while (found > 0 && found < bytes && follows(text[found]) && (found > 1 || may_follow(text[0], text[1]))) {
-            found++;
+        int length = bytes > 0 && !controls(text);
+        while (length > 0 && length < bytes && follows(text[length]) && (length > 1 || may_follow(text[0], text[1]))) {
+            length++;
         }
-        if (found == bytes && bytes > 0) {
+        if (length == bytes && bytes > 0) {
             text += bytes;
-        } else if (found > 0 && text[found] == '\0') {
+        } else if (length > 0 && text[length] == '\0') {
             *text = '\0';
         } else {
             *text++ = '?';

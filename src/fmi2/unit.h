@@ -3,11 +3,10 @@
  * The shell (src/fmi2) knows the FMI 2.0 standard and no physics; a model (model.c of a unit) knows physics and no FMI.
  * The two meet here. A model's memory is of two sorts:
  *   - the BLOCK, one contiguous, pointer-free piece that the shell owns, copies for get/set/serialise state and
- * restores on reset: variables (Scalars, AxisBlock), input slopes, and the model's own state (state_size() bytes,
- * zeroed);
+ *     restores on reset: variables (Scalars, AxisBlock), input slopes, and the model's own state (state_size() bytes,
+ *     zeroed);
  *   - DERIVED data (coefficients, mode tables), which the model allocates in load() and derive() and which is never
- * copied.
- */
+ *     copied. */
 #ifndef FEEDSIM_UNIT_H
 #define FEEDSIM_UNIT_H
 

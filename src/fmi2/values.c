@@ -1,22 +1,11 @@
 #include "values.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "numbers.h"
 
 static const char *const kind_names[] = {"Real", "Integer", "Boolean", "String"};
-
-char *values_name(const Unit *unit, const Variable *variable, char *name) {
-    if (variable->offset < AXES_AT) {
-        snprintf(name, VARIABLE_NAME_SIZE, "%s", variable->info->name);
-    } else {
-        snprintf(name, VARIABLE_NAME_SIZE, "%s.%s", unit->axis_names[(variable->offset - AXES_AT) / sizeof(AxisBlock)],
-                 variable->info->name);
-    }
-    return name;
-}
 
 RARE const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Kind kind) {
     if (reference >= unit->variable_count) {
@@ -28,7 +17,7 @@ RARE const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Ki
     char name[VARIABLE_NAME_SIZE];
     unit_fail(unit, "value reference %u is the %s %s '%s'; expected here is type %s", reference,
               kind_names[variable->info->kind], table_causality(variable->info->causality),
-              values_name(unit, variable, name), kind_names[kind]);
+              table_name(unit, variable, name), kind_names[kind]);
     return NULL;
 }
 
@@ -63,7 +52,7 @@ static bool ready(Unit *unit, size_t count, const fmi2ValueReference references[
     return true;
 }
 
-static inline bool all_found(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[]) {
+static inline bool all_exist(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[]) {
     for (size_t i = 0; i < count; i++) {
         if (values_find(unit, references[i], kind) == NULL) {
             return false;
@@ -74,7 +63,7 @@ static inline bool all_found(Unit *unit, Kind kind, size_t count, const fmi2Valu
 
 static inline bool readable(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[],
                             const void *values) {
-    return values_arrays(unit, count, references, values) && all_found(unit, kind, count, references) &&
+    return values_arrays(unit, count, references, values) && all_exist(unit, kind, count, references) &&
            ready(unit, count, references);
 }
 
@@ -115,11 +104,11 @@ RARE static bool settable_now(Unit *unit, const Variable *variable) {
     char name[VARIABLE_NAME_SIZE];
     if (info->causality != CAUSALITY_parameter) {
         return unit_fail(unit, "the %s '%s' is calculated and cannot be set", table_causality(info->causality),
-                         values_name(unit, variable, name));
+                         table_name(unit, variable, name));
     }
     if (unit_header(unit)->phase == PHASE_STEPPING && info->variability != VARIABILITY_tunable) {
         return unit_fail(unit, "the fixed parameter '%s' cannot be set once initialisation is complete",
-                         values_name(unit, variable, name));
+                         table_name(unit, variable, name));
     }
     return true;
 }
@@ -132,7 +121,7 @@ RARE static bool out_of_range(Unit *unit, const Variable *variable, double value
     const VariableInfo *info = variable->info;
     char name[VARIABLE_NAME_SIZE], text[3][NUMBER_TEXT_SIZE];
     const char *gap = *info->unit ? " " : "";
-    values_name(unit, variable, name);
+    table_name(unit, variable, name);
     number_text(text[0], value);
     number_text(text[1], info->min);
     number_text(text[2], info->max);
@@ -207,12 +196,12 @@ bool values_set_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueRefere
 static bool fits(Unit *unit, const Variable *variable, const char *text) {
     char name[VARIABLE_NAME_SIZE];
     if (text == NULL) {
-        return unit_fail(unit, "the value of '%s' is NULL", values_name(unit, variable, name));
+        return unit_fail(unit, "the value of '%s' is NULL", table_name(unit, variable, name));
     }
     size_t length = strlen(text);
     if (length >= STRING_SIZE) {
         return unit_fail(unit, "the value of '%s' is too long: %.0f bytes, allowed are at most %d",
-                         values_name(unit, variable, name), (double)length, STRING_SIZE - 1);
+                         table_name(unit, variable, name), (double)length, STRING_SIZE - 1);
     }
     return true;
 }
@@ -312,11 +301,11 @@ static bool sound(Unit *unit, const Variable *variable, const unsigned char *at,
         memcpy(&whole, at, sizeof whole);
         return whole == 0 || whole == 1 ||
                unit_fail(unit, "the value of %s '%s' is %d; a Boolean is 0 or 1",
-                         table_causality(variable->info->causality), values_name(unit, variable, name), whole);
+                         table_causality(variable->info->causality), table_name(unit, variable, name), whole);
     case KIND_STRING:
         return memchr(at, '\0', STRING_SIZE) != NULL ||
                unit_fail(unit, "the value of '%s' is too long: allowed are at most %d bytes",
-                         values_name(unit, variable, name), STRING_SIZE - 1);
+                         table_name(unit, variable, name), STRING_SIZE - 1);
     }
     return false;
 }

@@ -14,10 +14,6 @@
 static inline const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind);
 const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Kind kind); /* always NULL */
 
-#define VARIABLE_NAME_SIZE 256
-/* "F_S", or "X.M_a" for a row of axis X, written to name[VARIABLE_NAME_SIZE]; returns name. */
-char *values_name(const Unit *unit, const Variable *variable, char *name);
-
 /* No memory holds more numbers than this. */
 #define MOST_ELEMENTS (SIZE_MAX / 2 / sizeof(double))
 

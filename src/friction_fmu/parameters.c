@@ -4,6 +4,13 @@ static bool within(double value, double min, double max) {
     return isfinite(value) && value >= min && value <= max;
 }
 
+/* Where the contact has a parameter: among those of LuGre, but for these. */
+#define PLACE_W ~, W
+#define PLACE_gamma ~, gamma
+#define PLACE_SECOND(first, second, ...) second
+#define PLACE_CHOICE(...) PLACE_SECOND(__VA_ARGS__, ~)
+#define PLACE(field) PLACE_CHOICE(PLACE_##field, lugre.field)
+
 /* A parameter of another kind than REAL has no macro here and does not compile. */
 #define TAKE_input_REAL(...)
 #define TAKE_output_REAL(...)
@@ -25,17 +32,15 @@ bool parameters_agree(const Scalars *v) {
     return v->F_S >= v->F_C;
 }
 
+#define PUT_input(...)
+#define PUT_output(...)
+#define PUT_local(...)
+#define PUT_parameter(field) contact.PLACE(field) = v->field;
+#define VARIABLE(kind, field, name, causality, ...) PUT_##causality(field)
+
 Contact parameters_contact(const Scalars *v) {
-    return (Contact){.lugre = {.sigma_0 = v->sigma_0,
-                               .sigma_1 = v->sigma_1,
-                               .sigma_2 = v->sigma_2,
-                               .F_C = v->F_C,
-                               .F_S = v->F_S,
-                               .v_s = v->v_s,
-                               .beta = v->beta,
-                               .F_log = v->F_log,
-                               .v_log = v->v_log,
-                               .asymmetry = v->asymmetry},
-                     .W = v->W,
-                     .gamma = v->gamma};
+    Contact contact = {0};
+#include UNIT_TABLE
+    return contact;
 }
+#undef VARIABLE

@@ -6,8 +6,7 @@
  *   c      = clip(c + travelled angle, -W/2, +W/2)                                                   (4)
  *
  * Source: Wiesauer, Bleicher, 18th CIRP CMMO (2021). The print of (4) has the wrong sign in its second case: it must
- * read
- * <= -W/2. W = 0 switches the model off: lambda = k = 1. Pure functions. */
+ * read <= -W/2. W = 0 switches the model off: lambda = k = 1. Pure functions. */
 #ifndef FEEDSIM_TEM_H
 #define FEEDSIM_TEM_H
 

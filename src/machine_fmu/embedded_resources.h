@@ -1,7 +1,6 @@
 /* The archive's files as bytes, for importers without a file system, those of the parts under the names by which the
  * parts know them. The packager writes embedded_resources.c next to this file; the size is 0 where nothing was
- * embedded.
- */
+ * embedded. */
 #ifndef FEEDSIM_EMBEDDED_RESOURCES_H
 #define FEEDSIM_EMBEDDED_RESOURCES_H
 

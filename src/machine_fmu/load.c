@@ -126,13 +126,13 @@ static bool settings_read(Unit *unit, Settings *settings) {
 }
 
 static bool settings_are_the_packed(Unit *unit, const Settings *settings) {
-    char found[HASH_TEXT_SIZE];
-    hash_text(found, hash_bytes(HASH_OF_NOTHING, settings->text, settings->size));
-    return strcmp(found, unit_resource_hash(unit)) == 0 ||
+    char actual[HASH_TEXT_SIZE];
+    hash_text(actual, hash_bytes(HASH_OF_NOTHING, settings->text, settings->size));
+    return strcmp(actual, unit_resource_hash(unit)) == 0 ||
            unit_fail(unit,
                      "%s has hash %s, but the archive was packed with hash %s: the archive is stale or its file was "
                      "changed; pack it anew",
-                     settings->source, found, unit_resource_hash(unit));
+                     settings->source, actual, unit_resource_hash(unit));
 }
 
 static bool copy_cell(CsvRow *row, char *text) {

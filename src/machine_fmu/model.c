@@ -101,9 +101,9 @@ static void keep_start(Unit *unit, Machine *machine) {
 
 /* Between y_0 with speed v_0 and y_1 with v_1, h [s] apart. */
 static double cubic(double y_0, double v_0, double y_1, double v_1, double h, double share) {
-    const double left = 1 - share;
-    return left * left * ((1 + 2 * share) * y_0 + share * h * v_0) +
-           share * share * ((3 - 2 * share) * y_1 - left * h * v_1);
+    const double rest = 1 - share;
+    return rest * rest * ((1 + 2 * share) * y_0 + share * h * v_0) +
+           share * share * ((3 - 2 * share) * y_1 - rest * h * v_1);
 }
 
 static double line(double y_0, double y_1, double share) {

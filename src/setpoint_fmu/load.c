@@ -35,20 +35,20 @@ static char *setpoint_bytes(Unit *unit, const char **source, size_t *size) {
 }
 
 static bool setpoint_is_the_packed(Unit *unit, const char *bytes, const char *source, size_t size) {
-    char found[HASH_TEXT_SIZE];
-    if (strcmp(hash_text(found, hash_bytes(HASH_OF_NOTHING, bytes, size)), unit_resource_hash(unit)) == 0) {
+    char actual[HASH_TEXT_SIZE];
+    if (strcmp(hash_text(actual, hash_bytes(HASH_OF_NOTHING, bytes, size)), unit_resource_hash(unit)) == 0) {
         return true;
     }
     if (unit_resources(unit) == NULL) {
         return unit_fail(unit,
                          "the table embedded in this unit has hash %s, but the archive was packed with hash %s: with "
                          "another table; the importer must give the resource location",
-                         found, unit_resource_hash(unit));
+                         actual, unit_resource_hash(unit));
     }
     return unit_fail(unit,
                      "%s has hash %s, but the archive was packed with hash %s: the archive is stale or its file was "
                      "changed; pack it anew",
-                     source, found, unit_resource_hash(unit));
+                     source, actual, unit_resource_hash(unit));
 }
 
 static bool setpoint_name_axes(Unit *unit, const SetpointAxis *names, size_t axes) {

@@ -6,9 +6,15 @@ static double sign(double n) {
     return (double)((n > 0) - (n < 0));
 }
 
+/* (|n|/v_s)^beta. The usual beta of 1 needs no pow(), which returns its first argument then. */
+static double stribeck_exponent(const Lugre *p, double speed) {
+    const double ratio = speed / p->v_s;
+    return fabs(p->beta - 1) > 0 ? pow(ratio, p->beta) : ratio;
+}
+
 double lugre_level(const Lugre *p, double n) {
     const double speed = fabs(n);
-    double torque = p->F_C + (p->F_S - p->F_C) * exp(-pow(speed / p->v_s, p->beta));
+    double torque = p->F_C + (p->F_S - p->F_C) * exp(-stribeck_exponent(p, speed));
     if (p->F_log > 0) { /* 0 times an overflowing logarithm's argument would be no number */
         torque += p->F_log * log1p(speed / p->v_log);
     }
@@ -17,7 +23,7 @@ double lugre_level(const Lugre *p, double n) {
 
 double lugre_level_slope(const Lugre *p, double n) {
     const double speed = fabs(n);
-    const double x = pow(speed / p->v_s, p->beta);
+    const double x = stribeck_exponent(p, speed);
     double torque = 0;
     if (x < 700) { /* beyond, exp(-x) has vanished while x may be infinite */
         torque -= (p->F_S - p->F_C) * p->beta * x * exp(-x);

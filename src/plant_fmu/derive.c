@@ -17,7 +17,9 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     const size_t ports = plant_ports(plant), size = modal_padded(modes);
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
-    const size_t scratch = 4 * ports + plant->axes + 2 * size + crossing;
+    const size_t axes = plant->axes, shown = PORTS_SHOWN * axes;
+    const size_t joints = shown * 2 * (size + ports) + 4 * axes * axes + 8 * axes + 2 * ports;
+    const size_t scratch = 4 * ports + axes + joints + crossing;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
     double *memory = systems != NULL ? unit_alloc(unit, scratch, sizeof *memory) : NULL;
@@ -29,7 +31,6 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     unit_free(unit, plant->modal);
     unit_free(unit, plant->systems);
     unit_free(unit, plant->memory);
-    plant->mobility = plant->transmitted = NULL;
     plant->modal = modal;
     plant->systems = systems;
     plant->memory = memory;
@@ -43,9 +44,23 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     plant->y = plant->du + ports;
     plant->y_before = plant->y + ports;
     plant->x = plant->y_before + ports;
-    plant->q_free = plant->x + plant->axes;
-    plant->v_free_step = plant->q_free + size;
-    plant->carried = plant->v_free_step + size;
+    plant->carried = plant->x + axes;
+    double *at = plant->carried + crossing;
+    for (size_t i = 0; i < shown; i++) {
+        plant->forecasts[i] = (Forecast){.q = at, .v = at + size, .held = at + 2 * size, .ramp = at + 2 * size + ports};
+        at += 2 * (size + ports);
+    }
+    double **const matrices[] = {&plant->held, &plant->ramp, &plant->by_angle, &plant->by_n};
+    for (size_t i = 0; i < sizeof matrices / sizeof *matrices; i++, at += axes * axes) {
+        *matrices[i] = at;
+    }
+    double **const vectors[] = {&plant->v_free, &plant->angle_free, &plant->n_free,  &plant->v,
+                                &plant->angle,  &plant->n,          &plant->motor_u, &plant->motor_du};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++, at += axes) {
+        *vectors[i] = at;
+    }
+    plant->u_acting = at;
+    plant->du_acting = at + ports;
     return true;
 }
 
@@ -128,19 +143,31 @@ static void plant_derive_errors(Unit *unit, Plant *plant) {
     plant->errors = most > 0;
 }
 
+/* Memory for what is known of guides and transmissions, once. */
+static bool plant_place_joints(Unit *unit, Plant *plant) {
+    const size_t axes = unit_axes(unit);
+    if (plant->guides == NULL) {
+        plant->guides = unit_alloc(unit, axes, sizeof *plant->guides);
+    }
+    if (plant->transmissions == NULL) {
+        plant->transmissions = unit_alloc(unit, axes, sizeof *plant->transmissions);
+    }
+    if (plant->forecasts == NULL) {
+        plant->forecasts = unit_alloc(unit, PORTS_SHOWN * axes, sizeof *plant->forecasts);
+    }
+    if (plant->acting == NULL) {
+        plant->acting = unit_alloc(unit, plant_ports(plant), sizeof *plant->acting);
+    }
+    if (plant->shapes == NULL) {
+        plant->shapes = unit_alloc(unit, plant_ports(plant), sizeof *plant->shapes);
+    }
+    return plant->guides != NULL && plant->transmissions != NULL && plant->forecasts != NULL && plant->acting != NULL &&
+           plant->shapes != NULL;
+}
+
 /* Friction at the guides. */
 static bool plant_derive_guides(Unit *unit, Plant *plant) {
     const size_t axes = unit_axes(unit);
-    if (plant->guides == NULL) {
-        unit_free(unit, plant->v_free);
-        double *numbers = plant->v_free = unit_alloc(unit, axes + 2 * axes * axes, sizeof *numbers);
-        plant->guides = numbers != NULL ? unit_alloc(unit, axes, sizeof *plant->guides) : NULL;
-        if (plant->guides == NULL) {
-            return false;
-        }
-        plant->held = numbers + axes;
-        plant->ramp = plant->held + axes * axes;
-    }
     plant->guided = false;
     for (size_t i = 0; i < axes; i++) {
         const AxisBlock *v = unit_axis(unit, i);
@@ -185,28 +212,14 @@ static bool plant_derive_guides(Unit *unit, Plant *plant) {
 }
 
 /* Transmissions between the motors and the structure. */
-static bool plant_derive_transmissions(Unit *unit, Plant *plant) {
+static void plant_derive_transmissions(Unit *unit, Plant *plant) {
     const size_t axes = unit_axes(unit);
-    if (plant->transmissions == NULL) {
-        unit_free(unit, plant->motor_u);
-        double *numbers = plant->motor_u = unit_alloc(unit, 4 * axes + 2 * axes * axes, sizeof *numbers);
-        plant->transmissions = numbers != NULL ? unit_alloc(unit, axes, sizeof *plant->transmissions) : NULL;
-        if (plant->transmissions == NULL) {
-            return false;
-        }
-        plant->motor_du = numbers + axes;
-        plant->angle_free = plant->motor_du + axes;
-        plant->n_free = plant->angle_free + axes;
-        plant->by_angle = plant->n_free + axes;
-        plant->by_n = plant->by_angle + axes * axes;
-    }
     plant->driven = false;
     for (size_t i = 0; i < axes; i++) {
         const AxisBlock *v = unit_axis(unit, i);
         plant->transmissions[i] = (Transmission){.on = v->transmission_stiffness > 0, .J = v->transmission_inertia};
         plant->driven = plant->driven || plant->transmissions[i].on;
     }
-    return true;
 }
 
 /* Way of a slide per angle of its motor, by the rigid modes of a cell [m/rad]; 0: none moves it. */
@@ -262,9 +275,11 @@ static bool plant_join_motors(Unit *unit, const Plant *plant) {
 bool plant_derive(Unit *unit) {
     Plant *plant = unit_derived(unit);
     plant_derive_errors(unit, plant);
-    if (!plant_derive_guides(unit, plant) || !plant_derive_transmissions(unit, plant)) {
+    if (!plant_place_joints(unit, plant) || !plant_derive_guides(unit, plant)) {
         return false;
     }
+    plant_derive_transmissions(unit, plant);
+    plant->foretold = NULL; /* other axes may be joined now */
     const char *path = unit_scalars(unit)->modes_file;
     if (plant->ready && strcmp(plant->table, path) == 0) {
         return plant_join_motors(unit, plant);

@@ -8,7 +8,7 @@
  * Warming, sigma_2 and F_log are multiplied by exp(-theta), tau dtheta/dt = F v / P_w - theta; both of the step's
  * start.
  *
- * v_free: speeds at the end of the step without these forces; held, ramp: modal_mobility(). The step is implicit, so
+ * v_free: speeds at the end of the step without these forces; held, ramp: modal_forecast(). The step is implicit, so
  * that stiff guides set no limit to it, and no energy is lost between structure and friction. Pure functions; the
  * memory is the caller's. */
 #ifndef FEEDSIM_GUIDE_H
@@ -43,9 +43,10 @@ typedef struct GuideState {
     double warmth;
 } GuideState;
 
-/* Advance the guides over h [s] > 0, from start[axes] to end[axes]; held, ramp: [axes][axes] [m/s/N]. True where the
- * forces have settled, which they do unless one is no finite number. */
+/* Advance the guides over h [s] > 0, from start[axes] to end[axes]; held, ramp: [axes][axes] [m/s/N]. False where a
+ * force is no finite number. *settled: each force is that of its law, to 1e-6 of F_S where it can be, to 1e-4 at
+ * least. */
 bool guide_step(size_t axes, const Guide *guides, const double *v_free, const double *held, const double *ramp,
-                const GuideState *start, GuideState *end, double h);
+                const GuideState *start, GuideState *end, double h, bool *settled);
 
 #endif

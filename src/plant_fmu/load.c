@@ -121,9 +121,10 @@ void plant_release(Unit *unit) {
     Plant *plant = unit_derived(unit);
     if (plant != NULL) {
         unit_free(unit, plant->transmissions);
-        unit_free(unit, plant->motor_u);
+        unit_free(unit, plant->forecasts);
+        unit_free(unit, plant->acting);
+        unit_free(unit, plant->shapes);
         unit_free(unit, plant->guides);
-        unit_free(unit, plant->v_free);
         unit_free(unit, plant->memory);
         unit_free(unit, plant->systems);
         unit_free(unit, plant->modal);

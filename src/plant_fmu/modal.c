@@ -207,17 +207,31 @@ static inline void lanes_end(double *end, const double *c, const Lanes *q, const
     lanes_write(end, &sum);
 }
 
-void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u, const double *UNALIASED du,
-                   const double *UNALIASED q, const double *UNALIASED v, double *UNALIASED q_end,
-                   double *UNALIASED v_end) {
+/* Compiled by itself for every call with its number of inputs: in a step, nothing takes longer. */
+#ifdef __GNUC__
+#define INLINED static inline __attribute__((always_inline))
+#else
+#define INLINED static inline
+#endif
+#if defined(__GNUC__) && !defined(__clang__) /* which does so by itself */
+#define UNROLLED _Pragma("GCC unroll 4")
+#else
+#define UNROLLED
+#endif
+
+/* Inputs at the ports of those shapes, NULL: at the first of all ports. */
+INLINED void modal_advance_from(const Modal *modal, size_t inputs, const double *const *UNALIASED shapes,
+                                const double *UNALIASED u, const double *UNALIASED du, const double *UNALIASED q,
+                                const double *UNALIASED v, double *UNALIASED q_end, double *UNALIASED v_end) {
     const size_t size = modal->size;
     const double *UNALIASED c = modal->update;
     for (size_t k = 0; k < size; k += MODAL_LANES, c += COEFFICIENTS * MODAL_LANES) {
         Lanes f = {{{0}}}, df = {{{0}}}, q_k, v_k;
         const double *UNALIASED b = modal->shape + k;
+        UNROLLED
         for (size_t i = 0; i < inputs; i++, b += size) {
             Lanes b_k;
-            lanes_read(&b_k, b);
+            lanes_read(&b_k, shapes == NULL ? b : shapes[i] + k);
             lanes_add_scaled(&f, &b_k, u[i]);
             lanes_add_scaled(&df, &b_k, du[i]);
         }
@@ -228,63 +242,102 @@ void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u,
     }
 }
 
-void modal_add(const Modal *modal, size_t port, double f, double df, double *UNALIASED q_end, double *UNALIASED v_end) {
-    const size_t size = modal->size;
-    const double *UNALIASED c = modal->update, *UNALIASED b = modal->shape + port * size;
-    for (size_t k = 0; k < size; k += MODAL_LANES, c += COEFFICIENTS * MODAL_LANES) {
-        Lanes b_k, c_f, c_df, end;
-        lanes_read(&b_k, b + k);
-        for (int half = 0; half < 2; half++) {
-            Lanes push = {{{0}}};
-            double *UNALIASED x = half == 0 ? q_end : v_end;
-            const double *UNALIASED own = c + 4 * half * MODAL_LANES;
-            lanes_read(&c_f, own + 2 * MODAL_LANES);
-            lanes_read(&c_df, own + 3 * MODAL_LANES);
-            lanes_add_scaled(&push, &c_f, f);
-            lanes_add_scaled(&push, &c_df, df);
-            lanes_read(&end, x + k);
-            lanes_add_product(&end, &b_k, &push);
-            lanes_write(x + k, &end);
+void modal_advance(const Modal *modal, size_t inputs, const double *u, const double *du, const double *q,
+                   const double *v, double *q_end, double *v_end) {
+    if (inputs == 3) { /* machines of three axes without forces on tool and slides */
+        modal_advance_from(modal, 3, NULL, u, du, q, v, q_end, v_end);
+    } else {
+        modal_advance_from(modal, inputs, NULL, u, du, q, v, q_end, v_end);
+    }
+}
+
+void modal_advance_at(const Modal *modal, size_t inputs, const double *const *shapes, const double *u, const double *du,
+                      const double *q, const double *v, double *q_end, double *v_end) {
+    if (inputs == 3) {
+        modal_advance_from(modal, 3, shapes, u, du, q, v, q_end, v_end);
+    } else if (inputs == 4) {
+        modal_advance_from(modal, 4, shapes, u, du, q, v, q_end, v_end);
+    } else {
+        modal_advance_from(modal, inputs, shapes, u, du, q, v, q_end, v_end);
+    }
+}
+
+void modal_forecast(const Modal *modal, size_t port, bool speed, Forecast *forecast) {
+    const size_t size = modal->size, part = speed ? 4 * MODAL_LANES : 0;
+    for (size_t from = 0; from < modal->ports; from++) {
+        forecast->held[from] = forecast->ramp[from] = 0;
+    }
+    for (size_t k = 0; k < size; k++) {
+        const size_t lane = k % MODAL_LANES;
+        const double *c = modal->update + (k - lane) * COEFFICIENTS + part + lane;
+        const double b = modal->shape[port * size + k];
+        forecast->q[k] = b * c[0];
+        forecast->v[k] = b * c[MODAL_LANES];
+        for (size_t from = 0; from < modal->ports; from++) {
+            const double shapes = b * modal->shape[from * size + k];
+            forecast->held[from] += shapes * c[2 * MODAL_LANES];
+            forecast->ramp[from] += shapes * c[3 * MODAL_LANES];
         }
     }
 }
 
-void modal_mobility(const Modal *modal, size_t at, size_t from, double *held, double *ramp) {
-    const size_t size = modal->size;
-    *held = *ramp = 0;
-    for (size_t k = 0; k < size; k++) {
-        const size_t lane = k % MODAL_LANES;
-        const double *c = modal->update + (k - lane) * COEFFICIENTS + lane;
-        const double shapes = modal->shape[at * size + k] * modal->shape[from * size + k];
-        *held += shapes * c[6 * MODAL_LANES];
-        *ramp += shapes * c[7 * MODAL_LANES];
-    }
+/* Partial sums, in the order that every platform adds in. */
+static inline double lanes_total(const Lanes *x) {
+    double s[MODAL_LANES];
+    lanes_write(s, x);
+    return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
-double modal_moved(const Modal *modal, size_t at, size_t from) {
-    const size_t size = modal->size;
-    double moved = 0;
-    for (size_t k = 0; k < size; k++) {
-        const size_t lane = k % MODAL_LANES;
-        const double *c = modal->update + (k - lane) * COEFFICIENTS + lane;
-        moved += modal->shape[at * size + k] * modal->shape[from * size + k] * c[2 * MODAL_LANES];
+double modal_foretold(const Forecast *forecast, size_t size, const double *UNALIASED q, const double *UNALIASED v) {
+    Lanes sum = {{{0}}};
+    for (size_t k = 0; k < size; k += MODAL_LANES) {
+        Lanes by_q, by_v, q_k, v_k;
+        lanes_read(&by_q, forecast->q + k);
+        lanes_read(&by_v, forecast->v + k);
+        lanes_read(&q_k, q + k);
+        lanes_read(&v_k, v + k);
+        lanes_add_product(&sum, &by_q, &q_k);
+        lanes_add_product(&sum, &by_v, &v_k);
     }
-    return moved;
+    return lanes_total(&sum);
 }
 
 double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {
     const size_t size = modal->size;
     const double *UNALIASED b = modal->shape + port * size;
     Lanes sum = {{{0}}};
-    double s[MODAL_LANES];
     for (size_t k = 0; k < size; k += MODAL_LANES) {
         Lanes b_k, q_k;
         lanes_read(&b_k, b + k);
         lanes_read(&q_k, q + k);
         lanes_add_product(&sum, &b_k, &q_k);
     }
-    lanes_write(s, &sum);
-    return (s[0] + s[1]) + (s[2] + s[3]);
+    return lanes_total(&sum);
+}
+
+void modal_sums(const Modal *modal, size_t port, size_t count, const double *UNALIASED q, double *y) {
+    const size_t size = modal->size;
+    size_t i = 0;
+    for (; i + 3 <= count; i += 3) { /* as many sums as registers hold: q is read once for them */
+        const double *UNALIASED b = modal->shape + (port + i) * size;
+        Lanes sum_0 = {{{0}}}, sum_1 = {{{0}}}, sum_2 = {{{0}}};
+        for (size_t k = 0; k < size; k += MODAL_LANES) {
+            Lanes b_k, q_k;
+            lanes_read(&q_k, q + k);
+            lanes_read(&b_k, b + k);
+            lanes_add_product(&sum_0, &b_k, &q_k);
+            lanes_read(&b_k, b + size + k);
+            lanes_add_product(&sum_1, &b_k, &q_k);
+            lanes_read(&b_k, b + 2 * size + k);
+            lanes_add_product(&sum_2, &b_k, &q_k);
+        }
+        y[i] = lanes_total(&sum_0);
+        y[i + 1] = lanes_total(&sum_1);
+        y[i + 2] = lanes_total(&sum_2);
+    }
+    for (; i < count; i++) {
+        y[i] = modal_sum(modal, port + i, q);
+    }
 }
 
 double modal_acceleration(const Modal *modal, size_t port, size_t inputs, const double *u, const double *q,

@@ -16,6 +16,7 @@
 #ifndef FEEDSIM_MODAL_H
 #define FEEDSIM_MODAL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "prefix.h"
@@ -27,10 +28,11 @@
 #define modal_set_mode PREFIXED(modal_set_mode)
 #define modal_prepare PREFIXED(modal_prepare)
 #define modal_advance PREFIXED(modal_advance)
-#define modal_add PREFIXED(modal_add)
-#define modal_mobility PREFIXED(modal_mobility)
-#define modal_moved PREFIXED(modal_moved)
+#define modal_advance_at PREFIXED(modal_advance_at)
+#define modal_forecast PREFIXED(modal_forecast)
+#define modal_foretold PREFIXED(modal_foretold)
 #define modal_sum PREFIXED(modal_sum)
+#define modal_sums PREFIXED(modal_sums)
 #define modal_acceleration PREFIXED(modal_acceleration)
 #define modal_kinetic_energy PREFIXED(modal_kinetic_energy)
 #define modal_elastic_energy PREFIXED(modal_elastic_energy)
@@ -76,18 +78,28 @@ void modal_prepare(Modal *modal, double h);
 void modal_advance(const Modal *modal, size_t inputs, const double *u, const double *du, const double *q,
                    const double *v, double *q_end, double *v_end);
 
-/* Add to the end of a step, (q_end, v_end), what a further input f at `port`, changing by df over the step, does. */
-void modal_add(const Modal *modal, size_t port, double f, double df, double *q_end, double *v_end);
+/* The same with the inputs at any ports: shapes[inputs] of these, modal->shape + port * modal->size. */
+void modal_advance_at(const Modal *modal, size_t inputs, const double *const *shapes, const double *u, const double *du,
+                      const double *q, const double *v, double *q_end, double *v_end);
 
-/* Speed at the port `at` at the end of a step by an input of 1 at the port `from`: *held, and *ramp by one that rises
- * from 0 to 1 over the step. */
-void modal_mobility(const Modal *modal, size_t at, size_t from, double *held, double *ramp);
+/* What a port shows at the end of a step, its displacement or its speed, without the step itself:
+ *   y+ = sum over modes of (by_q q + by_v v) + sum over ports of (held u + ramp du) */
+typedef struct Forecast {
+    double *q, *v;       /* by_q, by_v [size] */
+    double *held, *ramp; /* [ports] */
+} Forecast;
 
-/* Displacement at the port `at` at the end of a step by an input of 1 at the port `from`. */
-double modal_moved(const Modal *modal, size_t at, size_t from);
+/* The forecast for the step that modal_prepare() has been called with. */
+void modal_forecast(const Modal *modal, size_t port, bool speed, Forecast *forecast);
+
+/* The sum over modes of it. */
+double modal_foretold(const Forecast *forecast, size_t size, const double *q, const double *v);
 
 /* Displacement at a port from q; with v in place of q the speed there. */
 double modal_sum(const Modal *modal, size_t port, const double *q);
+
+/* The same, to the bit, at `count` ports from `port` on: y[count]. */
+void modal_sums(const Modal *modal, size_t port, size_t count, const double *q, double *y);
 
 /* Acceleration at a port under inputs u[inputs] at the first `inputs` ports. */
 double modal_acceleration(const Modal *modal, size_t port, size_t inputs, const double *u, const double *q,

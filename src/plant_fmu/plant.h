@@ -19,6 +19,21 @@
 #define plant_table PREFIXED(plant_table)
 #define plant_derive PREFIXED(plant_derive)
 #define plant_accepts PREFIXED(plant_accepts)
+#define plant_measure PREFIXED(plant_measure)
+#define plant_measure_tool PREFIXED(plant_measure_tool)
+#define plant_positions PREFIXED(plant_positions)
+#define plant_play PREFIXED(plant_play)
+#define plant_errors_are_numbers PREFIXED(plant_errors_are_numbers)
+#define plant_show PREFIXED(plant_show)
+#define plant_show_play PREFIXED(plant_show_play)
+#define plant_show_tool PREFIXED(plant_show_tool)
+#define plant_slide_speed PREFIXED(plant_slide_speed)
+#define plant_tool_speed PREFIXED(plant_tool_speed)
+#define plant_start_joints PREFIXED(plant_start_joints)
+#define plant_join PREFIXED(plant_join)
+#define plant_follow_joints PREFIXED(plant_follow_joints)
+#define plant_show_guides PREFIXED(plant_show_guides)
+#define plant_show_transmissions PREFIXED(plant_show_transmissions)
 
 #define NO_AXIS ((size_t)-1)
 
@@ -50,21 +65,23 @@ typedef struct Plant {
     bool errors; /* play or geometry: what follows counts */
     Geometry geometry;
 
-    bool guided; /* friction at a guide: what follows counts */
+    bool guided; /* friction at a guide */
     Guide *guides;
-    double *v_free;        /* [axes] speeds of the slides without it */
-    double *held, *ramp;   /* [axes][axes] mobilities of the slides, for */
-    const Modal *mobility; /* this modal system */
-    double mobility_h;     /* and this step */
-
-    bool driven; /* a motor with a transmission: what follows counts */
+    bool driven; /* a motor with a transmission */
     Transmission *transmissions;
-    double *motor_u, *motor_du;   /* [axes] torques on the motors */
-    double *angle_free, *n_free;  /* [axes] the structure at their ports without them */
-    double *by_angle, *by_n;      /* [axes][axes] what their torques add there, for */
-    const Modal *transmitted;     /* this modal system */
-    double transmitted_h;         /* and this step */
-    double *q_free, *v_free_step; /* [size] */
+
+    /* What follows counts where one of both is. */
+    Forecast *forecasts;                  /* [PORTS_SHOWN][axes], for */
+    const Modal *foretold;                /* this modal system */
+    double foretold_h;                    /* and this step */
+    double *held, *ramp;                  /* [axes][axes] mobilities of the slides */
+    double *by_angle, *by_n;              /* [axes][axes] what torques at the motors' ports add there */
+    double *v_free, *angle_free, *n_free; /* [axes] slides and motors' ports without these forces */
+    double *v, *angle, *n;                /* [axes] with some of them */
+    double *motor_u, *motor_du;           /* [axes] torques on the motors */
+    size_t *acting;                       /* [ports] where forces act, */
+    const double **shapes;                /* [ports] the modes' shapes there */
+    double *u_acting, *du_acting;         /* [ports] and the forces */
 } Plant;
 
 /* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
@@ -76,6 +93,9 @@ typedef struct StateHead {
     uint64_t cell;       /* whose modes q and v belong to */
     uint64_t place;      /* that counts, 0 or 1 */
 } StateHead;
+
+/* What a Forecast is of. */
+typedef enum PortShown { SLIDE_SPEED, MOTOR_SPEED, MOTOR_ANGLE, PORTS_SHOWN } PortShown;
 
 enum {
     GUIDE_DOUBLES = sizeof(GuideState) / sizeof(double),
@@ -95,6 +115,31 @@ static inline size_t plant_state_doubles(const Plant *plant) {
     return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES + TRANSMISSION_DOUBLES) * plant->axes;
 }
 
+static inline StateHead *plant_head(Unit *unit) {
+    return unit_state(unit);
+}
+
+static inline double *plant_state_at(Unit *unit, const Plant *plant, uint64_t place) {
+    return (double *)(plant_head(unit) + 1) + place * plant_state_doubles(plant);
+}
+
+static inline double *plant_state(Unit *unit) {
+    return plant_state_at(unit, unit_derived(unit), plant_head(unit)->place);
+}
+
+/* Ways of the slides since the start, behind q and v of a state; what play takes off or adds follows. */
+static inline double *plant_ways(const Plant *plant, double *state) {
+    return state + plant_ports(plant) + 2 * plant->size;
+}
+
+static inline GuideState *plant_guides(const Plant *plant, double *state) {
+    return (GuideState *)(void *)(plant_ways(plant, state) + 3 * plant->axes);
+}
+
+static inline TransmissionState *plant_transmissions(const Plant *plant, double *state) {
+    return (TransmissionState *)(void *)(plant_guides(plant, state) + plant->axes);
+}
+
 /* --- load.c: the archive */
 bool plant_load(Unit *unit);
 void plant_release(Unit *unit);
@@ -104,5 +149,34 @@ double *plant_table(Unit *unit, const Plant *plant, const char *text, size_t siz
 /* --- derive.c: modal systems from the archive or from modes_file */
 bool plant_derive(Unit *unit);
 bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size);
+
+/* --- outputs.c: what a state shows */
+/* Speeds at the axes' rotors and displacements at their scales, y[ports]; false where one is no finite number. */
+bool plant_measure(const Plant *plant, const Modal *modal, const double *q, const double *v, double *y);
+/* Displacements at the tool, the rest of y[ports]; likewise. */
+bool plant_measure_tool(const Plant *plant, const Modal *modal, const double *q, double *y);
+/* Positions x[axes] from displacements at the axes' scales. */
+void plant_positions(Unit *unit, const Plant *plant, const double *displacement, double *x);
+/* Play of the drives, at the end of a step that leads from one place of the state to the other. */
+void plant_play(Unit *unit, const Plant *plant, const double *before, double *ways);
+/* Whether play and geometry are numbers at the ways that end a step: a cube of a way is soon none. */
+bool plant_errors_are_numbers(const Plant *plant, const double *ways);
+void plant_show(Unit *unit, const Plant *plant, const double *y);
+void plant_show_play(Unit *unit, const Plant *plant, const double *ways);
+void plant_show_tool(Unit *unit, Plant *plant, double *y);
+/* Speed of an axis's slide: that of the structure there, unless play lets it stand. */
+double plant_slide_speed(Unit *unit, const Plant *plant, const Modal *modal, size_t axis);
+double plant_tool_speed(Unit *unit, const Plant *plant, const Modal *modal, size_t direction);
+
+/* --- joints.c: friction at the guides, and transmissions */
+/* Their initial state; what the motors' ports of the state get is then the structure's. */
+void plant_start_joints(Unit *unit, Plant *plant, double *state);
+/* Ahead of a step: what they do over it, into `end` and among u and du. *acting: how many of shapes, u_acting and
+ * du_acting there are. False with the reason logged. */
+bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, double *end, double h, size_t *acting);
+/* Behind it, with y measured: the structure as the modes of its cell have it. */
+void plant_follow_joints(Unit *unit, const Plant *plant, const Modal *modal, double *end);
+void plant_show_guides(Unit *unit, const Plant *plant, double *state);
+void plant_show_transmissions(Unit *unit, const Plant *plant, double *state);
 
 #endif

@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-static const double TRANSMISSION_SETTLED = 1e-13; /* of the largest torque, or angle: rounding */
+static const double TRANSMISSION_SETTLED = 1e-13;  /* of the largest torque, or angle: rounding */
+static const double TRANSMISSION_UNSETTLED = 1e-6; /* of the largest torque */
 enum { TRANSMISSION_PASSES = 30, TRANSMISSION_TRIALS = 100 };
 
 /* e of delta. */
@@ -75,10 +76,12 @@ static void transmission_settle(const Transmission *p, double u, double du, doub
 
 bool transmission_step(size_t axes, const Transmission *p, const double *u, const double *du, const double *angle_free,
                        const double *n_free, const double *by_angle, const double *by_n, const TransmissionState *start,
-                       TransmissionState *end, double h) {
+                       TransmissionState *end, double h, bool *settled) {
     double probe = 0;
+    size_t joined = 0;
     for (size_t i = 0; i < axes; i++) {
         end[i] = start[i]; /* T as a first guess of what the others do */
+        joined += p[i].on;
     }
     double change = 1, most = 0;
     for (int pass = 0; pass < TRANSMISSION_PASSES && change > TRANSMISSION_SETTLED * most; pass++) {
@@ -93,11 +96,12 @@ bool transmission_step(size_t axes, const Transmission *p, const double *u, cons
             if (p[i].on) {
                 transmission_settle(&p[i], u[i], du[i], angle, n, by_angle[i * axes + i], by_n[i * axes + i], &start[i],
                                     &end[i], h);
-                change = fmax(change, fabs(end[i].T - T));
+                change = joined > 1 ? fmax(change, fabs(end[i].T - T)) : 0; /* one alone is settled at once */
                 most = fmax(most, fabs(end[i].T));
             }
         }
     }
+    *settled = !(change > TRANSMISSION_UNSETTLED * most);
     for (size_t i = 0; i < axes; i++) {
         probe += end[i].T + end[i].n + end[i].angle - (end[i].T + end[i].n + end[i].angle);
     }

@@ -44,9 +44,9 @@ typedef struct TransmissionState {
 /* Advance over h [s] > 0 from start[axes] to end[axes], whose T are the torques for the structure. u, du [axes]: M_a -
  * M_fr at the start, and its change. angle_free, n_free [axes]: the structure at the end of the step with T = 0;
  * by_angle, by_n [axes][axes]: what a held T of 1 of each axis (column) adds there. False where a torque is no finite
- * number. */
+ * number. *settled: the torques agree with one another, to 1e-6 of the largest at least. */
 bool transmission_step(size_t axes, const Transmission *p, const double *u, const double *du, const double *angle_free,
                        const double *n_free, const double *by_angle, const double *by_n, const TransmissionState *start,
-                       TransmissionState *end, double h);
+                       TransmissionState *end, double h, bool *settled);
 
 #endif

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2Error
+from plant_unit import write_modes
 from scipy.optimize import brentq
 
 from feedsim import cosim, scenario
@@ -14,6 +17,7 @@ from feedsim.errors import InputError
 from feedsim.linear.judgement import judge
 from feedsim.structure import Modes, checked_modes
 from feedsim.structure.modes import joined
+from fmi_helpers import Archive
 
 SCENARIO = Path(__file__).resolve().parents[2] / "scenarios" / "z_positioning.yaml"
 Z = "machine.axes.Z"
@@ -107,6 +111,21 @@ def test_one_unit_gives_the_same_bits(fmus: Path) -> None:
     own, one = run(fmus, *changes), run(fmus, *changes, "coupling.units=one")
     for name in ("Z.x_a", "Z.n_a", "Z.transmission.F", "Z.transmission.way"):
         assert np.array_equal(own.trace[name], one.trace[name]), name
+
+
+def test_a_step_that_does_not_settle_fails(fmus: Path, tmp_path: Path) -> None:
+    """Two motors on one mass, each with 0.6 of its inertia: the rest would be less than none."""
+    shapes = [8.0, 8.0, 0.0], [0.0, 0.0, 8.0]
+    rows = [[i, 0, 0, *n, *(0.003 * each for each in n), *(0.003 * each for each in n)] for i, n in enumerate(shapes)]
+    table = write_modes(tmp_path / "modes.csv", rows)
+    archive = Archive.unpack(fmus / "plant.fmu", tmp_path / "plant")
+    own: dict[str, float | str] = {"modes_file": str(table)}
+    for axis in "XY":
+        own |= {f"{axis}.transmission.stiffness": 2e8, f"{axis}.transmission.inertia": 0.6 / 8**2}
+    with archive.instance(own, inputs={"X.M_a": 3.0}) as plant:
+        with pytest.raises(FMICallException):
+            plant.step(T_C)
+        assert "do not settle over this step of 0.000125 s" in plant.texts(fmi2Error)
 
 
 def test_faults_are_refused(fmus: Path) -> None:

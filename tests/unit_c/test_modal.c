@@ -278,6 +278,48 @@ static void acceleration_is_the_rate_of_speed(void) {
     free(memory);
 }
 
+/* What modal_forecast() says of a step is what the step does, ports in any order. */
+static void forecasts_are_what_steps_do(void) {
+    Modal modal;
+    double *memory = structure(&modal), q[SIZE] = {0}, v[SIZE] = {0}, q_end[SIZE], v_end[SIZE];
+    const double u[] = {3, -200}, du[] = {40, 5}, h = 125e-6;
+    const size_t ports[] = {PORTS - 1, 1};
+    for (size_t k = 0; k < MODES; k++) {
+        q[k] = 1e-3 * pseudo_random();
+        v[k] = pseudo_random();
+    }
+    modal_prepare(&modal, h);
+    const double *const shapes[] = {modal.shape + (PORTS - 1) * SIZE, modal.shape + SIZE};
+    modal_advance_at(&modal, 2, shapes, u, du, q, v, q_end, v_end);
+    double whole[PORTS] = {0}, change[PORTS] = {0}, q_prefix[SIZE], v_prefix[SIZE];
+    whole[PORTS - 1] = u[0];
+    whole[1] = u[1];
+    change[PORTS - 1] = du[0];
+    change[1] = du[1];
+    modal_advance(&modal, PORTS, whole, change, q, v, q_prefix, v_prefix);
+    for (size_t port = 0; port < PORTS; port++) {
+        for (int speed = 0; speed < 2; speed++) {
+            double by_q[SIZE], by_v[SIZE], held[PORTS], ramp[PORTS];
+            Forecast forecast = {by_q, by_v, held, ramp};
+            modal_forecast(&modal, port, speed == 1, &forecast);
+            double y = modal_foretold(&forecast, modal.size, q, v);
+            for (size_t i = 0; i < 2; i++) {
+                y += held[ports[i]] * u[i] + ramp[ports[i]] * du[i];
+            }
+            CHECK_NEAR(y, modal_sum(&modal, port, speed == 1 ? v_end : q_end), speed == 1 ? 1e-13 : 1e-16);
+            CHECK_NEAR(y, modal_sum(&modal, port, speed == 1 ? v_prefix : q_prefix), speed == 1 ? 1e-13 : 1e-16);
+        }
+    }
+    for (size_t first = 0; first < PORTS; first++) { /* sums at once are single ones, to the bit */
+        double sums[PORTS];
+        modal_sums(&modal, first, PORTS - first, q_end, sums);
+        for (size_t port = first; port < PORTS; port++) {
+            CHECK_EQUAL(sums[port - first], modal_sum(&modal, port, q_end));
+        }
+    }
+    free(memory);
+}
+
 int main(void) {
     coefficients();
     rigid_mode_is_a_double_integrator();
@@ -286,5 +328,6 @@ int main(void) {
     coefficients_do_not_depend_on_history();
     step_response();
     acceleration_is_the_rate_of_speed();
+    forecasts_are_what_steps_do();
     return CHECK_RESULT;
 }

@@ -4,13 +4,15 @@
 
 static const double J = 0.006, J_S = 0.02, C_T = 900; /* kg.m2 of motor and mass, N.m/rad */
 
+static bool settled;
+
 /* The motor from n_0, alone at the torque u, for `steps` of h. The structure is a free mass that holds J. */
 static TransmissionState driven(const Transmission *p, TransmissionState state, double u, double h, int steps) {
     const double by_n = h / (J + J_S), by_angle = h * h / (2 * (J + J_S)), none = 0;
     for (int k = 0; k < steps; k++) {
         TransmissionState end;
         const double angle_free = state.angle_s + h * state.n_s, n_free = state.n_s;
-        CHECK(transmission_step(1, p, &u, &none, &angle_free, &n_free, &by_angle, &by_n, &state, &end, h));
+        CHECK(transmission_step(1, p, &u, &none, &angle_free, &n_free, &by_angle, &by_n, &state, &end, h, &settled));
         state = end;
     }
     return state;
@@ -83,7 +85,7 @@ static void period_with_play_is_that_of_its_pieces(void) {
     for (int k = 1; crossings < 10; k++) { /* upwards through the middle */
         TransmissionState end;
         const double angle_free = x.angle_s + h * x.n_s, n_free = x.n_s;
-        transmission_step(1, &p, &none, &none, &angle_free, &n_free, &by_angle, &by_n, &x, &end, h);
+        transmission_step(1, &p, &none, &none, &angle_free, &n_free, &by_angle, &by_n, &x, &end, h, &settled);
         x = end;
         const double delta = x.angle - x.angle_s;
         if (k > 1 && before < 0 && delta >= 0) {
@@ -103,7 +105,8 @@ static void two_axes_move_one_mass(void) {
     for (int k = 0; k < 1000; k++) {
         const double angle_free[2] = {x[0].angle_s + h * x[0].n_s, x[1].angle_s + h * x[1].n_s};
         const double n_free[2] = {x[0].n_s, x[1].n_s};
-        CHECK(transmission_step(2, p, u, none, angle_free, n_free, by_angle, by_n, x, end, h));
+        CHECK(transmission_step(2, p, u, none, angle_free, n_free, by_angle, by_n, x, end, h, &settled));
+        CHECK(settled);
         for (int i = 0; i < 2; i++) { /* the structure's end has the torques of both */
             end[i].n_s = n_free[i] + n * (end[0].T + end[1].T);
             end[i].angle_s = angle_free[i] + a * (end[0].T + end[1].T);
@@ -113,6 +116,16 @@ static void two_axes_move_one_mass(void) {
     CHECK_NEAR(J * (x[0].n + x[1].n) + J_S * x[0].n_s, 2 * 0.1, 1e-10);
 }
 
+/* Two motors that say to be 0.6 each of the one mass they move: there is no such machine. */
+static void what_does_not_settle_is_said(void) {
+    const double h = 1e-4, n = h * 0.6 / J, a = h * h * 0.3 / J;
+    const Transmission p[2] = {{.on = true, .J = J, .c = C_T}, {.on = true, .J = J, .c = C_T}};
+    const double by_n[4] = {n, n, n, n}, by_angle[4] = {a, a, a, a}, u[2] = {1, 1}, none[2] = {0, 0};
+    TransmissionState x[2] = {{.n = 0}, {.n = 0}}, end[2];
+    CHECK(transmission_step(2, p, u, none, none, u, by_angle, by_n, x, end, h, &settled));
+    CHECK(!settled);
+}
+
 int main(void) {
     without_play_two_masses_swing();
     stiff_contact_joins_them();
@@ -120,5 +133,6 @@ int main(void) {
     in_the_play_they_are_apart();
     period_with_play_is_that_of_its_pieces();
     two_axes_move_one_mass();
+    what_does_not_settle_is_said();
     return CHECK_RESULT;
 }

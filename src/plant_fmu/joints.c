@@ -1,0 +1,251 @@
+/* Forces that the structure's own motion makes: friction at the guides, and transmissions between motors and structure.
+ *
+ * They follow from speeds and angles at the end of a step and act within it. The step is a linear map, so that what the
+ * ports show at its end is known ahead, but for these forces (modal_forecast()). They are settled with one another
+ * there, in a few numbers, and then the modes are advanced once, with all forces known. */
+#include <math.h>
+
+#include "numbers.h"
+#include "plant.h"
+
+enum { JOINT_PASSES = 20 };
+
+static Forecast *plant_forecast(const Plant *plant, PortShown shown, size_t axis) {
+    return &plant->forecasts[shown * plant->axes + axis];
+}
+
+/* How what the ports show at the end of a step of h depends on its start and on forces. */
+static void plant_prepare_joints(Plant *plant, const Modal *modal, double h) {
+    if (plant->foretold == modal && plant->foretold_h == h) {
+        return;
+    }
+    const size_t axes = plant->axes, slides = plant_slides(plant);
+    for (size_t i = 0; i < axes; i++) {
+        if (plant->guides[i].on) {
+            modal_forecast(modal, slides + i, true, plant_forecast(plant, SLIDE_SPEED, i));
+        }
+        if (plant->transmissions[i].on) {
+            modal_forecast(modal, i, true, plant_forecast(plant, MOTOR_SPEED, i));
+            modal_forecast(modal, i, false, plant_forecast(plant, MOTOR_ANGLE, i));
+        }
+        for (size_t j = 0; j < axes; j++) {
+            plant->held[i * axes + j] = plant_forecast(plant, SLIDE_SPEED, i)->held[slides + j];
+            plant->ramp[i * axes + j] = plant_forecast(plant, SLIDE_SPEED, i)->ramp[slides + j];
+            plant->by_n[i * axes + j] = plant_forecast(plant, MOTOR_SPEED, i)->held[j];
+            plant->by_angle[i * axes + j] = plant_forecast(plant, MOTOR_ANGLE, i)->held[j];
+        }
+    }
+    plant->foretold = modal;
+    plant->foretold_h = h;
+}
+
+/* What a port shows at the end of the step with the forces from outside alone. */
+static double plant_without_joints(const Plant *plant, const Forecast *forecast, size_t acting, const double *state) {
+    const double *q = state + plant_ports(plant);
+    double sum = modal_foretold(forecast, plant->size, q, q + plant->size);
+    for (size_t i = 0; i < acting; i++) {
+        const size_t port = plant->acting[i];
+        sum += forecast->held[port] * plant->u[port] + forecast->ramp[port] * plant->du[port];
+    }
+    return sum;
+}
+
+/* The torques at motors with a transmission, taken off the structure, which keeps the constant load: a weight hangs
+ * behind the play. */
+static void plant_take_motors(Unit *unit, Plant *plant) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        if (plant->transmissions[i].on) {
+            const double M_0 = unit_axis(unit, i)->M_0;
+            plant->motor_u[i] = plant->u[i] + M_0;
+            plant->motor_du[i] = plant->du[i];
+            plant->u[i] = -M_0;
+            plant->du[i] = 0;
+        }
+    }
+}
+
+/* What friction at the guides adds to what a motor's port shows. */
+static double plant_by_guides(const Plant *plant, const Forecast *forecast, const GuideState *start,
+                              const GuideState *end) {
+    const size_t slides = plant_slides(plant);
+    double sum = 0;
+    for (size_t i = 0; i < plant->axes; i++) {
+        sum -= forecast->held[slides + i] * start[i].F + forecast->ramp[slides + i] * (end[i].F - start[i].F);
+    }
+    return sum;
+}
+
+static bool plant_settle_guides(const Plant *plant, const double *v_free, double *state, double *end, double h,
+                                bool *settled) {
+    return guide_step(plant->axes, plant->guides, v_free, plant->held, plant->ramp, plant_guides(plant, state),
+                      plant_guides(plant, end), h, settled);
+}
+
+/* Transmissions, and guides with them: the torques of the motors change the friction and are changed by it, by turns,
+ * until they have settled. */
+static bool plant_settle_transmissions(Plant *plant, double *state, double *end, double h, bool *settled) {
+    const double enough = 1e-8, unsettled = 1e-6; /* of the largest torque */
+    const size_t axes = plant->axes;
+    const TransmissionState *start = plant_transmissions(plant, state);
+    TransmissionState *motors = plant_transmissions(plant, end);
+    const GuideState *guides_start = plant_guides(plant, state);
+    GuideState *guides = plant_guides(plant, end);
+    double largest = 0, change = INFINITY;
+    bool guides_settled = true;
+    if (!plant->guided) {
+        return transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, plant->angle_free,
+                                 plant->n_free, plant->by_angle, plant->by_n, start, motors, h, settled);
+    }
+    for (size_t i = 0; i < axes; i++) {
+        guides[i].F = guides_start[i].F + guides_start[i].slope * h; /* a first guess */
+    }
+    for (int pass = 0; pass < JOINT_PASSES; pass++) {
+        for (size_t i = 0; i < axes; i++) {
+            const Forecast *angle = plant_forecast(plant, MOTOR_ANGLE, i), *n = plant_forecast(plant, MOTOR_SPEED, i);
+            plant->angle[i] = plant->angle_free[i] + plant_by_guides(plant, angle, guides_start, guides);
+            plant->n[i] = plant->n_free[i] + plant_by_guides(plant, n, guides_start, guides);
+            plant->y[i] = motors[i].T;
+        }
+        if (!transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, plant->angle, plant->n,
+                               plant->by_angle, plant->by_n, start, motors, h, settled)) {
+            return false;
+        }
+        largest = change = 0;
+        for (size_t i = 0; i < axes; i++) {
+            largest = fmax(largest, fabs(motors[i].T));
+            change = fmax(change, fabs(motors[i].T - plant->y[i]));
+        }
+        if (pass > 0 && !(change > enough * largest)) {
+            break;
+        }
+        for (size_t i = 0; i < axes; i++) {
+            plant->v[i] = plant->v_free[i];
+            for (size_t j = 0; j < axes; j++) {
+                plant->v[i] += plant_forecast(plant, SLIDE_SPEED, i)->held[j] * motors[j].T;
+            }
+        }
+        if (!plant_settle_guides(plant, plant->v, state, end, h, &guides_settled)) {
+            return false;
+        }
+    }
+    *settled = *settled && guides_settled && !(change > unsettled * largest);
+    return true;
+}
+
+bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, double *end, double h, size_t *acting) {
+    const size_t axes = plant->axes, slides = plant_slides(plant), ports = plant_ports(plant);
+    const GuideState *start = plant_guides(plant, state);
+    size_t count = 0;
+    bool settled = true;
+    plant_prepare_joints(plant, modal, h);
+    if (plant->driven) {
+        plant_take_motors(unit, plant);
+    }
+    for (size_t port = 0; port < ports; port++) {
+        if (port < axes || plant->u[port] != 0 || plant->du[port] != 0) {
+            plant->acting[count++] = port;
+        }
+    }
+    for (size_t i = 0; i < axes; i++) {
+        if (plant->guides[i].on) {
+            plant->v_free[i] = plant_without_joints(plant, plant_forecast(plant, SLIDE_SPEED, i), count, state);
+        }
+        if (plant->transmissions[i].on) {
+            plant->n_free[i] = plant_without_joints(plant, plant_forecast(plant, MOTOR_SPEED, i), count, state);
+            plant->angle_free[i] = plant_without_joints(plant, plant_forecast(plant, MOTOR_ANGLE, i), count, state);
+        }
+    }
+    if (!(plant->driven ? plant_settle_transmissions(plant, state, end, h, &settled)
+                        : plant_settle_guides(plant, plant->v_free, state, end, h, &settled))) {
+        return unit_fail(unit, plant->driven ? "a force behind a motor would be no finite number at the end of the step"
+                                             : "a friction force at a guide would be no finite number at the end of "
+                                               "the step");
+    }
+    if (!settled) {
+        char text[NUMBER_TEXT_SIZE];
+        return unit_fail(unit,
+                         "the forces of guides and transmissions do not settle over this step of %s s: they differ by "
+                         "more than 1e-4 of F_S, or 1e-6 of the largest torque, after all passes; take a shorter step, "
+                         "and see that motors that move one mass share its inertia",
+                         number_text(text, h));
+    }
+    for (size_t i = 0; i < axes; i++) {
+        const size_t slide = slides + i;
+        if (plant->transmissions[i].on) {
+            plant->u[i] += plant_transmissions(plant, end)[i].T;
+        }
+        if (plant->guides[i].on) {
+            if (!(plant->u[slide] != 0 || plant->du[slide] != 0)) {
+                plant->acting[count++] = slide;
+            }
+            plant->u[slide] -= start[i].F;
+            plant->du[slide] -= plant_guides(plant, end)[i].F - start[i].F;
+        }
+    }
+    for (size_t i = 0; i < count; i++) {
+        const size_t port = plant->acting[i];
+        plant->shapes[i] = modal->shape + port * modal->size;
+        plant->u_acting[i] = plant->u[port];
+        plant->du_acting[i] = plant->du[port];
+    }
+    *acting = count;
+    return true;
+}
+
+void plant_start_joints(Unit *unit, Plant *plant, double *state) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        plant_guides(plant, state)[i].x = unit_axis(unit, i)->x_0;
+        if (plant->transmissions[i].on) {
+            const double M_0 = unit_axis(unit, i)->M_0;
+            plant_transmissions(plant, state)[i].u = state[i] + M_0;
+            state[i] = -M_0;
+        }
+    }
+}
+
+void plant_follow_joints(Unit *unit, const Plant *plant, const Modal *modal, double *end) {
+    const size_t slides = plant_slides(plant);
+    const double *q_end = end + plant_ports(plant), *v_end = q_end + plant->size;
+    for (size_t i = 0; i < plant->axes; i++) {
+        if (plant->guides[i].on) {
+            GuideState *guide = &plant_guides(plant, end)[i];
+            guide->x = unit_axis(unit, i)->x_0 + plant->y[slides + i];
+            if (plant->cells > 1) {
+                guide->v = modal_sum(modal, slides + i, v_end);
+            }
+        }
+        if (plant->cells > 1 && plant->transmissions[i].on) { /* the motor turned along with the structure */
+            TransmissionState *motor = &plant_transmissions(plant, end)[i];
+            const double angle = modal_sum(modal, i, q_end);
+            motor->angle += angle - motor->angle_s;
+            motor->angle_s = angle;
+            motor->n_s = modal_sum(modal, i, v_end);
+        }
+    }
+}
+
+void plant_show_guides(Unit *unit, const Plant *plant, double *state) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        if (plant->guides[i].on) {
+            const GuideState *guide = &plant_guides(plant, state)[i];
+            AxisBlock *axis = unit_axis(unit, i);
+            axis->guide_F_fr = guide->F;
+            axis->guide_z = guide->contact.z;
+            axis->guide_E_fr = guide->work;
+            axis->guide_warmth = guide->warmth;
+        }
+    }
+}
+
+void plant_show_transmissions(Unit *unit, const Plant *plant, double *state) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        if (plant->transmissions[i].on) {
+            const TransmissionState *motor = &plant_transmissions(plant, state)[i];
+            AxisBlock *axis = unit_axis(unit, i);
+            axis->n_a = axis->n_fr = motor->n;
+            axis->transmission_F = motor->C / plant->transmissions[i].lead;
+            axis->transmission_way = (motor->angle - motor->angle_s) * plant->transmissions[i].lead;
+            axis->transmission_heat = motor->heat;
+        }
+    }
+}

@@ -26,9 +26,9 @@ __all__ = sorted(_HOMES)
 
 def __getattr__(public: str) -> _Any:
     if public == "__version__":
-        from importlib.metadata import version
+        from feedsim.installation import version
 
-        return version("feedsim")
+        return version("feedsim") or "unknown"
     if public not in _HOMES:
         raise AttributeError(f"module 'feedsim' has no attribute '{public}'")
     room, name = _HOMES[public]

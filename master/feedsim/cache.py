@@ -2,7 +2,7 @@
 
 An answer belongs to all that it follows from: the bytes of the user's files, the arguments, and the code that finds it.
 Where one of these changes it is found anew, so that a kept answer is the very one that would be found. What cannot be
-read or written is found as if nothing had been kept. May use: nothing. Start reading at cached().
+read or written is found as if nothing had been kept. May use: installation. Start reading at cached().
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from feedsim.installation import version
 
 FOLDER = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
 MAX_ANSWERS = 256  # answers of one kind; the oldest go first
@@ -101,10 +102,7 @@ def _versions(code: tuple[Path, ...]) -> list[str]:
     for each in code:
         for file in sorted(each.rglob("*.py")) if each.is_dir() else [each]:
             sources.update(file.read_bytes())
-    libraries = []
-    for name in LIBRARIES:
-        with suppress(PackageNotFoundError):
-            libraries.append(f"{name} {version(name)}")
+    libraries = [f"{name} {found}" for name in LIBRARIES if (found := version(name))]
     return [sources.hexdigest(), *libraries, platform.machine(), sys.byteorder]
 
 

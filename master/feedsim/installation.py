@@ -6,6 +6,8 @@ May use: nothing. Start reading at shipped().
 from __future__ import annotations
 
 from functools import cache
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as version_of
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
@@ -17,6 +19,15 @@ def checkout() -> Path | None:
     """The checkout that this package runs from; None where it is installed."""
     root = PACKAGE.parents[1]
     return root if (root / "src" / "fmi2").is_dir() and (root / "Makefile").is_file() else None
+
+
+@cache
+def version(package: str) -> str | None:
+    """Version of an installed package; None where it is not installed as one. Kept, as finding it reads a file."""
+    try:
+        return version_of(package)
+    except PackageNotFoundError:
+        return None
 
 
 def shipped(name: str) -> Path:

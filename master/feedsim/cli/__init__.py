@@ -108,17 +108,10 @@ class _Version(argparse.Action):
         super().__init__(nargs=0, **words)
 
     def __call__(self, parser: argparse.ArgumentParser, *given: object) -> None:
-        print(f"feedsim {_version()}")
+        from feedsim.installation import version
+
+        print(f"feedsim {version('feedsim') or '(run from its sources, not installed)'}")
         parser.exit()
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("feedsim")
-    except PackageNotFoundError:
-        return "(run from its sources, not installed)"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -129,6 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     # Small matrices by the thousand: threads for linear algebra only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # To look for plugins of pydantic, it reads what all installed packages say of themselves; none is used here.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
     from feedsim.arguments import as_options
     from feedsim.errors import FeedsimError

@@ -28,7 +28,7 @@ def loops_of(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     state = hashlib.sha256(repr((list(modes.ports), modes.frequency.shape)).encode())
     for column in (modes.frequency, modes.damping, *modes.ports.values()):
         state.update(column.tobytes())
-    described = repr(machine.model_dump(include={"axes", "cycles"}))
+    described = repr((machine.axes, machine.cycles))
 
     def find() -> list[dict[str, Any]]:
         return [asdict(loop) | {"growing": int(loop.growing)} for loop in judge(machine, modes)]

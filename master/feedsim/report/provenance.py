@@ -10,13 +10,13 @@ import math
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from feedsim.errors import InputError
 from feedsim.fields import Quantity
 from feedsim.files.regular import digest
+from feedsim.installation import version
 from feedsim.scenario import Axis, Drive, ForeignUnit, Friction, Machine, Scenario
 
 if TYPE_CHECKING:
@@ -78,12 +78,7 @@ def software() -> dict[str, str]:
     """Versions of the package, of what it calculates with, and the platform."""
     names = ("feedsim", "numpy", "scipy", "ruckig", "fmpy")
     found = {"python": platform.python_version(), "platform": platform.platform()}
-    for name in names:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed as a package"
-    return found
+    return found | {name: version(name) or "not installed as a package" for name in names}
 
 
 def archives(units: Mapping[str, Mapping[str, str]]) -> list[ArchiveUse]:

@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError, few, no_such_file
+from feedsim.installation import version
 from feedsim.scenario import Base
 from feedsim.scenario.study import Parameter, Study
 from feedsim.sweep.design import Design
@@ -190,10 +190,7 @@ def read(file: Path) -> bytes:
 
 
 def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown" if name in sys.modules else "not installed"
+    return version(name) or ("unknown" if name in sys.modules else "not installed")
 
 
 def _sources() -> str:

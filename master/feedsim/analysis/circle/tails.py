@@ -119,11 +119,10 @@ def known_tails(
         k = 2 * np.arange(len(circle.drag[axis])) + 1
         waves = circle.drag[axis] / k
         theta = np.linspace(0, 2 * math.pi, PERIOD, endpoint=False)
-        turned = np.exp(1j * np.outer(theta, k))
-        largest = float(np.abs((turned @ waves).imag).max())
+        largest = float(np.abs(_of_harmonics(k, waves)).max())
         within = math.radians(TURNS)
         for order, size in enumerate((TAIL, within, within**2)):
-            own = (turned @ ((1j * k) ** order * waves)).imag / largest
+            own = _of_harmonics(k, (1j * k) ** order * waves) / largest
             parts = []
             for each, path in zip(undone, paths, strict=True):
                 passed = path.sense * (each.angle - each.turned[i]) % (2 * math.pi)
@@ -132,3 +131,10 @@ def known_tails(
             columns.append(np.concatenate(parts))
             spread.append(size * peak)
     return Tails(np.column_stack(columns) if columns else np.empty((len(residual), 0)), np.array(spread))
+
+
+def _of_harmonics(k: NDArray[np.int64], waves: NDArray[np.complex128]) -> Array:
+    """Im sum of waves exp(i k theta) at PERIOD angles theta of a turn, k (K,) below PERIOD / 2."""
+    spectrum = np.zeros(PERIOD // 2 + 1, complex)
+    spectrum[k] = -0.5j * PERIOD * waves
+    return np.asarray(np.fft.irfft(spectrum, PERIOD))

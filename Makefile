@@ -159,7 +159,10 @@ check: fmus $(VENV)/.dev ## the quick set, below two minutes: layers, units of C
 	$(VENV)/bin/feedsim run scenarios/z_positioning.yaml --out $(BUILD)/check --quiet
 	@test -s $(BUILD)/check/report.html && echo "$(BUILD)/check/report.html is there"
 
-test: test-c test-sanitize test-sanitize-scenario test-valgrind test-python test-processors ## everything: C tests, sanitisers, leak check, Python tests, other processors' arithmetic
+test: fmus $(VENV)/.importers ## everything: C tests, sanitisers, leak check, Python tests, other processors' arithmetic
+	@$(MAKE) -s -j2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-c test-sanitize test-sanitize-scenario test-valgrind
+	@$(MAKE) -s test-python
+	@$(MAKE) -s test-processors
 
 # One scenario on units built with AddressSanitizer and UndefinedBehaviorSanitizer. Python itself is not built with them, so their
 # runtime is loaded ahead of it, and leaks (Python's own included) are left to test-valgrind.

@@ -13,7 +13,7 @@ from hypothesis import settings
 # numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import page_browsers
+import rotation
 
 if TYPE_CHECKING:
     from pint_registry import Registry
@@ -31,6 +31,21 @@ settings.load_profile("feedsim")
 # A shell's job in the background ignores Ctrl-C, and so would all that is started here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+LEFT_OUT = {ROOT / "tests" / file for file in rotation.left_out(rotation.turn())}
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Files whose turn it is not."""
+    return True if collection_path in LEFT_OUT else None
+
+
+def pytest_report_header() -> str | None:
+    """How much is left out, and how all of it runs."""
+    if not LEFT_OUT:
+        return None
+    return f"{len(LEFT_OUT)} slow files wait for their turn (tests/rotation.py); without FEEDSIM_TURN all run"
 
 
 def _inputs() -> list[Path]:
@@ -58,6 +73,8 @@ def _up_to_date(archives: list[Path]) -> bool:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """Chromium, which the tests of a file share."""
+    import page_browsers
+
     with page_browsers.chromium() as started:
         yield started
 

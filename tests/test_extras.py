@@ -179,9 +179,9 @@ def test_a_difference_is_explained_without_any(folder: Path) -> None:
 
 
 def test_what_is_drawn_is_asked_for_ahead_of_a_run(folder: Path) -> None:
-    done = without(["matplotlib"], *example("run"), "--figures", "png", cwd=folder)
+    done = without(["resvg_py"], *example("run"), "--figures", "png", cwd=folder)
     assert done.returncode == 2
-    line = "feedsim run needs feedsim[run,figures], of which matplotlib is not installed: pip install"
+    line = "feedsim run needs feedsim[run,figures], of which resvg_py is not installed: pip install"
     assert done.stderr == f'feedsim: {line} "feedsim[run,figures]"\n'
     assert not (folder / "results").exists()
 

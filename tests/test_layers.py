@@ -56,6 +56,7 @@ SOLE_USERS = {
     "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
     "yaml": {"files", "identify/friction_file.py"},
     "matplotlib": {"report"},
+    "resvg_py": {"report/chart/file.py"},
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},
     "tqdm": {"cli"},

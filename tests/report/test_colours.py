@@ -38,7 +38,7 @@ WORDS = {
 LISTS = {
     "sweep/figure_plots.py", "sweep/plots.py", "machine/model.py", "machine/pictures.py", "run/axis_plots.py",
     "identify/plots.py", "identify/stribeck_plots.py", "show/pictures.py", "frf/bode.py", "frf/truncation_plots.py",
-    "chart/model.py", "chart/printed.py",
+    "chart/model.py", "chart/grid.py",
 }  # fmt: skip
 RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY"}
 

@@ -15,6 +15,7 @@ from scipy import stats
 
 from feedsim.findings import WRONG, Wrong
 from feedsim.report import sweep as report
+from feedsim.report.chart.file import EDGE
 from feedsim.report.formatting import scale
 from feedsim.report.page import html
 from feedsim.report.sweep.account import Account, quantile_interval
@@ -206,7 +207,7 @@ def test_grids_are_drawn_as_such(tmp_path: Path, parameters: str, compared: int)
 
 
 def test_names_with_signs_of_other_languages(tmp_path: Path) -> None:
-    """What is markup to HTML, XML or matplotlib is a letter here."""
+    """What is markup to HTML or XML is a letter here."""
     parameters = SAMPLED.replace("F_C:", "a$b^<i>&:")
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 30}", parameters, name="<b>A</b> & $x$")
     table = table_of(study, plan, {"XZ.glitch_X+": ("m", glitch(plan)), "XZ.glitch_X-": ("m", glitch(plan))})
@@ -297,7 +298,7 @@ def test_a_study_for_indices_shows_the_cheap_measures_too(tmp_path: Path) -> Non
 
 
 def test_a_picture_says_by_itself_what_it_shows(tmp_path: Path) -> None:
-    """Title and caption stand above the PNG, and the drawing in the page is without them."""
+    """Title and caption stand above the chart in a file, and the drawing in the page is without them."""
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 30}", SAMPLED)
     account = Account(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan)
     whole, single = pictures_of(account)
@@ -305,6 +306,8 @@ def test_a_picture_says_by_itself_what_it_shows(tmp_path: Path) -> None:
         width, height = (int.from_bytes(picture.png[at : at + 4], "big") for at in (16, 20))
         box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', picture.svg)
         assert box
-        inches = float(box[1]) / 72, float(box[2]) / 72
-        assert width == pytest.approx(160 * inches[0], abs=2)
-        assert height >= 160 * (inches[1] + 0.4)  # a line of title and one of caption
+        per = width / (float(box[1]) + 2 * EDGE)
+        assert height >= per * (float(box[2]) + 2 * EDGE + 30)  # a line of title and one of caption
+        text = picture.content("svg").decode()
+        assert picture.title in text
+        assert picture.title not in picture.svg.partition(">")[2]

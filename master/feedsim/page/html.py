@@ -22,7 +22,6 @@ from feedsim.errors import InputError
 from feedsim.judge import JudgedRun
 from feedsim.page.content import Content, content, packed
 from feedsim.page.scripts import showing, styles, text, worker
-from feedsim.report.chart.still import still
 from feedsim.report.content import Table
 from feedsim.report.formatting import display_unit, duration, shown, typeset
 from feedsim.report.picture import Picture
@@ -184,7 +183,7 @@ def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
 
 def _figure(picture: Picture, *, bare: bool = False) -> str:
     """bare: without a still picture, which would make the page half as large again."""
-    kept = "" if bare or picture.chart is None else still(picture.chart, picture.stem, picture.title)
+    kept = "" if bare or picture.chart is None else picture.svg
     title = escape(picture.title)
     return (
         f'<figure id="{picture.stem}"{" class=needs" * bare} data-title="{title}"><h2>{title}</h2>'

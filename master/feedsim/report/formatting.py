@@ -141,8 +141,3 @@ def three(value: float) -> str:
         return "–"
     whole = abs(value) >= 100 or 0 < abs(value) < EXPONENT_BELOW
     return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
-
-
-def plain(text: str) -> str:
-    """A name of the user's as text of a picture, in which a $ would begin a formula."""
-    return text.replace("$", r"\$")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from collections.abc import Sequence
 from contextlib import suppress
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from feedsim.cache import own_folder
 from feedsim.report.chart.embedded import embedded
-from feedsim.report.chart.still import still
+from feedsim.report.chart.layout import LAYOUT
 from feedsim.report.content import TILES, Report, parted
 from feedsim.report.formatting import typeset
 from feedsim.report.style import PALETTE
@@ -36,7 +37,6 @@ def html(report: Report, kind: str = "") -> str:
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
     environment.filters["typeset"] = typeset
     environment.filters["kind"] = lambda part: type(part).__name__
-    environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
     environment.filters["parted"] = parted
     environment.filters["named"] = lambda text: PATH.sub("", text)
     charts = report.charts
@@ -50,7 +50,6 @@ def sheet_html(title: str, sheets: Sequence[Filled], rule: str) -> str:
     """HTML text of acceptance sheets, for print; all text is escaped. rule: how is decided."""
     environment = _environment()
     environment.filters["typeset"] = typeset
-    environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
     return environment.get_template("sheet.html.j2").render(
         title=title, sheets=sheets, rule=rule, palette=PALETTE, policy=policy("")
     )
@@ -90,9 +89,10 @@ def _compiled() -> BytecodeCache | None:
 
 
 def drawing() -> str:
-    """What draws the charts of a page and what a reader does with them."""
+    """What draws the charts of a page and what a reader does with them; it is handed the sizes of layout.py."""
     folder = resources.files("feedsim.report") / "template"
-    return "".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    sizes = json.dumps(LAYOUT, ensure_ascii=False, separators=(",", ":"))
+    return "".join([f"const LAYOUT = {sizes};\n", *((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)])
 
 
 @cache

@@ -1,8 +1,7 @@
-"""A figure of a report, for its page and for print."""
+"""A figure of a report, for its page and as a file of its own."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,8 +9,9 @@ from pathlib import Path
 
 from feedsim.errors import InputError, OutputError
 from feedsim.report.chart import Chart
-from feedsim.report.chart.printed import printed
-from feedsim.report.style import PALETTE, PAPER, REMARK, Drawn, said
+from feedsim.report.chart.file import png, standalone
+from feedsim.report.chart.svg import svg
+from feedsim.report.style import REMARK, Drawn, standalone_drawing
 
 # Files that a drawing is written as.
 PICTURE_FORMATS = ("png", "svg")
@@ -21,8 +21,8 @@ PICTURE_FORMATS = ("png", "svg")
 class Picture:
     """A figure: file stem, title, caption (plain text), and what it shows: a chart, or what draws it.
 
-    A chart is drawn by the page, and by matplotlib once a drawing is asked for; of what is no chart the page holds the
-    drawing. worded: title and caption stand within the drawing of a chart.
+    A chart is drawn by the page, and once as SVG; of what is no chart the page holds the drawing. worded: title and
+    caption stand above a chart in a file of its own.
     """
 
     stem: str
@@ -39,21 +39,26 @@ class Picture:
 
     @cached_property
     def drawn(self) -> Drawn:
-        """The figure as matplotlib draws it."""
-        with said(self.remark):
-            if isinstance(self.shows, Chart):
-                return printed(self.shows, self.stem, self.title, self.caption, worded=self.worded)
-            return self.shows()
+        """The drawing of what is no chart."""
+        assert not isinstance(self.shows, Chart)
+        return self.shows()
+
+    @cached_property
+    def svg(self) -> str:
+        """The drawing as text of an SVG within a page."""
+        return self.drawn.svg if self.chart is None else svg(self.chart, self.stem, self.title)
 
     @property
     def png(self) -> bytes:
         """The drawing as PNG."""
-        return self.drawn.png
+        return self.drawn.png if self.chart is None else png(self._file)
 
     @property
-    def svg(self) -> str:
-        """The drawing as text of an SVG."""
-        return self.drawn.svg
+    def _file(self) -> str:
+        """The drawing as text of an SVG that is a file of its own."""
+        if self.chart is None:
+            return standalone_drawing(self.svg)
+        return standalone(self.chart, self.stem, self.title, self.caption if self.worded else "", self.remark)
 
     def first_rows(self, most: int) -> Picture:
         """The picture itself, or one of its first rows of panels where it has more than `most`."""
@@ -76,21 +81,10 @@ class Picture:
 
     def content(self, kind: str) -> bytes:
         """What a file of one of PICTURE_FORMATS holds."""
-        return self.png if kind == "png" else _standalone(self.svg).encode()
+        return self.png if kind == "png" else self._file.encode()
 
     def __repr__(self) -> str:
         return f"Picture {self.stem!r}: {self.title}"
 
     def _repr_png_(self) -> bytes:
         return self.png
-
-
-def _standalone(svg: str) -> str:
-    """An SVG as a file of its own: colours as numbers, a size, a light ground."""
-    for name, colour, _ in PALETTE:
-        svg = svg.replace(f"var(--{name})", colour)
-    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
-        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
-    end = svg.index(">") + 1
-    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'

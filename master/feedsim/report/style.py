@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -25,7 +25,6 @@ from feedsim.extras import ask
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
-    from matplotlib.text import Text
 
 Array = NDArray[np.float64]
 
@@ -62,6 +61,8 @@ def named(colour: str) -> str:
 
 
 _NAMES = {on_light: name for name, on_light, _ in PALETTE}
+# Colours by their variables, as on white paper.
+PAGE_COLOURS = {name: colour for name, colour, _ in PALETTE} | {"ground": "#ffffff"}
 
 PNG_DPI = 160
 # The best compression of a PNG takes half as long again, for a file that is a ninth smaller.
@@ -69,7 +70,7 @@ PNG_EFFORT = {"compress_level": 3}
 # An inline SVG above this size [bytes] is put into the page as PNG instead.
 LARGEST_SVG = 400_000
 
-# What stands in small print in every figure that is finished inside remarked().
+# What stands in small print in every picture that is made inside remarked().
 REMARK: ContextVar[str] = ContextVar("remark", default="")
 
 
@@ -139,93 +140,38 @@ def drawing(width: float, height: float) -> Iterator[Drawing]:
 
 @contextmanager
 def remarked(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
-    """Figures made inside say `text` in their upper right corner: a picture travels without its page.
+    """Charts made inside have `text` in their upper right corner as files: a picture travels without its page.
 
     width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
     """
-    with said("\n".join(textwrap.wrap(text, width)[:lines])):
-        yield
-
-
-@contextmanager
-def said(remark: str) -> Iterator[None]:
-    """Figures finished inside have this in small print."""
-    token = REMARK.set(remark)
+    token = REMARK.set("\n".join(textwrap.wrap(text, width)[:lines]))
     try:
         yield
     finally:
         REMARK.reset(token)
 
 
-def finish(
-    figure: Drawing, stem: str, title: str, caption: str = "", *, worded: bool = False,
-    then: Callable[[], object] = lambda: None,
-) -> Drawn:  # fmt: skip
-    """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn.
-
-    worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG. then: called
-    when the layout is known. Legends of the figure that the layout leaves out stand above everything but
-    these words.
-    """
-    head, words_above = _head(figure, title, caption) if worded else (0.0, [])
-    if remark := REMARK.get():
-        words = figure.text(0.995, 0.995, remark, fontsize=6.5, color=MUTED, ha="right", va="top")
-        words.set_in_layout(False)
-        words.set_y(0.995 - head / figure.get_figheight())
-    room = head + (0.13 * (1 + remark.count("\n")) if remark else 0.0)
-    for legend in [each for each in figure.legends if not each.get_in_layout()]:
-        tall = legend.get_window_extent().height / figure.dpi
-        figure.set_figheight(figure.get_figheight() + tall)
-        legend.set_bbox_to_anchor((0.06 / figure.get_figwidth(), 1 - (room + 0.04) / figure.get_figheight()))
-        room += tall
-    if room:
-        layout: Any = figure.get_layout_engine()
-        layout.set(rect=(0, 0, 1, 1 - room / figure.get_figheight()))  # inches to a share of the height
-    from matplotlib.transforms import Bbox
-
+def finish(figure: Drawing, stem: str, title: str) -> Drawn:
+    """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn."""
     png, svg = io.BytesIO(), io.StringIO()
     with catch_warnings():
         # Names in scripts that the font lacks; the page around the picture has them.
         filterwarnings("ignore", message=r"Glyph \d+ .*missing from")
-        _lay_out(figure, then)
+        _lay_out(figure)
         figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None}, pil_kwargs=PNG_EFFORT)
         figure.patch.set_visible(False)
-        for text in words_above:
-            text.set_visible(False)
-        below = Bbox.from_extents(0, 0, figure.get_figwidth(), figure.get_figheight() - head) if head else None
         nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-        figure.savefig(svg, format="svg", metadata=nothing, bbox_inches=below)
+        figure.savefig(svg, format="svg", metadata=nothing)
     return Drawn(png.getvalue(), _inline(svg.getvalue(), stem, title))
 
 
-def _head(figure: Drawing, title: str, caption: str) -> tuple[float, list[Text]]:
-    """Make room for title and caption above a figure and write them there: room [inches], and texts."""
-    texts: list[Text] = []
-    lines = textwrap.wrap(caption, int(15.5 * figure.get_figwidth()))
-    head = 0.3 + 0.135 * len(lines)
-    figure.set_figheight(figure.get_figheight() + head)
-    height = figure.get_figheight()
-    for text, top, size, weight, colour in (
-        (title, 0.07, 11.0, "bold", INK),
-        ("\n".join(lines), 0.28, 7.5, "normal", MUTED),
-    ):
-        written = figure.text(
-            0.1 / figure.get_figwidth(), 1 - top / height, text.replace("$", r"\$"),
-            fontsize=size, fontweight=weight, color=colour, va="top", linespacing=1.2,
-        )  # fmt: skip
-        written.set_in_layout(False)
-        texts.append(written)
-    return head, texts
-
-
-def _lay_out(figure: Drawing, then: Callable[[], object]) -> None:
+def _lay_out(figure: Drawing) -> None:
     """Give the rooms their places once: saving would for each format, and draw everything once more to do it."""
     engine = figure.get_layout_engine()
     if engine is not None:
         dpi, figure.dpi = figure.dpi, PNG_DPI
         engine.execute(figure)
         figure.set_layout_engine(None)  # "none" would leave one that does nothing, but costs as much
-        then()
         figure.dpi = dpi
 
 
@@ -243,3 +189,13 @@ def _inline(svg: str, stem: str, title: str) -> str:
     for name, on_light, _ in PALETTE:
         svg = re.sub(re.escape(on_light), f"var(--{name})", svg, flags=re.IGNORECASE)
     return svg.replace("<svg", f'<svg role="img" aria-label="{escape(title)}" class="plot"', 1)
+
+
+def standalone_drawing(svg: str) -> str:
+    """An SVG as a file of its own: colours as numbers, a size, a light ground."""
+    svg = re.sub(r"var\(--(\w+)\)", lambda found: PAGE_COLOURS[found[1]], svg)
+    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
+        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
+    end = svg.index(">") + 1
+    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'

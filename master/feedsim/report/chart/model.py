@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.report.chart.layout import RING_GAPS
 from feedsim.report.style import BLUE, MUTED, Array
 
 Dash = Literal["", "dashed", "dotted"]
@@ -158,7 +159,7 @@ class Polar:
     @property
     def gap(self) -> float:
         """Distance of the rings as drawn, where the programmed circle's radius is 1."""
-        return {1: 0.36, 2: 0.24}[self.rings]
+        return RING_GAPS[self.rings]
 
     @property
     def magnification(self) -> float:

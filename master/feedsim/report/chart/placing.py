@@ -1,172 +1,87 @@
-"""Words within the panels of a drawing, each where no curve is; nothing is left to the data's mercy."""
+"""Words within a panel, where no curve is: what curves and words cover, in small squares, and the place of each word.
+
+Sizes are pixels. The page's script places words by the same rules.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.report.style import MUTED, PAPER, Array
+from feedsim.report.chart.layout import BLOCK, LETTER
+from feedsim.report.style import Array
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.text import Text
-
-CELL = 2.0  # points: how finely a panel is looked at
-LABEL_DISTANCE, LED_DISTANCE = 3.5, 9.0  # points between a point and its label; from which on a line leads to it
-MAX_LABEL_DISTANCE = 12.0  # points, of a label from its line
-WORD_GAP = 2  # cells between words
-COVERED = 1e4  # what it costs to stand on a curve, against points of distance
-# points: of words, of those that need to be smaller, about a note
-LABEL_POINTS, MIN_LABEL_POINTS, NOTE_POINTS = 8.5, 6.5, 5.0
+Box = tuple[float, float, float, float]  # left, top, width, height
+Place = tuple[float, float, float]  # left, foot of the first line, how far it is from what it belongs to
+ASCENT, LINE = 10.0, 15.0  # of words; from line to line
+OUTSIDE, COVERING, COVERED = (
+    1e6,
+    120.0,
+    10.0,
+)  # what it costs: to leave the panel, to cover curves, and a square of them
 
 
-def fit(axes: Axes, title: Text) -> None:
-    """Make title and names of axes as small as their panel needs them."""
-    room = axes.get_window_extent()
-    across, up = axes.xaxis.label, axes.yaxis.label
-    for text, most in ((title, room.width + 30), (across, room.width + 20), (up, room.height + 16)):
-        extent = text.get_window_extent()
-        size = extent.height if text is up else extent.width
-        if size > most:
-            text.set_fontsize(max(MIN_LABEL_POINTS, float(text.get_fontsize()) * most / size))
+def width_of(text: str) -> float:
+    """About the width of words over curves."""
+    return LETTER * max(map(len, text.split("\n"))) + 2
 
 
-class Ground:
-    """A panel in small squares: which of them are taken by curves and words."""
+class Covered:
+    """A panel in small squares: which of them curves and words cover."""
 
-    def __init__(self, axes: Axes) -> None:
-        self.axes = axes
-        self.per = axes.figure.dpi / 72  # pixels of a point
-        self.room = axes.get_window_extent()
-        self.cell = CELL * self.per
-        shape = (int(self.room.width / self.cell) + 1, int(self.room.height / self.cell) + 1)
-        self.taken: NDArray[np.bool_] = np.zeros(shape, dtype=bool)
-        for line in axes.lines:
-            if line.get_transform().contains_branch_seperately(axes.transData) == (True, True):
-                self.take(np.asarray(line.get_xydata(), dtype=float), lines=line.get_linestyle() != "None")
-        for segments in axes.collections:
-            for each in getattr(segments, "get_segments", list)():
-                self.take(np.asarray(each, dtype=float))
-
-    def take(self, points: Array, *, lines: bool = True, about: int = 0) -> None:
-        """Squares of points (N, 2) in the panel's coordinates, of the lines between them, and so many about them."""
-        if not len(points):
-            return
-        with np.errstate(all="ignore"):
-            at = (self.axes.transData.transform(points) - (self.room.x0, self.room.y0)) / self.cell
-        at = at[np.isfinite(at).all(axis=1)] if not lines else at
-        if lines and len(at) > 1:
-            at = np.clip(at, -2.0 * max(self.taken.shape), 3.0 * max(self.taken.shape))
-            steps = np.abs(np.diff(at, axis=0)).max(axis=1)
-            count = np.where(np.isfinite(steps), np.ceil(steps), 0).astype(int) + 1
-            first = np.repeat(np.arange(len(count)), count)
-            share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / np.repeat(count, count)
-            at = at[first] + share[:, None] * (at[first + 1] - at[first])
-            at = at[np.isfinite(at).all(axis=1)]
-        beside = np.arange(-about, about + 1)
-        offsets = np.stack(np.meshgrid(beside, beside), axis=-1).reshape(-1, 2)
-        cells = (np.floor(at).astype(int)[:, None] + offsets).reshape(-1, 2)
-        inside = ((cells >= 0) & (cells < self.taken.shape)).all(axis=1)
-        self.taken[tuple(cells[inside].T)] = True
-
-    def beside(self, x: float, y: float, text: str, colour: str) -> None:
-        """A label close to a point."""
-        a, b = self._pixels(x, y)
-        label = self._label(text, colour)
-
-        def far(left: Array, low: Array, wide: float, tall: float) -> Array:
-            gap = np.hypot(np.maximum(0, np.maximum(left - a, a - left - wide)),
-                           np.maximum(0, np.maximum(low - b, b - low - tall)))  # fmt: skip
-            middle = np.hypot(left + wide / 2 - a, low + tall / 2 - b)
-            near = LABEL_DISTANCE * self.per
-            return np.where(gap < near, COVERED, gap - near) + 0.05 * middle - 0.1 * np.clip(low - b, 0, near)
-
-        left, low, wide, tall = self._put(label, far)
-        to = (np.clip(a, left, left + wide), np.clip(b, low, low + tall))
-        if np.hypot(to[0] - a, to[1] - b) > LED_DISTANCE * self.per:
-            ends = self.axes.transData.inverted().transform([(a, b), to])
-            self.axes.plot(*ends.T, color=MUTED, linewidth=0.7, zorder=5)
-
-    def along(self, y: float, text: str, colour: str, ends: tuple[float, float] | None) -> None:
-        """A label of a level line: above or below it, as far right as may be."""
-        _, b = self._pixels(self.axes.get_xlim()[0], y)
-        right = self.room.x1 if ends is None else self._pixels(ends[1], y)[0]
-        begin = self.room.x0 if ends is None else self._pixels(ends[0], y)[0]
-
-        def far(left: Array, low: Array, wide: float, tall: float) -> Array:
-            gap = np.maximum(low - b, b - low - tall)
-            aside = np.abs(right - left - wide) if ends is None else 0.3 * np.abs((begin + right) / 2 - left - wide / 2)
-            cost = np.where(gap < self.per, COVERED, 2 * gap) + 0.1 * aside - 0.5 * np.clip(low - b, 0, self.per)
-            return np.asarray(cost)
-
-        self._put(self._label(text, colour), far)
-
-    def upright(self, x: float, text: str, colour: str) -> None:
-        """A label of an upright line: beside it, as high as may be."""
-        a, _ = self._pixels(x, self.axes.get_ylim()[0])
-
-        def far(left: Array, low: Array, wide: float, tall: float) -> Array:
-            gap = np.maximum(left - a, a - left - wide)
-            off = np.where(
-                (gap < 2 * self.per) | (gap > MAX_LABEL_DISTANCE * self.per), 3 * COVERED, 4 * gap
-            )  # else it is another's
-            return np.asarray(off + 0.1 * (self.room.y1 - low - tall) + (left < a))
-
-        self._put(self._label(text, colour), far)
-
-    def corner(self, text: str, colour: str) -> None:
-        """A note, in the lower left where that is free, else near another corner."""
-
-        def far(left: Array, low: Array, wide: float, tall: float) -> Array:
-            aside = np.minimum(left - self.room.x0, 40 + self.room.x1 - left - wide)
-            return np.asarray(aside + np.minimum(low - self.room.y0, 20 + self.room.y1 - low - tall))
-
-        self._put(self._label(text, colour), far, NOTE_POINTS * self.per)
-
-    def _pixels(self, x: float, y: float) -> tuple[float, float]:
-        a, b = self.axes.transData.transform((x, y))
-        return float(a), float(b)
-
-    def _label(self, text: str, colour: str) -> Text:
-        ground = {"facecolor": PAPER, "edgecolor": "none", "pad": 1.0, "alpha": 0.7}
-        look: dict[str, Any] = {
-            "fontsize": LABEL_POINTS,
-            "color": colour,
-            "linespacing": 1.3,
-            "zorder": 8,
-            "bbox": ground,
-        }
-        label = self.axes.text(0, 0, text, ha="left", va="bottom", transform=None, **look)
-        label.set_in_layout(False)
-        return label
-
-    def _put(self, label: Text, far: Any, edge: float = 1.0) -> tuple[float, float, float, float]:
-        """Put a label where it covers least and is least far, `edge` pixels inside the panel; its place in pixels."""
-        extent = label.get_window_extent()
-        wide, tall = extent.width, extent.height
-        across, up = (int(np.ceil(size / self.cell)) + 1 for size in (wide, tall))
-        sums = np.zeros(tuple(n + 1 for n in self.taken.shape))
-        sums[1:, 1:] = np.cumsum(np.cumsum(self.taken, axis=0), axis=1)
-        n, m = (max(1, size - taken) for size, taken in zip(self.taken.shape, (across, up), strict=True))
-        i, j = np.arange(n)[:, None], np.arange(m)[None, :]
-        i1, j1 = (np.minimum(at + more, size) for at, more, size in
-                  zip((i, j), (across, up), self.taken.shape, strict=True))  # fmt: skip
-        covered = sums[i1, j1] - sums[i, j1] - sums[i1, j] + sums[i, j]
-        left, low = self.room.x0 + i * self.cell, self.room.y0 + j * self.cell
-        inside = (left >= self.room.x0 + edge) & (left + wide <= self.room.x1 - edge)
-        inside = inside & (low >= self.room.y0 + edge) & (low + tall <= self.room.y1 - edge)
-        cost = (
-            np.where(inside, 0.0, 100 * COVERED)
-            + far(left, low, wide, tall)
-            + np.where(covered > 0, COVERED, 0.0)
-            + 50 * covered
+    def __init__(self, inner: Box) -> None:
+        self.inner = inner
+        self.squares: NDArray[np.bool_] = np.zeros(
+            (math.ceil(inner[3] / BLOCK) + 1, math.ceil(inner[2] / BLOCK) + 1), dtype=bool
         )
-        a, b = np.unravel_index(int(np.argmin(cost)), cost.shape)
-        self.taken[max(0, a - WORD_GAP) : a + across + WORD_GAP, b : b + up] = True
-        x, y = float(left[a, 0]), float(low[0, b])
-        label.set_transform(self.axes.transAxes)
-        at = self.axes.transAxes.inverted().transform((x, y))
-        label.set_position((float(at[0]), float(at[1])))
-        return x, y, wide, tall
+
+    def box(self, x: float, y: float, wide: float, tall: float) -> None:
+        """Cover a rectangle."""
+        top, bottom, left, right = self._squares(x, y, wide, tall)
+        self.squares[max(0, top) : max(0, bottom), max(0, left) : max(0, right)] = True
+
+    def path(self, x: Array, y: Array, *, dots: bool = False) -> None:
+        """Cover points (N,), and unless they are dots the lines between them."""
+        points = np.column_stack([x - self.inner[0], y - self.inner[1]]) / BLOCK
+        if not dots and len(points) > 1:
+            points = np.clip(points, -1e3, 1e4)
+            with np.errstate(invalid="ignore"):
+                lengths = np.abs(np.diff(points, axis=0)).max(axis=1)
+            counts = np.where(np.isfinite(lengths), np.ceil(lengths * 1.3), 0).astype(int) + 1
+            first = np.repeat(np.arange(len(counts)), counts)
+            share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(
+                counts, counts
+            )
+            points = points[first] + share[:, None] * (points[first + 1] - points[first])
+        points = points[np.isfinite(points).all(axis=1)]
+        at = np.floor(points).astype(int)
+        rows, columns = self.squares.shape
+        inside = (at[:, 0] >= 0) & (at[:, 0] < columns) & (at[:, 1] >= 0) & (at[:, 1] < rows)
+        self.squares[at[inside, 1], at[inside, 0]] = True
+
+    def put(self, text: str, places: Sequence[Place]) -> tuple[float, float]:
+        """The place that covers least and is least far, which is covered then: left, and foot of the first line."""
+        left, top, width, height = self.inner
+        wide, tall = width_of(text), 12 + LINE * text.count("\n")
+
+        best = (math.inf, 0, left + 4, top + 12)
+        for k in sorted(range(len(places)), key=lambda k: places[k][2]):
+            x, y, far = places[k]
+            if far > best[0]:
+                break
+            begin, end, first, last = self._squares(x, y - ASCENT, wide, tall)
+            if y - ASCENT < top or y - ASCENT + tall > top + height or x < left or x + wide > left + width + 1:
+                far += OUTSIDE
+            elif count := int(np.count_nonzero(self.squares[begin:end, first:last])):
+                far += COVERING + COVERED * count
+            best = min(best, (far, k, x, y))
+        _, _, x, y = best
+        self.box(x, y - ASCENT, wide, tall)
+        return x, y
+
+    def _squares(self, x: float, y: float, wide: float, tall: float) -> tuple[int, int, int, int]:
+        x, y = (x - self.inner[0]) / BLOCK, (y - self.inner[1]) / BLOCK
+        return math.floor(y), math.floor(y + tall / BLOCK) + 1, math.floor(x), math.floor(x + wide / BLOCK) + 1

@@ -61,7 +61,7 @@ def structure_picture(info: MachineInfo, of: Model) -> Picture:
             figure.set_dpi(PNG_DPI)
             remark(figure, info)
             figure.suptitle(info.title, x=0.015, ha="left", fontsize=12, fontweight="bold")
-            return finish(figure, "structure", "Structure", caption)
+            return finish(figure, "structure", "Structure")
 
     mass = f", {info.total_mass:.0f} kg" if np.isfinite(info.total_mass) else ""
     caption = (
@@ -85,7 +85,7 @@ def mode_picture(info: MachineInfo, built: Built, of: Model, k: int, scale: floa
             mode_heading(figure, info, of, k)
             figure.set_dpi(PNG_DPI)
             remark(figure, info)
-            return finish(figure, f"mode_{k}", mode_title(info, k), mode_caption(info, k))
+            return finish(figure, f"mode_{k}", mode_title(info, k))
 
     return Picture(f"mode_{k}", mode_title(info, k), mode_caption(info, k), draw)
 
@@ -117,7 +117,7 @@ def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0
             figure.suptitle(
                 f"{info.title}: the first elastic modes", x=0.015, ha="left", fontsize=12, fontweight="bold"
             )
-            return finish(figure, "modes", "The first elastic modes", caption)
+            return finish(figure, "modes", "The first elastic modes")
 
     caption = (
         "Deflections exaggerated, over the structure at rest in grey; below the frequency the body that has the "

@@ -1,11 +1,12 @@
 // Draws charts (feedsim.report.chart) as SVG: panels, polar panels, grids. Colours are the page's CSS variables, so that
 // one drawing serves light, dark and paper. chart_use.js has what a reader does with them.
 const SPACE = "http://www.w3.org/2000/svg";
-const EDGE = { left: 62, right: 14, top: 28, bottom: 44 };
-const HEIGHT = 235, NARROW = 640, COLUMN = 250, GAP = 18, ROUND = 520, FEW = 3;
-const DASHES = { dashed: "6 3", dotted: "2 3" };
+const {
+  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, FINER_UNITS, GAP, HEIGHT, LEADER, LEFT, LETTER, MAX_DIGITS, MIN_TICKS,
+  NARROWEST, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP,
+} = LAYOUT; // feedsim.report.chart.layout
+const NARROW = 640, COLUMN = 250;
 const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
-const RING_GAPS = { 1: 0.36, 2: 0.24 };
 
 function make(name, attributes = {}, parent = null, text = null) {
   const found = document.createElementNS(SPACE, name);
@@ -72,7 +73,7 @@ function ticks(axis, low, high, most) {
   const turns = axis.unit === "°" && high - low > 60;
   let step = turns ? PHASES.find(each => (high - low) / each <= most) || 3600 : step_of((high - low) / most);
   const marked = each => Math.floor(high / each + 1e-9) - Math.ceil(low / each - 1e-9) + 1;
-  for (let less; marked(step) < FEW; step = less) { // one or two ticks are no scale
+  for (let less; marked(step) < MIN_TICKS; step = less) { // one or two ticks are no scale
     less = finer(step, turns);
     if (!less || (marked(step) > 1 && marked(less) > most + 2)) break;
   }
@@ -84,10 +85,10 @@ function ticks(axis, low, high, most) {
 function marks_of(axis, low, high, step) {
   const found = [], digits = at => Math.max(6, Math.floor(Math.log10(Math.abs(at) || step)) - Math.floor(Math.log10(step) + 1e-9) + 1);
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push({ at: k * step });
-  if (Math.max(...found.map(each => digits(each.at))) <= MANY) for (const each of found) each.text = number(each.at, digits(each.at));
+  if (Math.max(...found.map(each => digits(each.at))) <= MAX_DIGITS) for (const each of found) each.text = number(each.at, digits(each.at));
   else {
     const whole = 10 ** Math.ceil(Math.log10(high - low) - 1e-9), common = Math.floor(low / whole + 1e-9) * whole, part = high - common;
-    const [factor, unit] = (FINER[axis.unit] || []).find(([factor]) => part * factor >= 1) || (FINER[axis.unit] || [[1, axis.unit]]).at(-1);
+    const [factor, unit] = (FINER_UNITS[axis.unit] || []).find(([factor]) => part * factor >= 1) || (FINER_UNITS[axis.unit] || [[1, axis.unit]]).at(-1);
     for (const each of found) each.text = number(Math.round((each.at - common) / step) * step * factor, 4);
     found.common = `${number(common, Math.floor(Math.log10(Math.abs(common) || 1)) - Math.floor(Math.log10(whole) + 1e-9) + 1)}${unit_of(axis)}`;
     found.unit = unit;
@@ -107,9 +108,6 @@ function apart(found_of, across, most, end = Infinity) {
   for (let k = 0; k < 3 && touching(found); k++) found.filter(each => each.text).forEach((each, i) => { if (i % 2) each.text = ""; });
   return found;
 }
-const MANY = 7; // digits of a tick
-const FINER = { m: [[1, "m"], [1e3, "mm"], [1e6, "µm"], [1e9, "nm"]], mm: [[1, "mm"], [1e3, "µm"], [1e6, "nm"]], "µm": [[1, "µm"], [1e3, "nm"]],
-  s: [[1, "s"], [1e3, "ms"], [1e6, "µs"], [1e9, "ns"]], ms: [[1, "ms"], [1e3, "µs"], [1e6, "ns"]], Hz: [[1, "Hz"], [1e3, "mHz"], [1e6, "µHz"]] };
 
 // What stands along an axis: quantity and unit, or what its ticks are added to.
 function title_of(axis, found) {
@@ -121,7 +119,6 @@ function wide_enough([low, high], axis) {
   const least = axis.log || axis.names.length ? 0 : NARROWEST * Math.max(Math.abs(low), Math.abs(high));
   return high - low >= least ? [low, high] : [(low + high - least) / 2, (low + high + least) / 2];
 }
-const NARROWEST = 4e-9; // against the largest value: 4 nm of 1 m
 
 // First row whose abscissa is not below; x ascending.
 function row_at(x, value) {
@@ -162,8 +159,6 @@ function path_of(x, y, across, up, range, columns) {
   return parts.join("");
 }
 
-const PHASES = [15, 30, 45, 90, 180, 360, 720, 1440];
-
 function finer(step, turns) {
   if (turns) return PHASES.filter(each => each < step).pop();
   const decade = 10 ** Math.floor(Math.log10(step) + 1e-9);
@@ -172,7 +167,7 @@ function finer(step, turns) {
 
 const styled = curve => ({
   fill: "none", stroke: colour(curve.colour), "stroke-width": curve.width, "stroke-linejoin": "round",
-  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.grey ? { class: `grey-${curve.grey}` } : {}), ...(curve.faint ? { "stroke-opacity": 0.4 } : {}),
+  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.grey ? { class: `grey-${curve.grey}` } : {}), ...(curve.faint ? { "stroke-opacity": FAINT } : {}),
 });
 
 // Least and largest ordinate of the curves that are seen, with room about them.
@@ -190,11 +185,11 @@ function range_of(panel, curves, values, span) {
   if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
   if (panel.y.log) return [low / 1.3, high * 1.3];
   if (panel.y.symlog) { // room in the measure of the axis, on either side of zero
-    const more = (value, sign) => value + sign * (0.21 * Math.abs(value) + (high > low ? 0 : panel.y.symlog));
+    const more = (value, sign) => value + sign * (3 * ROOM * Math.abs(value) + (high > low ? 0 : panel.y.symlog));
     return [more(low, -1), more(high, 1)];
   }
   if (high > low) [low, high] = wide_enough([low, high], panel.y);
-  const room = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
+  const room = ROOM * (high - low) || 0.05 * Math.abs(high) || 1;
   return [low - (low === 0 && curves.some(each => each.filled) ? 0 : room), high + room];
 }
 
@@ -213,24 +208,24 @@ function headed(text, x, room, parent) {
   make("text", { x, y: 15, "font-weight": 600, "font-size": size.toFixed(1), fill: colour("ink") }, parent, text);
 }
 
-const width_of = text => Math.max(...text.split("\n").map(line => 6.3 * line.length)) + 2;
+const width_of = text => Math.max(...text.split("\n").map(line => LETTER * line.length)) + 2;
 
 // What the curves and labels of a panel cover, in cells: words are put where nothing is.
 class Taken {
   constructor(inner) {
     this.inner = inner;
-    this.across = Math.ceil(inner.width / 4);
-    this.cells = new Uint8Array(this.across * Math.ceil(inner.height / 4));
+    this.across = Math.ceil(inner.width / BLOCK);
+    this.cells = new Uint8Array(this.across * Math.ceil(inner.height / BLOCK));
   }
 
   box(x, y, wide, tall) {
-    for (let b = y; b < y + tall + 4; b += 4) for (let a = x; a < x + wide + 4; a += 4) this.dot(Math.min(a, x + wide), Math.min(b, y + tall));
+    for (let b = y; b < y + tall + BLOCK; b += BLOCK) for (let a = x; a < x + wide + BLOCK; a += BLOCK) this.dot(Math.min(a, x + wide), Math.min(b, y + tall));
   }
 
   dot(x, y) {
     const { inner } = this;
     if (x < inner.x || x >= inner.x + inner.width || y < inner.y || y >= inner.y + inner.height) return;
-    this.cells[Math.floor((y - inner.y) / 4) * this.across + Math.floor((x - inner.x) / 4)] = 1;
+    this.cells[Math.floor((y - inner.y) / BLOCK) * this.across + Math.floor((x - inner.x) / BLOCK)] = 1;
   }
 
   path(d, dots) {
@@ -249,8 +244,8 @@ class Taken {
     const cost = ({ x, y, far }) => {
       if (y - 10 < inner.y || y - 10 + tall > inner.y + inner.height || x < inner.x || x + wide > inner.x + inner.width + 1) return 1e6 + far;
       let covered = 0;
-      for (let b = y - 10; b <= y - 10 + tall; b += 4) for (let a = x; a <= x + wide; a += 4)
-        covered += this.cells[Math.floor((b - inner.y) / 4) * this.across + Math.floor((a - inner.x) / 4)] || 0;
+      for (let b = y - 10; b <= y - 10 + tall; b += BLOCK) for (let a = x; a <= x + wide; a += BLOCK)
+        covered += this.cells[Math.floor((b - inner.y) / BLOCK) * this.across + Math.floor((a - inner.x) / BLOCK)] || 0;
       return far + (covered ? 120 + 10 * covered : 0);
     };
     const costs = places.map(cost), best = places[costs.indexOf(costs.reduce((least, each) => Math.min(least, each), Infinity))] || { x: inner.x + 4, y: inner.y + 12 };
@@ -264,11 +259,11 @@ function frame_of(panel, box, values, hidden, zoom) {
   const shown = panel.curves.filter(each => !hidden.has(each.name));
   const span = zoom.x || whole_span(panel, values);
   const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
-  const above = top_of(panel), tall = box.height - above - EDGE.bottom;
-  const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / 34)));
+  const above = top_of(panel), tall = box.height - above - BOTTOM;
+  const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / TICK_HEIGHT)));
   const widest_of = (texts, wide, more) => texts.reduce((most, each) => Math.max(most, wide * each.length + more), 0);
   const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(each => each.text || ""), 6.6, 30);
-  return { shown, span, height, above, tall, heights, widest_of, left: Math.min(Math.max(EDGE.left, beside), box.width * 0.45) };
+  return { shown, span, height, above, tall, heights, widest_of, left: Math.min(Math.max(LEFT, beside), box.width * 0.45) };
 }
 
 // The frames of all panels; those below one another begin alike.
@@ -301,7 +296,7 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
   const bottom = inner.y + inner.height, right = inner.x + inner.width;
   const title = panel.y.names.length ? 0 : Math.max(0, Math.min(inner.x, box.width - 7.4 * panel.title.length));
   headed(panel.title, title, box.width - title, part);
-  const widest = Math.max(74, widest_of(panel.x.names, 7, 14));
+  const widest = Math.max(TICK_WIDTH, widest_of(panel.x.names, 7, 14));
   const along = apart(most => ticks(panel.x, span[0], span[1], most), across, Math.max(2, Math.floor(inner.width / widest)), box.width);
   for (const tick of along) {
     const at = across(tick.at).toFixed(1);
@@ -319,14 +314,14 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
     upright(title_of(panel.y, heights), 13, inner, box.height - 8, part);
   if (panel.x.also) {
     const [label, unit, factor] = panel.x.also, named = { label, unit, log: panel.x.log, names: [] };
-    const found = apart(most => ticks(named, span[0] * factor, span[1] * factor, most), at => across(at / factor), Math.max(2, Math.floor(inner.width / 74)));
+    const found = apart(most => ticks(named, span[0] * factor, span[1] * factor, most), at => across(at / factor), Math.max(2, Math.floor(inner.width / TICK_WIDTH)));
     for (const tick of found)
       if (tick.text) make("text", { x: across(tick.at / factor), y: inner.y - 5, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
     make("text", { x: inner.x + inner.width / 2, y: inner.y - 20, "text-anchor": "middle", fill: colour("ink") }, part, title_of(named, found));
   }
   if (panel.y.also) {
     const [label, unit, factor] = panel.y.also, named = { label, unit, log: panel.y.log, names: [] };
-    const found = ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / 34)));
+    const found = ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / TICK_HEIGHT)));
     for (const tick of found)
       if (tick.text) make("text", { x: right + 6, y: up(tick.at / factor) + 4, fill: colour("ink") }, part, tick.text);
     upright(title_of(named, found), box.width - 5, inner, box.height - 8, part, true);
@@ -343,7 +338,7 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
     const inside = value => Math.min(Math.max(Number.isFinite(value) ? up(value) : bottom, -1e4), 1e4).toFixed(1);
     for (let k = 0; k < x.length; k++) points.push(`${across(x[k]).toFixed(1)} ${inside(high[k])}`);
     for (let k = x.length - 1; k >= 0; k--) points.push(`${across(x[k]).toFixed(1)} ${inside(low[k])}`);
-    make("path", { d: `M${points.join("L")}Z`, fill: colour(band.colour), "fill-opacity": 0.18 }, field);
+    make("path", { d: `M${points.join("L")}Z`, fill: colour(band.colour), "fill-opacity": BAND }, field);
   }
   for (const level of panel.levels) {
     const look = { stroke: colour(level.colour), "stroke-width": 1, ...(level.dash ? { "stroke-dasharray": DASHES[level.dash] } : {}) };
@@ -363,7 +358,7 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
     if (curve.dots) make("path", { ...styled(curve), d: d.replace(/[LM]/g, "h0M").slice(2) + "h0", "stroke-width": 2 * curve.width, "stroke-linecap": "round" }, field);
     else if (curve.filled) {
       const zero = Math.min(bottom, up(panel.y.log ? height[0] : 0)).toFixed(1);
-      make("path", { d: `${d}V${zero}H${across(x[0]).toFixed(1)}Z`, fill: colour(curve.colour), "fill-opacity": 0.5 }, field);
+      make("path", { d: `${d}V${zero}H${across(x[0]).toFixed(1)}Z`, fill: colour(curve.colour), "fill-opacity": FILL }, field);
     } else make("path", { ...styled(curve), d }, field);
   }
   part.append(top);
@@ -385,7 +380,7 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
       places.push({ x: Math.min(Math.max(from, inner.x + 3), right - wide - 3), y: y - 6 + 13 * k, far: far + Math.abs(13 * k) });
     const place = label(mark.text, places, part);
     const to = [Math.min(Math.max(x, place.x), place.x + wide), place.y < y ? place.y + 3 : place.y - 10];
-    if (Math.hypot(to[0] - x, to[1] - y) > 24) make("line", { x1: x, y1: y, x2: to[0], y2: to[1], stroke: colour("muted"), "stroke-width": 0.7 }, field);
+    if (Math.hypot(to[0] - x, to[1] - y) > LEADER) make("line", { x1: x, y1: y, x2: to[0], y2: to[1], stroke: colour("muted"), "stroke-width": 0.7 }, field);
   }
   for (const [level, at] of labelled) {
     const wide = width_of(level.text), places = [];
@@ -411,7 +406,7 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
 // Deviations about the programmed circle. reach: deviation [um] of the outermost ring.
 function draw_polar(panel, box, parent, values, hidden, reach, id) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
-  const gap = RING_GAPS[panel.rings] * panel.rings, outer = 1 + 1.16 * gap;
+  const gap = RING_GAPS[panel.rings] * panel.rings, outer = 1 + OUTER * gap;
   const half = Math.min(box.width, box.height - 24) / 2 - 20, centre = [box.width / 2, 24 + (box.height - 24) / 2];
   const one = half / outer;
   const radius = deviation => one * Math.max(0, Math.min(2 * outer, 1 + deviation / reach * gap));
@@ -443,11 +438,11 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   for (const curve of shown) {
     const angle = values(curve.x), deviation = values(curve.y), n = angle.length;
     const points = Array.from(angle, (each, k) => place(each, deviation[k]).map(value => Math.round(10 * value) / 10).join(" ")).filter((point, k, all) => point !== all[k - 1]);
-    const ends = n ? Math.abs(deviation[n - 1] - deviation[0]) < 0.02 * reach : false;
+    const ends = n ? Math.abs(deviation[n - 1] - deviation[0]) < CLOSED * reach : false;
     make("path", { ...styled(curve), d: n ? `M${points.join("L")}${ends ? "Z" : ""}` : "" }, field);
   }
   for (const mark of panel.marks) {
-    const [x, y] = place(mark.x, mark.y), inside = one * (1 - 1.16 * RING_GAPS[panel.rings]);
+    const [x, y] = place(mark.x, mark.y), inside = one * (1 - OUTER * RING_GAPS[panel.rings]);
     const to = [centre[0] + inside * Math.cos(mark.x), centre[1] - inside * Math.sin(mark.x)];
     make("circle", { cx: x, cy: y, r: 4, fill: colour(mark.colour) }, part);
     if (!mark.text) continue;
@@ -470,28 +465,39 @@ function draw_grid(panel, box, parent, values) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent), cells = values(panel.values);
   headed(panel.title, 4, box.width - 4, part);
   const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
-  const slanted = 4.8 * panel.columns[columns - 1].length; // the last name leans over the edge
-  const width = Math.min((box.width - left - 8) / columns, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
+  const slanted = SLANTED * panel.columns[columns - 1].length; // the last name leans over the edge
+  const width = Math.min((box.width - left - 8) / columns, (box.width - left - 8 - slanted) / (columns - 0.5)), height = ROW, numbers = width >= CELL_WITH_NUMBER;
   const [low, high] = panel.span, about_zero = low < 0 && high > 0;
-  panel.columns.forEach((name, j) => make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
+  const every = Math.ceil(CELL_WITH_NAME / width);
+  panel.columns.forEach((name, j) => j % every || make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
   panel.rows.forEach((name, i) => make("text", { x: left - 8, y: top + (i + 0.5) * height + 4, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, name));
   const bold = new Set(panel.bold || []);
+  const paint = value => {
+    const share = about_zero ? Math.abs(value) / Math.max(-low, high) : (value - low) / (high - low || 1);
+    return { fill: colour(about_zero && value < 0 ? "vermillion" : "blue"), "fill-opacity": (DEPTH * Math.min(1, Math.max(0, share))).toFixed(3) };
+  };
   panel.rows.forEach((row, i) => panel.columns.forEach((column, j) => {
     const value = cells[i * columns + j], box = { x: left + j * width, y: top + i * height, width, height };
     make("rect", { ...box, fill: "none", stroke: colour("grid"), "stroke-width": 0.6 }, part);
     if (!Number.isFinite(value)) return;
-    const share = about_zero ? Math.abs(value) / Math.max(-low, high) : (value - low) / (high - low || 1);
-    const cell = make("rect", { ...box, fill: colour(about_zero && value < 0 ? "vermillion" : "blue"), "fill-opacity": (0.75 * Math.min(1, Math.max(0, share))).toFixed(3) }, part);
+    const cell = make("rect", { ...box, ...paint(value) }, part);
     make("title", {}, cell, `${row}, ${column}: ${number(value)}`);
     if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? three(value) : fixed(value, panel.decimals));
   }));
+  if (!numbers) {
+    const end = box.width - 8 - 7 * number(high, 3).length, begin = end - SCALE_STEPS * SCALE_STEP - 4;
+    make("text", { x: begin - 4, y: 15, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, number(low, 3));
+    make("text", { x: end, y: 15, fill: colour("ink"), "font-size": 11 }, part, number(high, 3));
+    for (let k = 0; k < SCALE_STEPS; k++)
+      make("rect", { x: begin + k * SCALE_STEP, y: 6, width: SCALE_STEP, height: 10, ...paint(low + (high - low) * (k + 0.5) / SCALE_STEPS) }, part);
+  }
   if (panel.best) make("rect", { x: left + panel.best[1] * width, y: top + panel.best[0] * height, width, height, fill: "none", stroke: colour("ink"), "stroke-width": 2.2 }, part);
   return { panel, part };
 }
 const grid_left = panel => Math.min(260, 16 + 6.4 * panel.rows.reduce((most, each) => Math.max(most, each.length), 0));
 const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, each) => Math.max(most, each.length), 0);
 
-const top_of = panel => EDGE.top + (panel.x.also ? 34 : 0);
+const top_of = panel => TOP + (panel.x.also ? SECOND : 0);
 
 // As many columns as have room; of more than two that are alike half of them, before they stand below one another.
 function columns_of(widths, width) {
@@ -503,14 +509,14 @@ function columns_of(widths, width) {
 // Where every panel goes: boxes, and the height of all. tall: of the panels, against their usual height.
 function placed(chart, width, tall = 1) {
   const columns = columns_of(chart.widths, width), total = columns.reduce((a, b) => a + b, 0), boxes = [];
-  const aside = chart.panels.some(panel => panel.y && panel.y.also) ? EDGE.left : EDGE.right; // panels below one another end alike
+  const aside = chart.panels.some(panel => panel.y && panel.y.also) ? LEFT : RIGHT; // panels below one another end alike
   let y = 4;
   for (let k = 0; k < chart.panels.length; k += columns.length) {
     const row = chart.panels.slice(k, k + columns.length);
     const widths = columns.map(each => (width - GAP * (columns.length - 1)) * each / total);
     const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND * Math.min(1, tall + 0.2)) + 24
-      : panel.kind === "grid" ? grid_top(panel) + 24 * panel.rows.length + 12
-      : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * tall * panel.height + EDGE.bottom + top_of(panel) - EDGE.top);
+      : panel.kind === "grid" ? grid_top(panel) + ROW * panel.rows.length + 12
+      : panel.y.names.length ? TOP + BOTTOM + 26 * panel.y.names.length : HEIGHT * tall * panel.height + BOTTOM + top_of(panel) - TOP);
     const height = Math.max(...natural);
     let x = 0;
     row.forEach((panel, j) => {

@@ -12,7 +12,7 @@ VENV    := .venv
 PY      := $(VENV)/bin/python
 PIP     := $(PY) -m pip --disable-pip-version-check --quiet
 
-UNITS   := plant controller friction setpoint machine
+UNITS   := plant controller friction friction_gms setpoint machine
 FMUS    := $(UNITS:%=fmus/%.fmu)
 SCENARIOS := z_positioning xz_circle
 
@@ -77,7 +77,7 @@ ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 # --- the units -----------------------------------------------------------------------------------------------------
 
-fmus: $(FMUS) ## build the five FMUs and the native cycle loop into fmus/
+fmus: $(FMUS) ## build the six FMUs and the native cycle loop into fmus/
 
 PACKAGER := $(wildcard src/packager/feedsim_packager/*.py src/fmi2/terminals/*)
 SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
@@ -100,6 +100,8 @@ fmus/$(EXCHANGE): $(VENV)/.run $(COMPILER) $(EXCHANGE_SOURCES)
 	$(PY) -m feedsim_packager exchange --out $(@D)
 
 fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
+# It has the torque over speed and the functions over whole records of friction.
+fmus/friction_gms.fmu $(BUILD)/fmus-all/friction_gms.fmu: $(wildcard src/friction_gms_fmu/*.* src/friction_fmu/*.*)
 fmus/controller.fmu: $(wildcard src/controller_fmu/*.*)
 fmus/setpoint.fmu: $(wildcard src/setpoint_fmu/*.* src/setpoint_fmu/resources/*)
 fmus/plant.fmu: $(wildcard src/plant_fmu/*.* src/plant_fmu/resources/*) scenarios/machines/test_centre/modes.csv

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pint_registry import Registry
 
 ROOT = Path(__file__).resolve().parent.parent
-UNITS = ("plant", "controller", "friction", "setpoint", "machine")
+UNITS = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
 
 # What a test computes, no earlier run has computed for it.
 os.environ["FEEDSIM_CACHE"] = ""

@@ -28,7 +28,8 @@ ELSEWHERE = {
     DOCS / "README.md": "index.md",
     ROOT / "examples" / "README.md": "reference/gallery.md",
     **{ROOT / "src" / unit / "README.md": f"units/{unit.removesuffix('_fmu')}.md"
-       for unit in ("plant_fmu", "controller_fmu", "friction_fmu", "setpoint_fmu", "machine_fmu", "exchange", "page")},
+       for unit in ("plant_fmu", "controller_fmu", "friction_fmu", "friction_gms_fmu", "setpoint_fmu", "machine_fmu",
+                    "exchange", "page")},
 }  # fmt: skip
 _LINK = re.compile(r"(?P<text>!?\[(?:[^\[\]]|\[[^\]]*\])*\])\((?P<target>[^)#\s]+)(?P<anchor>#[^)\s]*)?\)")
 

@@ -4,6 +4,20 @@
 
 #include "tem.h"
 
+ContactState contact_at(const Contact *p, double z, double c) {
+    return (ContactState){.z = z, .c = tem_advance(c, 0, p->W)};
+}
+
+double contact_deflection(const Contact *p, const ContactState *state) {
+    (void)p;
+    return state->z;
+}
+
+double contact_engaged(const Contact *p, const ContactState *state) {
+    (void)p;
+    return state->c;
+}
+
 /* One part of a step: mean speed n, which does not change its sign, over h. */
 static ContactState contact_part(const Contact *p, ContactState state, double n, double h) {
     return (ContactState){.z = lugre_advance(&p->lugre, state.z, n, h), .c = tem_advance(state.c, n * h, p->W)};

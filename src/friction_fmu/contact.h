@@ -9,7 +9,10 @@
 #include "lugre.h"
 #include "prefix.h"
 
+#define contact_at PREFIXED(contact_at)
 #define contact_advance PREFIXED(contact_advance)
+#define contact_deflection PREFIXED(contact_deflection)
+#define contact_engaged PREFIXED(contact_engaged)
 #define contact_engagement PREFIXED(contact_engagement)
 #define contact_force PREFIXED(contact_force)
 #define contact_torque PREFIXED(contact_torque)
@@ -24,6 +27,13 @@ typedef struct ContactState {
     double z; /* mean bristle deflection [rad] */
     double c; /* position in the engaging zone [rad], -W/2 to +W/2 */
 } ContactState;
+
+/* State with deflection z and position c [rad] in the engaging zone; a c beyond it is put to its end. */
+ContactState contact_at(const Contact *p, double z, double c);
+
+/* z [rad], and c [rad]. */
+double contact_deflection(const Contact *p, const ContactState *state);
+double contact_engaged(const Contact *p, const ContactState *state);
 
 /* State after h [s], over which the speed goes in a straight line from n_start to n_end [rad/s]. */
 ContactState contact_advance(const Contact *p, ContactState state, double n_start, double n_end, double h);

@@ -3,8 +3,10 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "contact.h"
-#include "parameters.h"
+#ifndef LAW_PARAMETERS /* another law brings its own, with the same functions */
+#define LAW_PARAMETERS "parameters.h"
+#endif
+#include LAW_PARAMETERS
 
 typedef struct Axis {
     double angle, n;         /* [rad], [rad/s] */
@@ -33,7 +35,7 @@ size_t free_axis(const double parameters[], double J, double M_0, const double M
     }
     const Contact p = parameters_contact(&v);
     const double d = h / (double)substeps;
-    Axis x = {.n = n, .contact = {.z = z}};
+    Axis x = {.n = n, .contact = contact_at(&p, z, 0)};
     x.M_fr = contact_torque(&p, x.contact, n, NULL);
     for (size_t i = 0;; i++) {
         if (!isfinite(x.angle) || !isfinite(x.n)) {

@@ -2,9 +2,10 @@
 
 #include <math.h>
 
-#include "contact.h"
-#include "parameters.h"
-#include "tem.h"
+#ifndef LAW_PARAMETERS /* another law brings its own, with the same functions */
+#define LAW_PARAMETERS "parameters.h"
+#endif
+#include LAW_PARAMETERS
 
 /* From one instant to the next. */
 static ContactState response_interval(const Contact *p, ContactState state, double n_start, double n_end, double h,
@@ -27,7 +28,7 @@ size_t response(const double parameters[], const double n[], size_t steps, doubl
         return 0;
     }
     const Contact p = parameters_contact(&v);
-    ContactState state = {.z = z, .c = tem_advance(c, 0, p.W)};
+    ContactState state = contact_at(&p, z, c);
     size_t written = 0;
     for (size_t i = 0;;) {
         const double torque = contact_torque(&p, state, n[i], NULL);
@@ -36,10 +37,10 @@ size_t response(const double parameters[], const double n[], size_t steps, doubl
         }
         M_fr[written] = torque;
         if (z_out != NULL) {
-            z_out[written] = state.z;
+            z_out[written] = contact_deflection(&p, &state);
         }
         if (c_out != NULL) {
-            c_out[written] = state.c;
+            c_out[written] = contact_engaged(&p, &state);
         }
         written++;
         if (steps - i < every) {

@@ -69,7 +69,7 @@ def test_sums_are_of_every_file(made: Path) -> None:
 def test_units_come_with_references_icons_and_sums(made: Path, fmus: Path) -> None:
     with zipfile.ZipFile(made / "first" / f"feedsim-fmus-{VERSION}.zip") as opened:
         files = {name: opened.read(name) for name in opened.namelist()}
-    for unit in ("plant", "controller", "friction", "setpoint"):
+    for unit in ("plant", "controller", "friction", "friction_gms", "setpoint"):
         assert files[f"{unit}.fmu"] == (fmus / f"{unit}.fmu").read_bytes()
         assert files[f"icons/{unit}.png"].startswith(b"\x89PNG")
         assert [name for name in files if name.startswith(f"references/{unit}/") and name.endswith(".csv")]
@@ -118,7 +118,8 @@ def test_changes_are_those_of_the_changelog(made: Path) -> None:
 def test_archives_that_are_missing_are_told(tmp_path: Path) -> None:
     (tmp_path / "plant.fmu").write_bytes(b"")
     with pytest.raises(
-        InputError, match=r"has no controller\.fmu, friction\.fmu, machine\.fmu, setpoint\.fmu; make fmus-all"
+        InputError,
+        match=r"has no controller\.fmu, friction\.fmu, friction_gms\.fmu, machine\.fmu, setpoint\.fmu; make fmus-all",
     ):
         shipped.for_platform("any", ("cc",), tmp_path)
     with pytest.raises(InputError, match="platform amiga: no wheel is made for it"):

@@ -116,9 +116,9 @@ PROGRAM = """\
 #include "fmi2FunctionTypes.h"
 
 fmi2InstantiateTYPE plant_fmi2Instantiate, controller_fmi2Instantiate, friction_fmi2Instantiate,
-    setpoint_fmi2Instantiate, machine_fmi2Instantiate;
+    friction_gms_fmi2Instantiate, setpoint_fmi2Instantiate, machine_fmi2Instantiate;
 fmi2FreeInstanceTYPE plant_fmi2FreeInstance, controller_fmi2FreeInstance, friction_fmi2FreeInstance,
-    setpoint_fmi2FreeInstance, machine_fmi2FreeInstance;
+    friction_gms_fmi2FreeInstance, setpoint_fmi2FreeInstance, machine_fmi2FreeInstance;
 
 static int try(fmi2InstantiateTYPE *instantiate, fmi2FreeInstanceTYPE *release, const char *guid) {
     const fmi2CallbackFunctions callbacks = {NULL, calloc, free, NULL, NULL};
@@ -130,13 +130,14 @@ static int try(fmi2InstantiateTYPE *instantiate, fmi2FreeInstanceTYPE *release, 
 }
 
 int main(int count, char **guids) {
-    if (count != 6)
+    if (count != 7)
         return 2;
     return try(plant_fmi2Instantiate, plant_fmi2FreeInstance, guids[1]) +
            try(controller_fmi2Instantiate, controller_fmi2FreeInstance, guids[2]) +
            try(friction_fmi2Instantiate, friction_fmi2FreeInstance, guids[3]) +
-           try(setpoint_fmi2Instantiate, setpoint_fmi2FreeInstance, guids[4]) +
-           try(machine_fmi2Instantiate, machine_fmi2FreeInstance, guids[5]);
+           try(friction_gms_fmi2Instantiate, friction_gms_fmi2FreeInstance, guids[4]) +
+           try(setpoint_fmi2Instantiate, setpoint_fmi2FreeInstance, guids[5]) +
+           try(machine_fmi2Instantiate, machine_fmi2FreeInstance, guids[6]);
 }
 """
 

@@ -25,7 +25,7 @@ from feedsim_packager import build, cli, reference, toolchain
 from feedsim_packager.errors import InputError
 
 ROOT = "extra/org.fmi-standard.fmi-ls-ref/"
-UNITS = ("friction", "plant", "controller", "setpoint")
+UNITS = ("friction", "friction_gms", "plant", "controller", "setpoint")
 SSV = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"
 # roles that fmi-ls-ref 1.0.0-alpha.1 knows, of those used here

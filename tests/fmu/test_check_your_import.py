@@ -32,7 +32,7 @@ def script() -> str:
     return match[1]
 
 
-@pytest.mark.parametrize("unit", ["friction", "plant", "controller", "setpoint"])
+@pytest.mark.parametrize("unit", ["friction", "friction_gms", "plant", "controller", "setpoint"])
 def test_all_the_same(unit: str, script: str, fmus: Path, tmp_path: Path) -> None:
     found = check(fmus / f"{unit}.fmu", tmp_path, script)
     assert found.returncode == 0, found.stdout + found.stderr

@@ -45,6 +45,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
         expected = {
             "controller": {("x_e", "x_s"), ("x_e", "x_a"), ("x_m", "x_a")},
             "friction": {("M_fr", "n_fr")},
+            "friction_gms": {("M_fr", "n_fr")},
             "plant": set(),
             "setpoint": set(),
             "machine": {(f"{axis}.{x_e}", f"{axis}.x_s") for axis in "XYZ" for x_e in ("x_e", "x_e_min", "x_e_max")},

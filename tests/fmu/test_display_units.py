@@ -47,7 +47,10 @@ def test_display_units_are_those_of_pint(archive: Archive, registry: Registry) -
                 )
                 assert factor * value + offset == pytest.approx(expected, rel=1e-14, abs=0), display.attrib["name"]
             pairs += 1
-    assert pairs >= {"plant": 4, "controller": 7, "friction": 3, "setpoint": 2, "machine": 8}[archive.unit]
+    assert (
+        pairs
+        >= {"plant": 4, "controller": 7, "friction": 3, "friction_gms": 2, "setpoint": 2, "machine": 8}[archive.unit]
+    )
 
 
 # What a person at a machine calls these quantities. SI units that are read as they are need no other.

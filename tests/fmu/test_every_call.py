@@ -61,7 +61,7 @@ def bring(archive: Archive, place: str) -> Slave | None:
     assert slave.component, slave.last
     if place == "instantiated":
         return slave
-    if place == "error" and archive.unit == "friction":
+    if place == "error" and archive.unit in ("friction", "friction_gms"):
         slave.set([of(archive, "parameter")["sigma_2"]], [1e300])  # its torque is finite for any speed without
     slave.set_up()
     if place == "initialization mode":

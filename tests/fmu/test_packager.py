@@ -304,7 +304,7 @@ def test_files_are_compiled_as_one_program_only_where_that_works(tmp_path: Path)
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (["describe", "gearbox"], 2, "no unit 'gearbox' (units: controller, friction, machine, plant, setpoint;"),
+        (["describe", "gearbox"], 2, "no unit 'gearbox' (units: controller, friction, friction_gms, machine, "),
         (["describe", "friction", "--cc", "no-such-compiler"], 3, "no-such-compiler"),
         (["describe", "plant", "--modes", "nowhere.csv"], 2, "nowhere.csv"),
         (["describe", "friction", "--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")], 2,

@@ -88,6 +88,7 @@ EXPECTED: dict[str, dict[str, dict[str, str]]] = {
     },
     "controller": {"setpoint": {name: name for name in SETPOINT}, "motor": {name: name for name in DRIVE}},
     "friction": {"friction": {name: name for name in CONTACT}},
+    "friction_gms": {"friction": {name: name for name in CONTACT}},
     "setpoint": {f"{axis}.setpoint": {name: f"{axis}.{name}" for name in SETPOINT} for axis in AXES},
     "machine": {
         "tool": {name: f"tool.{name}" for name in TOOL},

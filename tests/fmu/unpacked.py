@@ -14,7 +14,7 @@ from fmpy.fmi2 import FMU2Slave
 from feedsim_packager import compile
 
 ROOT = Path(__file__).resolve().parents[2]
-UNITS = ("plant", "controller", "friction", "setpoint", "machine")
+UNITS = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
 PLATFORM = compile.host_target()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from fuzz import units
 
-SECONDS = 9  # of each of the five units; the rest of the minute compiles them
+SECONDS = 9  # of each of the six units; the rest of the minute compiles them
 
 
 @pytest.mark.skipif(platform.system() == "Windows", reason="the driver maps files as POSIX has it")

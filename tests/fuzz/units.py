@@ -28,8 +28,9 @@ from feedsim_packager.errors import CompilerError
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
-UNITS = ("plant", "controller", "friction", "setpoint", "machine")
+UNITS = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
 CORPUS = HERE / "corpus"
+ALIKE = {"friction_gms": "friction"}  # unit -> another with the same calls, whose inputs it begins with
 
 FLAGS = ("-std=c99", "-ffp-contract=off", "-D_DEFAULT_SOURCE", "-O1", "-g", "-fno-omit-frame-pointer")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
@@ -104,9 +105,9 @@ def kept_inputs(unit: str, out: Path) -> list[Path]:
     """Folders of inputs to begin with; the first one, empty, is for those that are found."""
     found, reached = out / "found", out / "reached"
     found.mkdir(exist_ok=True)
-    with zipfile.ZipFile(CORPUS / f"{unit}.zip") as archive:
+    with zipfile.ZipFile(CORPUS / f"{ALIKE.get(unit, unit)}.zip") as archive:
         archive.extractall(reached)
-    return [found, reached, CORPUS / unit]
+    return [found, reached, CORPUS / ALIKE.get(unit, unit)]
 
 
 def fuzz(program: Path, inputs: Sequence[Path], seconds: float, seed: int) -> Outcome:

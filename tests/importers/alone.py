@@ -53,6 +53,7 @@ class Case:
 
 CASES = (
     Case("friction", {"n_fr": "speed"}, ("M_fr",), {"F_C": 2.0, "F_S": 2.9}),
+    Case("friction_gms", {"n_fr": "speed"}, ("M_fr",), {"F_C": 2.0, "F_S": 2.9, "spread": 40.0}),
     Case(
         "plant",
         {"X.M_a": "torque", "X.M_fr": "friction", "Z.M_a": "other_torque", "Z.M_fr": "other_friction"},

@@ -12,7 +12,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 from fmpy.validation import validate_fmu
 
-UNITS = ("plant", "controller", "friction", "setpoint", "machine")
+UNITS = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
 # VDMCheck2 has its rules twice, written independently: what it calls with which class.
 RULES = ("VDMCheckPlus", "VDMCheck")
 

@@ -66,6 +66,7 @@ def _plant() -> dict[str, Floats]:
 
 CASES = (
     Case("friction", "sliding, reversals, pre-sliding", {"n_fr": _friction()}),
+    Case("friction_gms", "sliding, reversals, pre-sliding", {"n_fr": _friction()}, {"beta": 1.7, "skew": 0.3}),
     Case("friction", "Stribeck exponent 1.7, no engaging model", {"n_fr": _friction()}, {"beta": 1.7, "W": 0.0}),
     Case("controller", "move, torque limit", _controller()),
     Case("controller", "two more filters, lag", _controller(), {"T_ref": 1e-4, "T_dyn": 1.4e-3, "filter_1.f": 500.0}),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,22 @@ def friction_cases() -> list[Pinned]:
         _friction("rapid_traverse", 1.0, 1e-3, 2e-3, rapid),
         _friction("stick", 0.7, 1e-3, 2e-3, stick),
     ]
+
+
+def friction_gms_cases() -> list[Pinned]:
+    """Steady speeds, a circle's reversals, presliding loops and sticking by generalised Maxwell slip."""
+    found = []
+    for pinned in friction_cases():
+        changes = {"reversal_lugre": {"asymmetry": 0.1, "beta": 1.5, "spread": 60.0, "skew": 0.4, "C": 80.0}}
+        case = pinned.case
+        name = "reversal_skew" if case.name in changes else case.name
+        parameters = changes.get(case.name, {})
+        found.append(
+            Pinned(
+                replace(case, unit="friction_gms", name=name, parameters=parameters), ("M_fr", "z", "k"), pinned.every
+            )
+        )
+    return found
 
 
 # --- plant ----------------------------------------------------------------------------------------------------------

@@ -12,20 +12,28 @@ from pathlib import Path
 import numpy as np
 import solve_controller
 import solve_friction
+import solve_friction_gms
 import solve_plant
 import solve_setpoint
 import system
-from cases import STEP, Pinned, controller_cases, friction_cases, grid, plant_cases, setpoint_cases
+from cases import STEP, Pinned, controller_cases, friction_cases, friction_gms_cases, grid, plant_cases, setpoint_cases
 from reference_files import HERE, UNITS, Case, write_inputs, write_reference
 
 SOLVERS = {
     "friction": solve_friction.solve,
+    "friction_gms": solve_friction_gms.solve,
     "plant": solve_plant.solve,
     "controller": solve_controller.solve,
     "setpoint": solve_setpoint.solve,
 }
-CASES = {"friction": friction_cases, "plant": plant_cases, "controller": controller_cases, "setpoint": setpoint_cases}
-CONTINUOUS = ("friction", "plant")
+CASES = {
+    "friction": friction_cases,
+    "friction_gms": friction_gms_cases,
+    "plant": plant_cases,
+    "controller": controller_cases,
+    "setpoint": setpoint_cases,
+}
+CONTINUOUS = ("friction", "friction_gms", "plant")
 ALL = (*UNITS, system.FOLDER)
 
 

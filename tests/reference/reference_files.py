@@ -23,7 +23,7 @@ from feedsim.compare import thinned
 from feedsim.trace import Series
 
 HERE = Path(__file__).parent
-UNITS = ("friction", "plant", "controller", "setpoint")
+UNITS = ("friction", "friction_gms", "plant", "controller", "setpoint")
 HELD = "held"
 # What the inputs of cases.py are rounded to; speeds, torques and forces elsewhere to 1e-9.
 LAST_DIGIT = {"time": 1e-12, "x_s": 1e-12, "x_a": 1e-12, "n_fr": 1e-12}

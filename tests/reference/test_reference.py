@@ -12,8 +12,9 @@ import make_reference
 import numpy as np
 import pytest
 import solve_friction
+import solve_friction_gms
 import system
-from cases import Pinned, controller_cases, friction_cases
+from cases import Pinned, controller_cases, friction_cases, friction_gms_cases
 from reference_files import HERE, UNITS, all_cases, read_case, read_table, same_but_for_the_last_digit, write_table
 from run_case import simulate
 from solve_friction import OWN_ERROR
@@ -68,7 +69,7 @@ def test_what_is_off_between_the_rows_of_a_reference_is_found(unit: str, name: s
 
 
 def test_every_unit_has_its_cases() -> None:
-    for unit, least in (("friction", 6), ("plant", 7), ("controller", 8), ("setpoint", 2)):
+    for unit, least in (("friction", 6), ("friction_gms", 6), ("plant", 7), ("controller", 8), ("setpoint", 2)):
         assert len([name for of, name, held in CASES if of == unit and not held]) >= least
 
 
@@ -107,6 +108,15 @@ def test_own_error_of_the_friction_reference(wanted: Pinned) -> None:
     whole, halved = (solve_friction.solve(case, wanted.every, wanted.outputs, finer) for finer in (1, 2))
     for name in wanted.outputs:
         np.testing.assert_allclose(whole[name], halved[name], rtol=1e-15, atol=OWN_ERROR * np.ptp(halved[name]))
+
+
+@pytest.mark.parametrize("wanted", friction_gms_cases(), ids=lambda wanted: wanted.case.name)
+def test_own_error_of_the_reference_of_maxwell_slip(wanted: Pinned) -> None:
+    case = make_reference.refined(read_case("friction_gms", wanted.case.name), wanted.case.step)
+    whole, halved = (solve_friction_gms.solve(case, wanted.every, wanted.outputs, finer) for finer in (1, 2))
+    for name in wanted.outputs:
+        limit = solve_friction_gms.OWN_ERROR * np.ptp(halved[name])
+        np.testing.assert_allclose(whole[name], halved[name], rtol=1e-15, atol=limit)
 
 
 def test_inputs_are_the_same_but_for_the_last_digit(tmp_path: Path) -> None:

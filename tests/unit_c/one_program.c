@@ -5,7 +5,7 @@
 
 #include "fmi2FunctionTypes.h"
 
-#define UNITS(U) U(friction) U(controller) U(plant) U(setpoint) U(machine)
+#define UNITS(U) U(friction) U(friction_gms) U(controller) U(plant) U(setpoint) U(machine)
 
 #define DECLARE(unit)                                                                                                  \
     extern fmi2InstantiateTYPE unit##_fmi2Instantiate;                                                                 \

@@ -8,7 +8,7 @@
 # it. The directories of those sources are searched for headers. $(TOY) stands for the shell with the toy unit.
 
 BUILD  ?= build
-UNITS  ?= friction controller plant setpoint machine
+UNITS  ?= friction friction_gms controller plant setpoint machine
 PY     ?= python3
 UNIT_C  := tests/unit_c
 C_BUILD := $(BUILD)/tests
@@ -32,6 +32,7 @@ SOURCES_test_tem       := src/friction_fmu/tem.c
 SOURCES_test_contact   := $(addprefix src/friction_fmu/,contact.c lugre.c tem.c)
 SOURCES_test_response  := $(filter-out %/model.c,$(wildcard src/friction_fmu/*.c))
 SOURCES_test_free_axis := $(filter-out %/model.c,$(wildcard src/friction_fmu/*.c))
+SOURCES_test_gms       := $(addprefix src/friction_gms_fmu/,gms.c level.c)
 
 SOURCES_test_geometry := src/plant_fmu/geometry.c
 SOURCES_test_transmission := src/plant_fmu/transmission.c
@@ -131,7 +132,7 @@ test-sanitize: $(C_TESTS:%=$(C_BUILD)/sanitized/%) $(foreach unit,$(UNITS),$(C_B
 	@$(if $(FLAGS_sanitized),,echo "the compiler has no sanitisers: running without";) $(RUN_C_TESTS)
 	@set -e; for unit in $(UNITS); do \
 	    $(C_BUILD)/sanitized/lifecycle $(C_BUILD)/sanitized/$$unit.so "$(call GUID_OF,$$unit)" $(C_BUILD)/packed/$$unit/resources; done
-	@$(C_BUILD)/sanitized/one_program $(foreach unit,friction controller plant setpoint machine,"$(call GUID_OF,$(unit))" $(C_BUILD)/packed/$(unit)/resources)
+	@$(C_BUILD)/sanitized/one_program $(foreach unit,friction friction_gms controller plant setpoint machine,"$(call GUID_OF,$(unit))" $(C_BUILD)/packed/$(unit)/resources)
 
 # An archive may hold binaries of other platforms as well.
 HOST_FOLDER = $(shell $(PY) -c 'from feedsim_packager import targets; print(targets.host_target().folder)')

@@ -22,7 +22,7 @@ from feedsim.installation import shipped
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 
-SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "setpoint.fmu", "machine.fmu")
+SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "friction_gms.fmu", "setpoint.fmu", "machine.fmu")
 Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files beside the library for this platform
 
 

@@ -17,9 +17,10 @@ from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
 from feedsim.installation import mend
 from feedsim.owned import Closing
+from feedsim.scenario.roles import FRICTION_ROLE
 
-RESPONSE = "friction_response"  # src/friction_fmu/response.h
-FREE_AXIS = "friction_free_axis"  # src/friction_fmu/free_axis.h
+RESPONSE = "response"  # src/friction_fmu/response.h, behind the unit's name
+FREE_AXIS = "free_axis"  # src/friction_fmu/free_axis.h
 
 _RESPONSE = ctypes.CFUNCTYPE(
     ctypes.c_size_t,
@@ -34,7 +35,7 @@ _FREE_AXIS = ctypes.CFUNCTYPE(
 
 
 class FrictionLaw(Closing):
-    """The law of ``friction.fmu`` as a function, for as long as this object is open (a context manager).
+    """The law of a friction unit as a function, for as long as this object is open (a context manager).
 
     The numbers are those of stepping the unit with the slope of its speed. Calls are independent of each other and may
     come from several threads; the interpreter is free for others while one runs. Not to be closed while one runs.
@@ -44,27 +45,29 @@ class FrictionLaw(Closing):
         start_values: start value of each, in the unit's own units.
     """
 
-    def __init__(self, fmus: Path | None = None) -> None:
-        """Open friction.fmu in the folder `fmus` (default: :func:`~feedsim.cosim.binaries.fmus_directory`).
+    def __init__(self, fmus: Path | None = None, unit: str = FRICTION_ROLE.shipped) -> None:
+        """Open the archive of `unit` in the folder `fmus` (default: :func:`~feedsim.cosim.binaries.fmus_directory`).
 
         Raises:
             InputError: no usable archive, or one without the functions.
         """
-        self._archive = Archive((fmus or fmus_directory()) / "friction.fmu")
+        self._name = unit
+        self._archive = Archive((fmus or fmus_directory()) / f"{unit}.fmu")
         self._refusing = Lock()
         self._unit: Unit | None = None
         try:
             # The instance holds the library, and its GUID stands for the order of the parameters in it.
-            self._unit = Unit(self._archive, "friction")
+            self._unit = Unit(self._archive, unit)
             library = self._unit.library
-            for name in (RESPONSE, FREE_AXIS):
+            response, free_axis = (f"{unit}_{name}" for name in (RESPONSE, FREE_AXIS))
+            for name in (response, free_axis):
                 if not hasattr(library, name):
                     raise InputError(
                         f"{self._archive.path}: its library has no function {name}; it was built from older sources: "
                         f"{mend('it')}"
                     )
-            self._response = _RESPONSE((RESPONSE, library))
-            self._free_axis = _FREE_AXIS((FREE_AXIS, library))
+            self._response = _RESPONSE((response, library))
+            self._free_axis = _FREE_AXIS((free_axis, library))
         except BaseException:
             self.close()
             raise
@@ -211,7 +214,7 @@ class FrictionLaw(Closing):
     def _let_unit_refuse(self, parameters: Mapping[str, float]) -> None:
         """Raise InputError with the unit's words where it refuses `parameters`."""
         with self._refusing:  # loading a library changes the working directory for a moment
-            unit = Unit(self._archive, "friction")
+            unit = Unit(self._archive, self._name)
             try:
                 unit.set_parameters(parameters)
                 unit.enter_initialisation(0.0, 1.0)

@@ -11,7 +11,7 @@ from feedsim.cosim.archive import Archive
 from feedsim.cosim.roles import controller_parameters
 from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.scenario import Machine
+from feedsim.scenario import Friction, Machine
 from feedsim.scenario.coupling import SCHEMES, Coupling
 from feedsim.scenario.parameter_group import Parameter
 from feedsim.structure.pack import POSES_IN_ARCHIVE, Packed, packaging, packed, plant_tables, setpoint_table
@@ -82,15 +82,23 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
     """Parameters of the unit by their names.
 
     Raises:
-        InputError: lists the roles that another maker's unit fills.
+        InputError: lists the roles that another unit or law fills than this one holds.
     """
-    if machine.foreign_units:
+    others = [
+        (axis, f"its {unit.role.name} is {unit.fmu.name}, another maker's unit; one unit holds the shipped ones alone")
+        for axis, unit in machine.foreign_units
+    ]
+    others += [
+        (axis, f"its friction has the law {friction.law}; one unit holds LuGre alone")
+        for axis, friction in machine.shipped_frictions.items()
+        if not isinstance(friction, Friction)
+    ]
+    if others:
         raise InputError.of(
             "the machine cannot be one unit",
             [
-                f"axis {axis}: its {unit.role.name} is {unit.fmu.name}, another maker's unit; one unit holds the "
-                "shipped ones alone: coupling.units: separate runs it, feedsim ssp without --one wires it"
-                for axis, unit in machine.foreign_units
+                f"axis {axis}: {other}: coupling.units: separate runs it, feedsim ssp without --one wires it"
+                for axis, other in others
             ],
         )
     values: dict[str, Parameter] = {
@@ -99,8 +107,8 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
         "motion.built_in": built_in,
     }
     for name, axis in machine.axes.items():
-        friction = axis.friction_at_motor
+        at_motor = axis.friction_at_motor
         values |= {f"{name}.drive.{key}": value for key, value in controller_parameters(machine, name).items()}
-        values |= {f"{name}.friction.{key}": value for key, value in friction.items()}
+        values |= {f"{name}.friction.{key}": value for key, value in at_motor.items()}
         values[f"{name}.M_0"] = axis.M_0
     return values | dict(machine.errors)

@@ -62,7 +62,7 @@ class RoleUnit:
 def archive_path(machine: Machine, axis: str, role: Role, fmus: Path) -> Path:
     """The archive in a role on an axis; shipped ones are in the folder `fmus`."""
     described = getattr(machine.axes[axis], role.name)
-    return described.fmu if isinstance(described, ForeignUnit) else fmus / f"{role.shipped}.fmu"
+    return described.fmu if isinstance(described, ForeignUnit) else fmus / f"{role.archive_name(described)}.fmu"
 
 
 def filled(machine: Machine, axis: str, role: Role, archive: Archive) -> RoleUnit:

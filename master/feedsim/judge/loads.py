@@ -9,7 +9,7 @@ import numpy as np
 from feedsim.cosim import Run
 from feedsim.cosim.loads import LOAD_TAKEN_UP, Acting, at_motor
 from feedsim.nc import Program
-from feedsim.scenario import Drive, Friction, Machine, Scenario
+from feedsim.scenario import Drive, FrictionParameters, Machine, Scenario
 
 # Of F_C: a load that never exceeds it is lost in what friction itself is known to. Newtons read as kilonewtons are.
 FELT = 1e-2
@@ -39,7 +39,7 @@ def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[str]:
         torque = at_motor(each.load, float(each.means(start)[0]), machine)
         friction = machine.axes[each.load.axis_name].friction if torque is not None else None
         # Friction alone holds what is below F_C.
-        if torque is not None and isinstance(friction, Friction) and abs(torque) > friction.F_C:
+        if torque is not None and isinstance(friction, FrictionParameters) and abs(torque) > friction.F_C:
             told.append(f"{each.place}: the load of {torque:.3g} N.m at the motor of {each.load.axis_name} {sagging}")
     return told
 
@@ -60,7 +60,7 @@ def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[s
                 f"{size}, {abs(torque) / drive.M_max:.3g} times the drive's M_max, {drive.M_max:.4g} N.m: the axis "
                 "cannot hold it; are unit, kind and factor right?"
             )
-        elif isinstance(friction, Friction) and abs(torque) < FELT * friction.F_C:
+        elif isinstance(friction, FrictionParameters) and abs(torque) < FELT * friction.F_C:
             told.append(
                 f"{size}, {abs(torque) / friction.F_C:.2g} of the Coulomb friction F_C, {friction.F_C:.4g} N.m: next "
                 "to nothing feels it; are unit, kind and factor right?"

@@ -25,7 +25,7 @@ from feedsim.errors import InputError
 from feedsim.linear.drive import LinearDrive
 from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, ModalPlant, modal_sums
 from feedsim.linear.stability import GROWTH, MAX_PHASE_STEP
-from feedsim.scenario import Cycles, Drive, Friction, Machine
+from feedsim.scenario import Cycles, Drive, Friction, FrictionParameters, Machine
 from feedsim.structure import Modes
 
 # "For satisfactory performance, the phase margin should be between 30 deg and 60 deg, and the gain margin should be
@@ -118,8 +118,9 @@ class Bristles(NamedTuple):
     sigma_2: float
 
     @classmethod
-    def of(cls, friction: Friction) -> Bristles:
-        k = 0.5 * (1 + friction.gamma) if friction.W > 0 else 1.0
+    def of(cls, friction: FrictionParameters) -> Bristles:
+        # of generalised Maxwell slip all elements stick
+        k = 0.5 * (1 + friction.gamma) if isinstance(friction, Friction) and friction.W > 0 else 1.0
         return cls(k * friction.sigma_0, friction.sigma_1, friction.sigma_2)
 
 

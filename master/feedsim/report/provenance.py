@@ -17,7 +17,7 @@ from feedsim.errors import InputError
 from feedsim.fields import Quantity
 from feedsim.files.regular import digest
 from feedsim.installation import version
-from feedsim.scenario import Axis, Drive, ForeignUnit, Friction, Machine, Scenario
+from feedsim.scenario import Axis, Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
@@ -104,7 +104,7 @@ def friction_origins(machine: Machine) -> dict[str, str]:
     """
     origins: dict[str, str] = {}
     for name, axis in machine.axes.items():
-        told = axis.friction.identified if isinstance(axis.friction, Friction) else None
+        told = axis.friction.identified if isinstance(axis.friction, FrictionParameters) else None
         if not told:
             continue
         traces = told.get("traces")
@@ -115,7 +115,7 @@ def friction_origins(machine: Machine) -> dict[str, str]:
     return origins
 
 
-def _with_units(group: Drive | Friction | ForeignUnit) -> dict[str, tuple[Parameter, str]]:
+def _with_units(group: Drive | FrictionParameters | ForeignUnit) -> dict[str, tuple[Parameter, str]]:
     if isinstance(group, ForeignUnit):  # what it declares, and has not been given here, only its archive knows
         return {"fmu": (group.fmu.name, ""), **{name: (value, "") for name, value in group.parameters.items()}}
     units = dict(_units(type(group)))

@@ -4,7 +4,7 @@ May use files, fields, motions, variables and trace.
 Start with load.py: ``load``.
 """
 
-from feedsim.scenario.axis_units import CurrentController, Drive, Filter, Friction
+from feedsim.scenario.axis_units import CurrentController, Drive, Filter, Friction, FrictionParameters, GmsFriction
 from feedsim.scenario.base import Base, Change
 from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
@@ -15,6 +15,7 @@ from feedsim.scenario.roles import ForeignUnit
 
 __all__ = [
     "Axis", "Base", "Change", "CircleTest", "Coupling", "CurrentController", "Cycles", "Delay", "Drive", "Filter",
-    "ForeignUnit", "Friction", "Level", "Logging", "Machine", "Noise", "Positioning", "PositioningAccuracy",
-    "Quantisation", "Recording", "Scenario", "Subject", "load", "load_machine", "load_subject",
+    "ForeignUnit", "Friction", "FrictionParameters", "GmsFriction", "Level", "Logging", "Machine", "Noise",
+    "Positioning", "PositioningAccuracy", "Quantisation", "Recording", "Scenario", "Subject", "load", "load_machine",
+    "load_subject",
 ]  # fmt: skip

@@ -5,21 +5,24 @@ Names of parameters are those of the FMI units; every value is SI.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
+    BeforeValidator,
     Field,
     StrictBool,
     StrictInt,
     ValidationInfo,
     create_model,
     field_validator,
+    model_validator,
 )
 
 from feedsim import variables
-from feedsim.fields import Quantity, Reading, fault, parameter
+from feedsim.fields import Quantity, Reading, brief, fault, parameter
 from feedsim.scenario.parameter_group import Parameter, ParameterGroup, effects, group
-from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, ForeignUnit, mapping
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, FRICTION_UNITS, GMS, ForeignUnit, filled, mapping
 
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
 FILTER_TYPES: dict[str, int] = {"off": 0, "second_order": 1, "band_stop": 1, "low_pass": 2}
@@ -35,10 +38,11 @@ _IDENTIFIED = (
 )
 
 
-class _Friction(ParameterGroup):
-    """Friction of an axis on the motor side: LuGre with the transmission engaging model (Eqs. 1-7)."""
+class FrictionParameters(ParameterGroup):
+    """Friction of an axis on the motor side, by any law of the shipped units: the same torque over speed."""
 
     if TYPE_CHECKING:
+        law: ClassVar[str]
         identified: dict[str, Any]
 
         def __getattr__(self, parameter: str) -> float: ...
@@ -55,8 +59,7 @@ class _Friction(ParameterGroup):
 
     def parameters(self) -> dict[str, Parameter]:
         values = super().parameters()
-        del values["identified"]
-        return values
+        return {name: value for name, value in values.items() if name not in ("identified", "law")}
 
     @field_validator("F_S", check_fields=False)
     @classmethod
@@ -69,9 +72,35 @@ class _Friction(ParameterGroup):
         return F_S
 
 
-def _friction_fields() -> dict[str, Any]:
-    """The parameters of the unit `friction`, each with how it is checked, and where they come from."""
-    known = variables.parameters("friction")
+class _Friction(FrictionParameters):
+    """Friction of an axis on the motor side: LuGre with the transmission engaging model (Eqs. 1-7)."""
+
+    law: ClassVar[str] = "lugre"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _law_by_name(cls, data: Any) -> Any:
+        """A file may say its law, LuGre as any other."""
+        named = isinstance(data, Mapping) and data.get("law") == cls.law
+        return {key: value for key, value in data.items() if key != "law"} if named else data
+
+
+class _GmsFriction(FrictionParameters):
+    """Friction of an axis on the motor side: generalised Maxwell slip."""
+
+    TOLD_BY: ClassVar[str] = "law"
+    not_shown: ClassVar[tuple[str, ...]] = ("c", "lambda")  # it has no engaging zone
+
+
+def _known_law(law: Any) -> Any:
+    if law not in FRICTION_UNITS:
+        raise fault(f"{brief(law)} is no friction law; allowed: {', '.join((Friction.law, *FRICTION_UNITS))}")
+    return law
+
+
+def _friction_fields(unit: str) -> dict[str, Any]:
+    """The parameters of a friction unit, each with how it is checked, and where they come from."""
+    known = variables.parameters(unit)
     defaults = dict.fromkeys(_FRICTION_NEEDED, ...) | _FRICTION_WITHOUT
     fields = {name: (float, parameter(each, defaults.get(name, float(each.start)))) for name, each in known.items()}
     return {**fields, "identified": (dict[str, Any], Field(default={}, description=_IDENTIFIED))}
@@ -79,10 +108,26 @@ def _friction_fields() -> dict[str, Any]:
 
 if TYPE_CHECKING:
     Friction = _Friction
+    GmsFriction = _GmsFriction
 else:
     Friction = create_model(
-        "Friction", __base__=_Friction, __module__=__name__, __doc__=_Friction.__doc__, **_friction_fields()
-    )
+        "Friction", __base__=_Friction, __module__=__name__, __doc__=_Friction.__doc__,
+        **_friction_fields("friction"),
+    )  # fmt: skip
+    GmsFriction = create_model(
+        "GmsFriction", __base__=_GmsFriction, __module__=__name__, __doc__=_GmsFriction.__doc__,
+        law=(
+            Annotated[Literal[GMS], BeforeValidator(_known_law)],
+            Field(description="Law of the friction; without it LuGre"),
+        ),
+        **_friction_fields(FRICTION_UNITS[GMS]),
+    )  # fmt: skip
+
+
+def friction_filled(data: Any) -> str:
+    """Which friction stands there, as the tag of a pydantic union: the shipped LuGre, another law or another unit."""
+    law = data.get("law", Friction.law) if isinstance(data, Mapping) else getattr(data, "law", Friction.law)
+    return filled(data) if law == Friction.law else GMS
 
 
 CONTROLLER_TABLE = variables.parameters("controller")

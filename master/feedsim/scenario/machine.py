@@ -28,12 +28,15 @@ from feedsim.scenario.axis_units import (
     ForeignDrive,
     ForeignFriction,
     Friction,
+    FrictionParameters,
+    GmsFriction,
     Guide,
     Hysteresis,
     Transmission,
+    friction_filled,
 )
 from feedsim.scenario.parameter_group import Parameter, ParameterGroup, group
-from feedsim.scenario.roles import FOREIGN, SHIPPED, ForeignUnit, filled
+from feedsim.scenario.roles import FOREIGN, GMS, SHIPPED, ForeignUnit, filled
 
 
 class Axis(Model):
@@ -67,8 +70,12 @@ class Axis(Model):
         Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
     )
     friction: Annotated[
-        Annotated[Friction, Tag(SHIPPED)] | Annotated[ForeignFriction, Tag(FOREIGN)], Discriminator(filled)
-    ] = Field(description="Parameters of the shipped friction, or another unit (fmu) with its variables")
+        Annotated[Friction, Tag(SHIPPED)] | Annotated[GmsFriction, Tag(GMS)] | Annotated[ForeignFriction, Tag(FOREIGN)],
+        Discriminator(friction_filled),
+    ] = Field(
+        description="Parameters of the shipped friction (law: gms for generalised Maxwell slip), or another unit (fmu) "
+        "with its variables"
+    )
 
     @field_validator("travel")
     @classmethod
@@ -77,6 +84,17 @@ class Axis(Model):
             raise fault(f"the lowest position {travel[0]:.9g} m is not below the highest, {travel[1]:.9g} m")
         return travel
 
+    @field_validator("friction")
+    @classmethod
+    def _shared_with_the_guide(cls, friction: Model, info: ValidationInfo) -> Model:
+        guide = info.data.get("guide")
+        if guide is not None and guide.share and isinstance(friction, GmsFriction):
+            raise fault(
+                "guide.share gives a share of the axis's friction to the guide, whose law is LuGre; this friction has "
+                f"the law {friction.law}: give the guide parameters of its own"
+            )
+        return friction
+
     @property
     def I_P(self) -> float:
         """Lead, pitch / (2 pi) [m/rad]."""
@@ -84,8 +102,8 @@ class Axis(Model):
 
     @property
     def friction_at_motor(self) -> dict[str, Parameter]:
-        """Parameters of the shipped unit `friction`: those of the axis, without what is at the guide."""
-        assert isinstance(self.friction, Friction)
+        """Parameters of the shipped friction unit: those of the axis, without what is at the guide."""
+        assert isinstance(self.friction, FrictionParameters)
         values = self.friction.parameters()
         share = self.guide.share if self.guide is not None else None
         if share is None:
@@ -251,15 +269,19 @@ class Machine(Model):
         ]  # fmt: skip
 
     @property
-    def shipped_frictions(self) -> dict[str, Friction]:
-        """Axis -> parameters of its friction, where that is the shipped unit."""
-        return {name: axis.friction for name, axis in self.axes.items() if isinstance(axis.friction, Friction)}
+    def shipped_frictions(self) -> dict[str, FrictionParameters]:
+        """Axis -> parameters of its friction, where that is a shipped unit."""
+        return {
+            name: axis.friction for name, axis in self.axes.items() if isinstance(axis.friction, FrictionParameters)
+        }
 
     def shipped_friction(self, axis: str, who: str) -> Friction:
         """The parameters of an axis's friction. InputError: as :meth:`shipped_drive`."""
         friction = self.axes[axis].friction
         if isinstance(friction, ForeignUnit):
             raise InputError(_foreign(axis, friction, who))
+        if not isinstance(friction, Friction):
+            raise InputError(f"axis {axis}: its friction has the law {friction.law}; {who} needs LuGre")
         return friction
 
     @property

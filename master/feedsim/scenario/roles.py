@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 from pydantic import (
@@ -22,6 +23,8 @@ from feedsim import variables
 from feedsim.fields import File, Model, brief, fault
 
 SHIPPED, FOREIGN = "[shipped]", "[foreign]"
+GMS = "gms"  # generalised Maxwell slip, a friction law besides LuGre
+FRICTION_UNITS = {GMS: "friction_gms"}  # law -> unit that has it
 BOOLEAN = ""  # the unit of a signal that is true or false
 
 
@@ -42,13 +45,18 @@ class Signal:
 class Role:
     """What a unit takes from the system and gives to it. The order of the outputs is that of the recorded columns.
 
-    shipped: the archive that fills the role where nothing else is said.
+    shipped: the archive that fills the role where nothing else is said. others: law -> shipped archive of that law.
     """
 
     name: str
     shipped: str
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
+    others: tuple[tuple[str, str], ...] = ()
+
+    def archive_name(self, unit: Model) -> str:
+        """The shipped archive that has the law of `unit`, without its ending."""
+        return dict(self.others).get(getattr(unit, "law", ""), self.shipped)
 
     def shown(self, unit: Model) -> list[str]:
         """The outputs that a unit in this role shows: of the shipped one those that say something."""
@@ -61,7 +69,7 @@ class Role:
         return {signal.name: signal for signal in (*self.inputs, *self.outputs)}
 
 
-def _role(name: str, shipped: str, *needed: str) -> Role:
+def _role(name: str, shipped: str, *needed: str, others: Mapping[str, str] = MappingProxyType({})) -> Role:
     """A role with the signals that the table of the shipped unit declares, in its order."""
     known = {
         name: (each.causality, Signal(name, each.unit if each.kind == "REAL" else BOOLEAN, each.short, name in needed))
@@ -71,11 +79,11 @@ def _role(name: str, shipped: str, *needed: str) -> Role:
         tuple(signal for causality, signal in known.values() if causality in wanted)
         for wanted in (("input",), ("output", "local"))
     )
-    return Role(name, shipped, inputs, outputs)
+    return Role(name, shipped, inputs, outputs, tuple(others.items()))
 
 
 DRIVE = _role("drive", "controller", "x_s", "x_a", "M_a")
-FRICTION_ROLE = _role("friction", "friction", "n_fr", "M_fr")
+FRICTION_ROLE = _role("friction", "friction", "n_fr", "M_fr", others=FRICTION_UNITS)
 
 VariableName = Annotated[StrictStr, Field(min_length=1)]
 

@@ -49,9 +49,16 @@ class Parts:
         """Component, the first that is made from it -> file name of a shipped archive, as runs know it."""
         if self.coupling is not None:
             return {self.roles.plant: f"{UNIT}.fmu"}
-        shipped = {"controller": self.roles.shipped_drives, "friction": self.roles.shipped_frictions}
-        first = {found[0]: f"{kind}.fmu" for kind, found in shipped.items() if found}
+        first = {found[0]: f"{kind}.fmu" for kind, found in self.shipped.items()}
         return {self.roles.plant: "plant.fmu", **first}
+
+    @property
+    def shipped(self) -> dict[str, list[str]]:
+        """Name of a shipped archive -> components of drives and frictions that are made from it."""
+        found: dict[str, list[str]] = {}
+        for name in (*self.roles.shipped_drives, *self.roles.shipped_frictions):
+            found.setdefault(str(self.archives[name].description.modelName), []).append(name)
+        return found
 
 
 def cycles(
@@ -112,7 +119,7 @@ def faults(parts: Parts, where: str) -> list[str]:
     for axis, name in roles.setpoints.items():
         if name not in parts.table.x_s:
             found.append(f"{where}: axis {axis}: {roles.setpoint} has no setpoints of an axis {name!r}")
-    for shipped in (roles.shipped_drives, roles.shipped_frictions):
+    for shipped in parts.shipped.values() if parts.coupling is None else ():
         guids = {parts.archives[name].guid for name in shipped}
         if len(guids) > 1:
             found.append(f"{where}: {', '.join(shipped)} are made from different archives ({', '.join(guids)})")
@@ -241,7 +248,9 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
         friction = _foreign(parts, contact, FRICTION_ROLE, told, folder)
     else:
         identified = {key: value for key, value in told.get("friction", {}).items() if key == "identified"}
-        friction = {**_group(parts, contact), **identified}
+        laws = {unit: law for law, unit in FRICTION_ROLE.others} if parts.coupling is None else {}
+        law = laws.get(str(parts.archives[contact].description.modelName))
+        friction = {**({"law": law} if law else {}), **_group(parts, contact), **identified}
     return {
         **limits,
         **{key: value for key, value in told.items() if key in (*limits, "display_sign")},

@@ -78,6 +78,8 @@ def _kind(archive: Archive) -> str:
 
 def _is_shipped(archive: Archive, role: Role) -> bool:
     """By its name and its variables: a unit that calls itself alike, and is another one, is foreign."""
+    if _kind(archive) in dict(role.others).values():
+        return all(name in archive.variables for name, signal in role.signals.items() if signal.needed)
     return _kind(archive) == role.shipped and all(signal in archive.variables for signal in role.signals)
 
 

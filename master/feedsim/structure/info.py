@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feedsim.scenario import Friction
+from feedsim.scenario import FrictionParameters
 from feedsim.structure.assembly import Assembly, Floats, translating_mass
 from feedsim.structure.build import Built
 from feedsim.structure.modes import Modes
@@ -43,7 +43,7 @@ def axis_infos(
     modes: Modes,
     axes: Sequence[str],
     h: float,
-    friction: Mapping[str, Friction] | None = None,
+    friction: Mapping[str, FrictionParameters] | None = None,
     model: tuple[Assembly, Floats] | None = None,
 ) -> tuple[AxisInfo, ...]:
     """Figures of every axis; h is the exchange step [s].
@@ -131,7 +131,7 @@ def info_of_model(
     note: str,
     built: Built,
     step: float,
-    friction: Mapping[str, Friction] | None = None,
+    friction: Mapping[str, FrictionParameters] | None = None,
     warnings: Sequence[str] = (),
 ) -> MachineInfo:
     """All figures of a machine whose structure was built; `warnings` beside those of the build."""
@@ -156,7 +156,7 @@ def info_of_table(
     modes: Modes,
     pose: Mapping[str, float],
     step: float,
-    friction: Mapping[str, Friction] | None = None,
+    friction: Mapping[str, FrictionParameters] | None = None,
 ) -> MachineInfo:
     """The figures that a table of modes gives by itself."""
     return MachineInfo(

@@ -24,7 +24,7 @@ exit codes:
   4  the archive cannot be written
 """
 
-_UNIT_HELP = "plant, controller, friction, setpoint, machine, or a unit's folder"
+_UNIT_HELP = "plant, controller, friction, friction_gms, setpoint, machine, or a unit's folder"
 
 
 def _parser() -> argparse.ArgumentParser:

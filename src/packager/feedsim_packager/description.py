@@ -40,6 +40,7 @@ TYPES = {
     "J": ("Energy", "Energy"),
     "W": ("Power", "Power"),
     "N.m": ("Torque", "Torque"),
+    "N.m/s": ("TorqueRate", "TorquePerTime"),
     "N.m/rad": ("RotationalStiffness", "RotationalSpringConstant"),
     "N.m.s/rad": ("RotationalDamping", "RotationalDampingConstant"),
     "N.m/A": ("TorqueConstant", "ElectricalTorqueConstant"),

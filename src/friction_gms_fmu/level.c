@@ -1,0 +1,2 @@
+/* The torque over speed, once more for this law. */
+#include "../friction_fmu/lugre.c"

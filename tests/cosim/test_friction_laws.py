@@ -1,0 +1,94 @@
+"""Another shipped friction law on an axis: chosen in the machine file, run, judged, exported and read again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import feedsim as fs
+from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.errors import InputError
+from feedsim.linear.judgement import Bristles
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+PARAMETERS = {
+    "sigma_0": "300 N.m/rad", "sigma_1": "0.8 N.m.s/rad", "sigma_2": "0.006 N.m.s/rad", "F_C": "1.6 N.m",
+    "F_S": "2.1 N.m", "v_s": "0.6 rad/s", "F_log": "0.4 N.m", "spread": "30", "C": "150 N.m/s",
+}  # fmt: skip
+
+
+def gms(**changes: str) -> str:
+    return f"{{law: gms, {', '.join(f'{name}: {value}' for name, value in (PARAMETERS | changes).items())}}}"
+
+
+def test_a_run_is_of_that_law(fmus: Path) -> None:
+    """The recorded torque is the law's along the recorded speed."""
+    result = fs.run(SCENARIOS / "z_positioning.yaml", set=[f"machine.axes.Z.friction={gms()}"], fmus=fmus)
+    trace = result.trace
+    assert {"Z.z", "Z.k"} <= set(trace.columns)
+    assert not {"Z.c", "Z.lambda"} & set(trace.columns)
+    friction = result.scenario.machine.axes["Z"].friction
+    assert friction.law == "gms"
+    with FrictionLaw(fmus, "friction_gms") as law:
+        parameters = {name: float(value) for name, value in friction.parameters().items()}
+        expected = law(parameters, trace["Z.n_a"], float(trace.time[1] - trace.time[0]))
+    # The unit sees n_fr, which is n_a here; the exchange extrapolates M_fr over a cycle, and rows are thinned.
+    assert np.corrcoef(trace["Z.M_fr"], expected)[0, 1] > 0.999
+
+
+def test_a_file_may_say_its_law(fmus: Path, tmp_path: Path) -> None:
+    file = tmp_path / "friction.yaml"
+    for law, known in (("gms", "GmsFriction"), ("lugre", "Friction")):
+        lines = [f"law: {law}", *(f"{n}: {v}" for n, v in PARAMETERS.items() if n not in ("spread", "C"))]
+        file.write_text("\n".join(lines) + "\n")
+        machine = fs.load_machine(SCENARIOS / "machines" / "test_centre", [f"axes.Z.friction={file}"])
+        assert type(machine.axes["Z"].friction).__name__ == known
+        assert "law" not in machine.axes["Z"].friction.parameters()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (f"axes.Z.friction={gms().replace('gms', 'dahl')}", "'dahl' is no friction law; allowed: lugre, gms"),
+        (f"axes.Z.friction={gms(W='2 deg')}", "W: unknown key; allowed: law, sigma_0"),
+        (f"axes.Z.friction={gms(spread='0.5')}", "spread"),
+        (f"axes.Z.friction={gms(F_S='1 N.m')}", "F_S 1 N.m is smaller than F_C 1.6 N.m"),
+    ],
+)
+def test_what_is_no_such_law_is_refused(change: str, words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        fs.load_machine(SCENARIOS / "machines" / "test_centre", [change])
+    assert words in str(raised.value)
+
+
+def test_the_guide_takes_no_share_of_it() -> None:
+    with pytest.raises(InputError, match="this friction has the law gms"):
+        fs.load_machine(
+            SCENARIOS / "machines" / "test_centre", [f"axes.Z.friction={gms()}", "axes.Z.guide={share: 30 %}"]
+        )
+
+
+def test_what_needs_lugre_says_so(fmus: Path) -> None:
+    scenario, change = SCENARIOS / "z_positioning.yaml", f"machine.axes.Z.friction={gms()}"
+    with pytest.raises(InputError, match="axis Z: its friction has the law gms; one unit holds LuGre alone"):
+        fs.run(scenario, set=[change, "coupling.units=one"], fmus=fmus)
+    with pytest.raises(InputError, match=r"axis Z: its friction has the law gms; .* needs LuGre"):
+        fs.tune_drive(scenario, "Z", set=[change], fmus=fmus)
+
+
+def test_at_rest_all_elements_are_springs() -> None:
+    machine = fs.load_machine(SCENARIOS / "machines" / "test_centre", [f"axes.Z.friction={gms()}"])
+    assert Bristles.of(machine.shipped_frictions["Z"]) == (300.0, 0.8, 0.006)
+
+
+def test_an_ssp_keeps_the_law(fmus: Path, tmp_path: Path) -> None:
+    scenario, change = SCENARIOS / "z_positioning.yaml", f"machine.axes.Z.friction={gms()}"
+    fs.write_ssp(scenario, tmp_path / "machine.ssp", set=[change], fmus=fmus)
+    again = fs.run(tmp_path / "machine.ssp")
+    assert again.scenario.machine.axes["Z"].friction.law == "gms"
+    assert again.scenario.machine.axes["X"].friction.law == "lugre"
+    first = fs.run(scenario, set=[change], fmus=fmus)
+    for name in ("Z.x_a", "Z.M_fr", "Z.k"):
+        np.testing.assert_array_equal(again.trace[name], first.trace[name])

@@ -20,7 +20,8 @@ Curve = Callable[[Floats], Floats]
 STEP_PER_DAMPING = 1 / 3
 GRID_STEPS = (5e-4, 1e-2)  # finest, coarsest relative step of the grid
 INSIDE = 15  # points looked at within every bracket in one call of the curve, which costs little more than a single one
-CROSSING_ROUNDS = 10  # each narrows a bracket to 1/16: a step of the grid to 1e-14 of the frequency
+CROSSING_ROUNDS = 24  # at most: every other one narrows a bracket to 1/16, the others to what the chord is off
+CHORD_OFFSETS = np.r_[-(8.0 ** np.arange(-1, -8, -1)), 0.0, 8.0 ** np.arange(-7, 0)]  # shares of a bracket, INSIDE
 EXTREME_ROUNDS = 6  # each narrows a bracket to 1/8: two steps to 1e-7; an extreme's place shows to the rounding's root
 
 
@@ -54,14 +55,26 @@ def crossings(curve: Curve, frequency: Floats, values: Floats | None = None) -> 
     where = np.flatnonzero(np.isfinite(values[:-1]) & np.isfinite(values[1:]) & ((values[:-1] < 0) != (values[1:] < 0)))
     if not where.size:
         return np.empty(0)
-    low, high, below = frequency[where], frequency[where + 1], values[where] < 0
     each = np.arange(len(where))
-    for _ in range(CROSSING_ROUNDS):
-        places = _places(low, high)
-        changed = (curve(places[1:-1].ravel()) < 0).reshape(INSIDE, -1) != below
-        first = np.where(changed.any(axis=0), changed.argmax(axis=0) + 1, INSIDE + 1)
-        low, high = places[first - 1, each], places[first, each]
-    return np.asarray(0.5 * (low + high))
+    ends, at_ends = frequency[[where, where + 1]], values[[where, where + 1]]
+    for number in range(CROSSING_ROUNDS):
+        low, high = ends
+        if (high - low <= 2 * np.spacing(high)).all():
+            break
+        places = _around_chord(ends, at_ends) if number % 3 else _places(low, high)
+        heights = np.vstack([at_ends[:1], curve(places[1:-1].ravel()).reshape(INSIDE, -1), at_ends[1:]])
+        first = ((heights < 0) != (at_ends[0] < 0)).argmax(axis=0)
+        ends, at_ends = (np.stack([one[first - 1, each], one[first, each]]) for one in (places, heights))
+    return np.asarray(0.5 * (ends[0] + ends[1]))
+
+
+def _around_chord(ends: Floats, values: Floats) -> Floats:
+    """(INSIDE + 2, n) places in n brackets, densest where the chord between the curve's values (2, n) passes 0."""
+    low, high = ends
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.nan_to_num(values[0] / (values[0] - values[1]), nan=0.5)
+    inside = np.clip(low + (high - low) * (share + CHORD_OFFSETS[:, None]), low, high)
+    return np.vstack([low, inside, high])
 
 
 def _places(low: Floats, high: Floats) -> Floats:
@@ -213,10 +226,10 @@ def bandwidth(response: Gain, frequency: Floats) -> Bandwidth:
         return np.asarray(np.abs(response(f)) - THREE_DB)
 
     found = crossings(above, frequency)
-    falling = [float(f) for f in found if above(np.array([f * (1 + 1e-6)]))[0] < 0]
-    if not falling:
+    if not found.size:
         return Bandwidth(math.nan, math.nan)
-    return Bandwidth(falling[0], falling[-1])
+    falling = found[above(found * (1 + 1e-6)) < 0]
+    return Bandwidth(float(falling[0]), float(falling[-1])) if falling.size else Bandwidth(math.nan, math.nan)
 
 
 def delay(response: Gain, frequency: float) -> float:

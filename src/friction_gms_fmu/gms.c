@@ -37,9 +37,19 @@ static double level(const Contact *p, double n, double d) {
 ContactState contact_at(const Contact *p, double z, double c) {
     (void)c;
     ContactState state = {.force = {0}};
-    const double d = direction(z), s = level(p, 0, d);
-    for (int i = 0; i < GMS_ELEMENTS; i++) {
-        state.force[i] = d * fmin(p->stiffness[i] * fabs(z), p->share[i] * s);
+    const double d = direction(z), s = level(p, 0, d), torque = p->sigma_0 * fabs(z);
+    /* The way x at which elements bear that torque together: those that slip, in the order in which they begin to, bear
+     * alpha s, the others k x. */
+    double slipping = 0, sticking = p->sigma_0;
+    int i = 0;
+    while (i < GMS_ELEMENTS && slipping + sticking * (p->share[i] * s / p->stiffness[i]) < torque) {
+        slipping += p->share[i] * s;
+        sticking -= p->stiffness[i];
+        i++;
+    }
+    for (int e = 0; e < GMS_ELEMENTS; e++) {
+        const double most = p->share[e] * s;
+        state.force[e] = d * (e < i ? most : fmin(p->stiffness[e] * ((torque - slipping) / sticking), most));
     }
     return state;
 }
@@ -126,11 +136,10 @@ double contact_torque(const Contact *p, ContactState state, double n, double *sh
     bool slips = false;
     for (int i = 0; i < GMS_ELEMENTS; i++) {
         force += state.force[i];
+        rate += p->stiffness[i] * (n - fabs(n) * (state.force[i] / (p->share[i] * s)));
         if (d != 0 && state.slip[i] == d) {
             slips = true;
-            rate += p->C / s * (d * p->share[i] * s - state.force[i]);
         } else {
-            rate += p->stiffness[i] * n;
             sticking += p->stiffness[i];
         }
     }
@@ -156,11 +165,11 @@ double contact_engaged(const Contact *p, const ContactState *state) {
 
 double contact_torque_by_speed(const Contact *p, const ContactState *state, double n) {
     const double d = direction(n), s = lugre_level(&p->curve, n);
-    /* ds/dn; elements that slip do so at n != 0 */
-    const double s_by_speed = n != 0 ? lugre_level_slope(&p->curve, n) / n : 0;
+    /* n ds/dn, which stays finite at n = 0 */
+    const double s_by_speed = lugre_level_slope(&p->curve, n);
     double rate = 0;
     for (int i = 0; i < GMS_ELEMENTS; i++) {
-        rate += d != 0 && state->slip[i] == d ? p->C * state->force[i] / (s * s) * s_by_speed : p->stiffness[i];
+        rate += p->stiffness[i] * (1 - d * (state->force[i] / (p->share[i] * s)) * (1 - s_by_speed / s));
     }
     return p->sigma_1 / p->sigma_0 * rate + p->sigma_2;
 }

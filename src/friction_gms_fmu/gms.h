@@ -1,7 +1,7 @@
 /* Generalised Maxwell slip (GMS) friction, motor side: rad, rad/s, N.m. The friction contact of friction_fmu/contact.h
  * by another law, with the same functions.
  *
- *   M_fr = sum F_i + sigma_1/sigma_0 sum dF_i/dt + sigma_2 n
+ *   M_fr = sum F_i + sigma_1 sum k_i/sigma_0 (n - |n| F_i/(alpha_i s(n))) + sigma_2 n
  *   an element that sticks:  dF_i/dt = k_i n                                    until |F_i| reaches alpha_i s(n)
  *   an element that slips:   dF_i/dt = sgn(n) C (alpha_i - |F_i|/s(n))          until n passes zero
  *   s(n) = (1 + a sgn n) (F_C + (F_S - F_C) exp(-(|n|/v_s)^beta) + F_log ln(|n|/v_log + 1))      (lugre.h, Eq. 7)
@@ -13,7 +13,8 @@
  *
  *   alpha_i ~ x_i^skew, sum alpha_i = 1          k_i = sigma_0 (alpha_i/x_i) / sum (alpha_j/x_j)
  *
- * |F_i| is of the direction in which the element slips. Pure functions: no memory, no FMI. */
+ * Their damping, sigma_i dz_i/dt, jumps where an element begins to slip; here it is that of LuGre (Eq. 6), which has
+ * vanished there. |F_i| is of the direction in which the element slips. Pure functions: no memory, no FMI. */
 #ifndef FEEDSIM_GMS_H
 #define FEEDSIM_GMS_H
 
@@ -51,7 +52,8 @@ typedef struct ContactState {
  */
 Contact contact_make(const Lugre *lugre, double spread, double skew, double C);
 
-/* State of a contact at rest that was free of torque and then moved by z [rad]; c has no meaning here. */
+/* State of a contact that was free of torque and then moved until its mean deflection is z [rad], or all elements
+ * slip; c has no meaning here. */
 ContactState contact_at(const Contact *p, double z, double c);
 
 /* State after h [s], over which the speed goes in a straight line from n_start to n_end [rad/s]. Split where the speed

@@ -19,8 +19,8 @@ from feedsim.errors import InputError, SimulationError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.free_axis import first_deflection, first_speed, reached, substeps
 from feedsim.identify.friction_file import drift_texts
-from feedsim.identify.open_loop import NEEDED, balanced
-from feedsim.identify.parameters import NO_EFFECT
+from feedsim.identify.open_loop import balanced
+from feedsim.identify.parameters import FRICTION_NAMES, NO_EFFECT
 from feedsim.identify.record import Record
 from feedsim.identify.result import Balance, Estimate
 
@@ -363,7 +363,7 @@ def test_a_motion_that_is_no_number(general: Record, law: FrictionLaw, monkeypat
     assert_refused(balanced([general], law, given), given, "no finite number at 0.5 s")
 
 
-@pytest.mark.parametrize("name", NEEDED)
+@pytest.mark.parametrize("name", [*FRICTION_NAMES, "M_0", "J"])
 def test_an_estimate_that_is_missing(general: Record, law: FrictionLaw, name: str) -> None:
     given = estimates(OFF)
     del given[name]

@@ -78,15 +78,8 @@ def _shown(p: Mapping[str, float], parts: list[Element], n: float) -> tuple[floa
     """M_fr [N.m], z and k at the speed n [rad/s]."""
     side = float(np.sign(n))
     force = math.fsum(each.F for each in parts)
-    rates, sticking = [], []
-    for each in parts:
-        if side and each.slip == side:
-            rates.append(p["C"] * (side * each.alpha - each.F / level(p, n, side)))
-        else:
-            rates.append(each.k * n)
-            sticking.append(each.k)
-    rate = math.fsum(rates)
-    share = math.fsum(sticking) / p["sigma_0"]
+    rate = math.fsum(each.k * (n - abs(n) * each.F / (each.alpha * level(p, n, side))) for each in parts)
+    share = math.fsum(each.k for each in parts if not side or each.slip != side) / p["sigma_0"]
     return force + p["sigma_1"] / p["sigma_0"] * rate + p["sigma_2"] * n, force / p["sigma_0"], share
 
 

@@ -12,7 +12,7 @@ import math
 NORMAL_95 = 1.959964  # standard deviations on either side that hold 95 % of a normal distribution
 MAX_RELATIVE_HALF = 0.5  # half of the interval of a value that is determined, over the value
 # Loads, delays and differences of both directions have no scale of their own to which an interval could be compared.
-ANY_VALUE = frozenset({"M_0", "asymmetry", "delay", "k_ffw", "T_sym", "T_dyn"})
+ANY_VALUE = frozenset({"M_0", "asymmetry", "skew", "delay", "k_ffw", "T_sym", "T_dyn"})
 
 
 def half_width(sigma: float) -> float:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.identify.parameters import FRICTION_NAMES, level
+from feedsim.identify.parameters import level
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Drift
 from feedsim.identify.torque import RecordTorque, deflection
@@ -51,7 +51,7 @@ def reached(record: Record, law: FrictionLaw, values: Mapping[str, float]) -> Ar
     first, n = first_speed(record.angle, record.interval)
     torque = middle_torque(record, values["delay"])
     z = first_deflection(values, n, float(torque[0]) - values["M_0"])
-    parameters = {name: values[name] for name in FRICTION_NAMES}
+    parameters = {name: values[name] for name in law.names}
     angle, _ = law.free_axis(parameters, values["J"], values["M_0"], torque, record.interval, n=n, z=z, substeps=steps)
     return np.asarray(first + angle, dtype=np.float64)
 
@@ -83,7 +83,7 @@ class OpenLoop:
         h = self.record.interval
         drifts = values[self.change] * self._elapsed(self.record.time[:-1] + h / 2)
         torque = self.torque(values["delay"]) - drifts + push
-        parameters = {name: values[name] for name in FRICTION_NAMES}
+        parameters = {name: values[name] for name in self.model.law.names}
         z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
         steps = substeps(values, h)
         free_axis = self.model.law.free_axis
@@ -162,7 +162,7 @@ def first_deflection(values: Mapping[str, float], n: float, torque: float) -> fl
 
     if abs(n) * START_FIT[0] > most(float(np.sign(n))):
         return float(np.sign(n)) * most(float(np.sign(n)))
-    share = 1.0 if values["W"] == 0 else values["gamma"] + (1 - values["gamma"]) / 2
+    share = 1.0 if values.get("W", 0.0) == 0 else values["gamma"] + (1 - values["gamma"]) / 2
     return float(np.clip(torque / (share * values["sigma_0"]), -most(-1.0), most(1.0)))
 
 

@@ -19,7 +19,8 @@ from feedsim.fields import Quantity
 from feedsim.identify.read import Provenance, distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Balance, Estimate, Identification
-from feedsim.scenario import Friction, Subject
+from feedsim.scenario import Friction, FrictionParameters, GmsFriction, Subject
+from feedsim.scenario.roles import GMS
 
 FRICTION_FILE = "friction.yaml"
 # Relative 5e-8 at most: what is calculated from the file is that of the fit to 1e-6, and a person can still read it.
@@ -81,9 +82,10 @@ def friction_yaml(identified: Identified, software: Mapping[str, str]) -> str:
     Raises OutputError where the values make no friction, e.g. one beyond its range.
     """
     estimates = identified.found.estimates
-    lines = {name: _line(estimates[name]) for name in Friction.model_fields if name in estimates}
+    model = GmsFriction if "spread" in estimates else Friction
+    lines = {name: _line(estimates[name]) for name in model.model_fields if name in estimates}
     origin = _origin(identified, software)
-    return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION_FILE)
+    return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION_FILE, model=model)
 
 
 def constant_load_hint(found: Identification) -> str:
@@ -247,25 +249,32 @@ def _quantity(value: float, unit: str) -> str | float:
 
 
 def friction_text(
-    parameters: Mapping[str, Line], identified: Mapping[str, Any], head: Sequence[str] = (), *, name: str
+    parameters: Mapping[str, Line],
+    identified: Mapping[str, Any],
+    head: Sequence[str] = (),
+    *,
+    name: str,
+    model: type[FrictionParameters] = Friction,
 ) -> str:
     """Content of a friction file.
 
-    parameters: keys of Friction, SI values. identified: plain values (text, numbers, lists, groups), kept by readers
+    parameters: keys of `model`, SI values. identified: plain values (text, numbers, lists, groups), kept by readers
     and not calculated with. head: lines of the comment at the top. name: of the file, for messages. Raises OutputError:
     a value is outside its allowed range or not finite, a key is unknown or missing.
     """
-    known = _units()
+    known = _units(model)
+    law = {"law": GMS} if model is GmsFriction else {}
     if unknown := [key for key in parameters if key not in known]:
         raise OutputError(
             f"{name} is not written: {unknown[0]!r} is no friction parameter; there are {', '.join(known)}"
         )
     rounded = {key: float(f"{line.value:.{DIGITS}g}") for key, line in parameters.items()}
     try:
-        Friction.model_validate({**rounded, "identified": dict(identified)})
+        model.model_validate({**law, **rounded, "identified": dict(identified)})
     except ValueError as error:  # pydantic's
         raise OutputError(f"{name} is not written: {_first_fault(error)}") from None
     lines = [f"# {line}".rstrip() for text in head for line in text.splitlines() or [""]]
+    lines += [f"{key}: {value}" for key, value in law.items()]
     entries = [
         (f"{key}: {_number(rounded[key])} {known[key]}".removesuffix(" 1"), key) for key in known if key in rounded
     ]
@@ -299,9 +308,9 @@ _Dumper.add_multi_representer(str, _text)  # findings carry their severity as a 
 _Dumper.add_representer(list, _list)
 
 
-def _units() -> dict[str, str]:
+def _units(model: type[FrictionParameters]) -> dict[str, str]:
     """Name -> SI unit of every friction parameter, in the order of the file."""
-    found = {name: Quantity.of(info) for name, info in Friction.model_fields.items()}
+    found = {name: Quantity.of(info) for name, info in model.model_fields.items()}
     return {name: quantity.unit for name, quantity in found.items() if quantity is not None}
 
 

@@ -53,7 +53,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
         return None
     found.sort(key=lambda pair: -pair[0])
     # Damping and engagement first: they lean on the others.
-    order = ("asymmetry", "gamma", "W", "F_log", "F_S", "v_s", "sigma_1", "sigma_2")
+    order = ("asymmetry", "gamma", "W", "skew", "spread", "F_log", "F_S", "v_s", "sigma_1", "sigma_2")
     for name in order:
         for _, candidate in found:
             if name in candidate.held:
@@ -92,7 +92,9 @@ def _complete(judged: Verdict, free: Collection[str], values: Mapping[str, float
         held = {name: NO_EFFECT[name] for name in ("W", "gamma") if name in free}
     if {"F_S", "v_s"} & set(held):
         held = {name: values["F_C"] if name == "F_S" else values["v_s"] for name in ("F_S", "v_s") if name in free}
-    for name in ("sigma_1", "sigma_2", "F_log", "asymmetry"):
+    if "spread" in held:  # what the shares lean on
+        held |= {"skew": NO_EFFECT["skew"]} if "skew" in free else {}
+    for name in ("sigma_1", "sigma_2", "F_log", "asymmetry", "skew"):
         if name in held:
             held[name] = NO_EFFECT[name]
     return Verdict(held, judged.name, judged.reason)

@@ -33,7 +33,6 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.estimation.least_squares import Model
 from feedsim.estimation.parameter import Parameter
 from feedsim.identify.free_axis import MOST_STEPS, OpenLoop, substeps
-from feedsim.identify.parameters import FRICTION_NAMES
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Balance, Estimate
 from feedsim.identify.torque import RecordTorque, deflection
@@ -53,7 +52,6 @@ DRAWS = 24  # how often the torque residuals of stretches are turned
 LOAD_CHANGE = "change of M_0 over record"  # with its number, among the values
 SINES = "sines; the open loop needs general motion"
 NO_DRIFT = "its interval includes 0: the load is taken as constant"
-NEEDED = (*FRICTION_NAMES, "M_0", "J")
 
 
 def balanced(
@@ -72,7 +70,7 @@ def balanced(
 
     Raises InputError: an estimate is missing, or a parameter that the law refuses.
     """
-    missing = [name for name in NEEDED if name not in estimates]
+    missing = [name for name in (*law.names, "M_0", "J") if name not in estimates]
     if missing:
         raise InputError(f"open loop: no value of {', '.join(missing)}")
     values = {name: each.value for name, each in estimates.items()}
@@ -205,7 +203,7 @@ def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, floa
         return "nothing moves"
     if any(part.kind == "sine" for part in model.parts):
         return SINES
-    way = SLIDING * max(deflection(values), values["W"])
+    way = SLIDING * max(deflection(values), values.get("W", 0.0))
     if max(2 * part.amplitude for part in model.parts) < way:
         return f"no move is longer than {SLIDING:g} times the way of pre-sliding"
     return ""

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 
+from feedsim import variables
 from feedsim.errors import InputError
-from feedsim.identify.parameters import FRICTION_NAMES, PARAMETER_KINDS, Kind, check_held, estimate
+from feedsim.identify.parameters import PARAMETER_KINDS, Kind, check_held, estimate
 from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
-from feedsim.scenario import Machine
+from feedsim.scenario import Friction, Machine
+from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
 from feedsim.structure import Modes
 from feedsim.structure.modes import checked_modes
 
@@ -31,6 +33,7 @@ class Options:
         hold: name -> SI value that a parameter keeps. free: names that are estimated although they are usually held.
         fallback: name -> SI value, for what the records do not determine: the friction of the machine so far.
         stages: 1 stationary friction, 2 pre-sliding.
+        law: that is fitted.
         seed: of the random starts.
 
     Raises InputError: a lead or an inertia that is not above 0, a delay or a value of `hold` outside its range
@@ -47,10 +50,11 @@ class Options:
     free: tuple[str, ...] = ()
     fallback: Mapping[str, float] = field(default_factory=dict)
     stages: tuple[int, ...] = STAGES
+    law: str = Friction.law
     seed: int = 0
 
     def __post_init__(self) -> None:
-        known = (*FRICTION_NAMES, "M_0")
+        known = (*variables.parameters(FRICTION_UNITS.get(self.law, FRICTION_ROLE.shipped)), "M_0")
         for name in (*self.hold, *self.free):
             if name not in known:
                 raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")
@@ -73,7 +77,7 @@ class Asked:
         inertia: seen at the motor [kg.m2]; mass: the same at the slide [kg], and in words; None: not said.
         delay: of the torque channel [s]; None: not said.
         estimated: "inertia", "delay", or both: to be estimated, whatever mapping and machine say.
-        hold, free, stages: as in :class:`Options`.
+        hold, free, stages, law: as in :class:`Options`.
     """
 
     axis: str | None = None
@@ -85,6 +89,7 @@ class Asked:
     hold: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()
     stages: tuple[int, ...] = STAGES
+    law: str = Friction.law
 
     def with_traces(self, sources: Sequence[Provenance], machine: Machine | None = None) -> Options:
         """What is known when the traces are read: this, else what their mapping says, else the machine.
@@ -121,6 +126,7 @@ class Asked:
             # The friction that the machine file has: for parameters that the traces do not determine.
             fallback={name: float(value) for name, value in friction.parameters().items()} if friction else {},
             stages=self.stages,
+            law=self.law,
         )
 
     def _axis(self, sources: Sequence[Provenance]) -> str:

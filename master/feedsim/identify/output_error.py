@@ -36,6 +36,7 @@ from feedsim.identify.parameters import (
     PRE_SLIDING,
     STATIONARY,
     estimate,
+    names_of,
 )
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
@@ -60,6 +61,8 @@ REFINEMENTS = (
     ("F_S", "v_s"),
     ("asymmetry",),
     ("W", "gamma"),
+    ("spread",),
+    ("skew",),
     ("F_S", "v_s"),  # once more: what engages passed for it, or hid it
     ("F_log",),
 )
@@ -133,7 +136,7 @@ def dynamic(
         raise InputError("stage 2: nothing moves in " + ", ".join(record.name for record in records))
     known = _known(fine, prior, J, delay, hold or {}, free)
     weights = [_first_weights(model) for model in fine]
-    base = _base(known, prior is not None, delay is None)
+    base = _base(known, law.names, prior is not None, delay is None)
     tell("start values", 0.1)
     search = Search(fine, known.prior, weights)
     states = np.zeros((len(fine), 2))
@@ -145,8 +148,9 @@ def dynamic(
     held = dict(known.held)
     found, base = _told(search, found, base, known, held)
     if prior is None:
-        for k, group in enumerate(REFINEMENTS):
-            tell("refinements", 0.4 + 0.06 * k)
+        groups = [group for group in REFINEMENTS if set(group) <= set(law.names)]
+        for k, group in enumerate(groups):
+            tell("refinements", 0.4 + 0.48 * k / len(groups))
             found, base = _refined(search, coarse, found, base, group, known, held)
             search = Search(fine, known.prior, _weights(fine, found, weights))
     tell("final fit", 0.9)
@@ -241,11 +245,11 @@ def _sliding(fine: Sequence[RecordTorque], share: float = 0.05) -> Array:
     return np.asarray(speed[np.abs(speed) > share * np.max(np.abs(speed))])
 
 
-def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:
+def _base(known: _Known, names: Collection[str], with_prior: bool, with_delay: bool) -> list[str]:
     """What is free at first."""
     wanted = ["sigma_0", "J", *(["delay"] if with_delay else [])]
     if with_prior:
-        wanted += [*(name for name in PRE_SLIDING if name not in wanted), *STATIONARY]
+        wanted += [*(name for name in PRE_SLIDING if name not in wanted and name in names), *STATIONARY]
         wanted += [name for name in DEFAULT_SHAPES if name in known.told]
     else:
         wanted += ["F_C", "sigma_2", "M_0", *(name for name in DEFAULT_SHAPES if name not in known.held)]
@@ -312,7 +316,11 @@ def _refined(
         held["asymmetry"] = "undetermined", "friction that hardly depends on speed leaves it a constant load"
         return found, base
     general = not has_sines(search.models)
-    if general and {"sigma_1", "W"} & set(added) and (rows := turnover_rows(search.models, found)) < MIN_TURNOVER_ROWS:
+    if (
+        general
+        and {"sigma_1", "W", "spread", "skew"} & set(added)
+        and (rows := turnover_rows(search.models, found)) < MIN_TURNOVER_ROWS
+    ):
         reason = f"bristles turn over within {rows:.0f} rows of the log"
         held |= dict.fromkeys(added, ("undetermined", reason))
         return found, base
@@ -373,12 +381,12 @@ def _result(
     I_P: float | None,
     prior: Stationary | None,
 ) -> Dynamic:
-    names = tuple(name for name in PARAMETER_KINDS if name in base)
+    names = tuple(name for name in names_of(fine[0].law) if name in base)
     found = honest.solution
     covariance = found.covariance(names)
     sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     estimates = {}
-    for name in PARAMETER_KINDS:
+    for name in names_of(fine[0].law):
         status, reason = held.get(name, ("estimated" if name in names else "held", ""))
         estimates[name] = estimate(name, found.values[name], sigma.get(name, nan), status, reason)
     without = dict(sigma)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, nan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,13 +18,19 @@ from feedsim.errors import InputError
 from feedsim.fields import Quantity
 from feedsim.identify.record import Array
 from feedsim.identify.result import Estimate, Status
-from feedsim.scenario import Friction
+from feedsim.scenario import Friction, GmsFriction
+from feedsim.scenario.roles import FRICTION_UNITS
 
-_TABLE = variables.parameters("friction")
-FRICTION_NAMES = tuple(_TABLE)
+if TYPE_CHECKING:
+    from feedsim.cosim.friction_law import FrictionLaw
+
+FRICTION_NAMES = tuple(variables.parameters("friction"))
+# Of all laws; which of them a law has, it says itself (FrictionLaw.names).
+_TABLE = {**variables.parameters("friction"), **{name: row for unit in FRICTION_UNITS.values()
+          for name, row in variables.parameters(unit).items() if name not in FRICTION_NAMES}}  # fmt: skip
 # What reversals determine (stage 2), and what plateaus of constant speed determine (stage 1), in the order in which it
 # is shown.
-PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
+PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma", "spread", "skew")
 CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
 RIGID_AXIS_NAMES = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
 # Held at the unit's start values unless they are freed: no record of friction alone determines them well.
@@ -33,11 +39,16 @@ STATIONARY = tuple(
     name for name in CONSTANT_SPEED if name not in DEFAULT_SHAPES
 )  # all of stage 1 that stage 2 takes over
 # no stage determines them
-FIXED = tuple(name for name in FRICTION_NAMES if name not in (*PRE_SLIDING, *CONSTANT_SPEED))
+FIXED = tuple(name for name in _TABLE if name not in (*PRE_SLIDING, *CONSTANT_SPEED))
 # Where a parameter has no effect: what machine files mean that do not give it; v_s where F_S is F_C.
 NO_EFFECT: Mapping[str, float] = {
     **{"sigma_1": 0.0, "sigma_2": 0.0, "M_0": 0.0, "v_s": float(_TABLE["v_s"].start)},
-    **{name: field.default for name in FRICTION_NAMES if not (field := Friction.model_fields[name]).is_required()},
+    **{
+        name: field.default
+        for model in (GmsFriction, Friction)
+        for name, field in model.model_fields.items()
+        if name in _TABLE and not field.is_required()
+    },
 }
 # F_S moves as its excess over F_C: F_S >= F_C then is a bound like any other.
 EXCESS = "excess"
@@ -84,6 +95,11 @@ PARAMETER_KINDS = {
     # Wide against the offsets between the channels of one log; what is beyond is a wrong unit, or two logs.
     "delay": Kind("s", "delay of the torque channel against the motion", -20e-3, 20e-3),
 }
+
+
+def names_of(law: FrictionLaw) -> tuple[str, ...]:
+    """What can be estimated with a law, in the order in which it is shown: its parameters, M_0, J and the delay."""
+    return tuple(name for name in PARAMETER_KINDS if name in law.names or name not in _TABLE)
 
 
 def estimate(name: str, value: float, sigma: float = nan, status: Status = "estimated", reason: str = "") -> Estimate:
@@ -161,7 +177,8 @@ def plateau_ranges(slow: float, fast: float, top: float) -> dict[str, Range]:
 
 
 # Stage 2, likewise.
-DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5}  # either way from their start, which is of the right order
+# either way from their start, which is of the right order
+DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5, "spread": 1.5}
 DELAYS = (-5e-3, 20e-3)  # [s]: filters and buses make the torque late; what makes it early is less
 MOST_EXCESS = 2.0  # of the friction: static friction beyond three times Coulomb's is none
 MOST_ASYMMETRY = 0.6  # beyond, it plays the constant load's part
@@ -175,12 +192,14 @@ def reversal_ranges(start: Mapping[str, float]) -> dict[str, Range]:
     found: dict[str, dict[str, Any]] = {name: {} for name in PARAMETER_KINDS}
     for name, decades in DECADES.items():  # known by their order of magnitude at first, and above 0
         span = 10**decades
-        found[name] = {"lower": start[name] / span, "upper": start[name] * span, "log": True}
+        value = start.get(name, NO_EFFECT.get(name, 0.0))
+        found[name] = {"lower": value / span, "upper": value * span, "log": True}
     for name in ("F_C", "beta", "v_log", "J"):
         found[name] = {"lower": LEAST_SHARE * start[name]}
     found["sigma_1"] = {"scale": max(abs(start["sigma_1"]), 1e-4 * start["sigma_0"])}
     found["sigma_2"] = {"scale": max(abs(start["sigma_2"]), 1e-4 * F_C)}
     found["gamma"] = {"lower": LEAST_GAMMA, "scale": 1.0}
+    found["skew"] = {"scale": 1.0}
     found["F_log"] = found["M_0"] = {"scale": F_C}
     found["asymmetry"] = {"lower": -MOST_ASYMMETRY, "upper": MOST_ASYMMETRY, "scale": 0.1}
     found["delay"] = {"lower": DELAYS[0], "upper": DELAYS[1], "scale": 1e-4}

@@ -144,6 +144,7 @@ MOST_STIFFNESSES = 10
 ZONES = (3.0, 7.0, 14.0)  # width of the engaging zone over the largest deflection F_C/sigma_0
 GAMMA_STARTS = (0.25, 0.6)  # gamma
 PURE = (0.0, 1.0)  # W and gamma of pure LuGre
+SPREADS, SKEWS = (5.0, 20.0, 80.0), (0.0, 0.5)  # of the elements of Maxwell slip
 
 
 def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown: Collection[str]) -> dict[str, float]:
@@ -206,21 +207,28 @@ def stiffnesses(models: Sequence[RecordTorque], values: Mapping[str, float]) -> 
 
 
 def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Collection[str]) -> list[dict[str, float]]:
-    """The best sets of sigma_0, sigma_1, W, gamma of a grid, each of another W and gamma; the best one first.
+    """The best sets of sigma_0, sigma_1, W, gamma (spread, skew) of a grid, each of another shape; the best one first.
 
     The law is linear in sigma_1: its best value comes with every point of the grid. Parameters that are not free keep
     their values.
     """
     zones = [PURE, *((zone, share) for zone in ZONES for share in GAMMA_STARTS)]
-    shapes: Sequence[tuple[float, float] | None] = zones if {"W", "gamma"} <= set(free) else [None]
+    shapes: Sequence[tuple[float, float] | None] = [None]
+    engaging = {"W", "gamma"} <= set(free)
+    if engaging:
+        shapes = zones
+    elif {"spread", "skew"} <= set(free):
+        shapes = [(spread, skew) for spread in SPREADS for skew in SKEWS]
     levels = stiffnesses(models, values) if "sigma_0" in free else np.array([values["sigma_0"]])
     found: list[tuple[float, dict[str, float]]] = []
     for shape in shapes:
         best: tuple[float, dict[str, float]] | None = None
         for sigma_0 in levels:
             trial = {**values, "sigma_0": float(sigma_0)}
-            if shape is not None:
+            if shape is not None and engaging:
                 trial |= {"W": shape[0] * values["F_C"] / float(sigma_0), "gamma": shape[1]}
+            elif shape is not None:
+                trial |= {"spread": shape[0], "skew": shape[1]}
             cost = _damped(models, trial, "sigma_1" in free)
             if best is None or cost < best[0]:
                 best = cost, trial

@@ -25,7 +25,6 @@ from feedsim.identify.parameters import (
     CONSTANT_SPEED,
     DEFAULT_SHAPES,
     FIXED,
-    FRICTION_NAMES,
     NO_EFFECT,
     PRE_SLIDING,
     estimate,
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many of its steps are done, of how many
 
-RESULT_ORDER = (*FRICTION_NAMES, "M_0", "J", "delay")
 # Pre-sliding of an axis without a word from its records: bristles that give 5 mrad at break-away and relax in 2.5 ms.
 USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
 # relative, standard deviations: a given inertia that is off by both is worth a warning
@@ -131,7 +129,9 @@ class _Run:
             axis=options.axis,
             I_P=options.I_P,
             estimates={name: each.judged() for name, each in estimates.items()},
-            correlation=merged_correlation(first if prior else None, second) if believed else NOTHING_TOLD,
+            correlation=merged_correlation(first if prior else None, second, self.law.names)
+            if believed
+            else NOTHING_TOLD,
             stationary=first,
             dynamic=second,
             warnings=tuple(dict.fromkeys(self.warnings)),
@@ -220,7 +220,7 @@ class _Run:
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
             self.prior = len(Points.of(first.plateaus).speeds) >= FEW_SPEEDS
-        hold, free = self._held((*FRICTION_NAMES, "M_0"))
+        hold, free = self._held((*self.law.names, "M_0"))
         rigid = self._rigid(others) if others and self.options.J is None else None
         try:
             return dynamic(
@@ -275,7 +275,7 @@ class _Run:
 
     def _held(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
         """What of `names` is held at which value, besides the usual ones, and what is freed."""
-        constant = {name: self.options.fallback.get(name, NO_EFFECT[name]) for name in FIXED}
+        constant = {name: self.options.fallback.get(name, NO_EFFECT[name]) for name in FIXED if name in self.law.names}
         held = {name: value for name, value in (constant | dict(self.options.hold)).items() if name in names}
         return held, tuple(name for name in self.options.free if name in names)
 
@@ -296,7 +296,7 @@ class _Run:
         if "delay" not in found and self.options.delay is not None:
             reason = "not used: stage 2 is absent"
             found["delay"] = estimate("delay", self.options.delay, status="given", reason=reason)
-        for name in FRICTION_NAMES:
+        for name in self.law.names:
             if name not in found:
                 found[name] = self._absent(name, found)
         if found["F_S"].value < found["F_C"].value:
@@ -304,7 +304,7 @@ class _Run:
             found["F_S"] = replace(
                 found["F_S"], value=found["F_C"].value, sigma=nan, status="undetermined", reason=reason
             )
-        return {name: found[name] for name in RESULT_ORDER if name in found}
+        return {name: found[name] for name in (*self.law.names, "M_0", "J", "delay") if name in found}
 
     def _absent(self, name: str, found: Mapping[str, Estimate]) -> Estimate:
         """A parameter that no stage determines."""
@@ -360,7 +360,7 @@ def transitions(records: Sequence[Record]) -> tuple[Record, ...]:
     return reversing or tuple(r for r in records if both and ways[id(r)])
 
 
-def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Correlation:
+def merged_correlation(first: Stationary | None, second: Dynamic | None, law: Sequence[str]) -> Correlation:
     """Of all that was estimated; nan between a parameter that stage 1 alone determines and one that stage 2 alone
     does."""
     stages = [stage.correlation for stage in (second, first) if stage is not None]
@@ -370,7 +370,8 @@ def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Corr
         at = [names.index(name) for name in each.names]
         matrix[np.ix_(at, at)] = each.matrix
     np.fill_diagonal(matrix, 1.0)
-    order = [name for name in RESULT_ORDER if name in names] + [name for name in names if name not in RESULT_ORDER]
+    known = (*law, "M_0", "J", "delay")
+    order = [name for name in known if name in names] + [name for name in names if name not in known]
     at = [names.index(name) for name in order]
     return Correlation(tuple(order), matrix[np.ix_(at, at)])
 

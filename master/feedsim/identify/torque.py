@@ -11,7 +11,6 @@ import numpy as np
 
 from feedsim.identify.averages import resolution
 from feedsim.identify.motion import MIN_STRETCH_ROWS, Motion, Part, motion, noise_of, parts
-from feedsim.identify.parameters import FRICTION_NAMES
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Plateau
 
@@ -72,13 +71,13 @@ class RecordTorque:
 
     def friction(self, values: Mapping[str, float], z: float, c: float) -> Array:
         """(rows,) friction torque [N.m] without its viscous part."""
-        key = (*(values[name] for name in FRICTION_NAMES if name != "sigma_2"), values["delay"], z, c)
+        key = (*(values[name] for name in self.law.names if name != "sigma_2"), values["delay"], z, c)
         if key not in self._law:
             fine = self.moved(values["delay"])[0]
             # Linear in sigma_2: that part is added outside and costs no run.
-            law = {name: values[name] for name in FRICTION_NAMES} | {"sigma_2": 0.0}
+            law = {name: values[name] for name in self.law.names} | {"sigma_2": 0.0}
             h, start = self.record.interval / self.count, z * deflection(values)
-            found = self.law(law, fine, h, z=start, c=c * values["W"])
+            found = self.law(law, fine, h, z=start, c=c * values.get("W", 0.0))
             if len(self._law) >= MAX_CACHED_RESPONSES:
                 del self._law[next(iter(self._law))]
             self._law[key] = np.asarray(found[:: self.count][self.rows], dtype=np.float64)

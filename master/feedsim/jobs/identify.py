@@ -25,7 +25,8 @@ from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import identify as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content
-from feedsim.scenario import load_subject
+from feedsim.scenario import Friction, load_subject
+from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
 
 ESTIMATE = "estimate"  # of inertia and delay: whatever mapping and machine say
 AXIS = "{axis}"  # in the name of a folder: the axis, in small letters
@@ -118,6 +119,7 @@ def identify(
     hold: Mapping[str, Value] | None = None,
     free: str | Sequence[str] = (),
     stages: str | int | Sequence[int] = "both",
+    law: str = Friction.law,
     fmus: File | None = None,
     out: File | None = None,
     figures: Sequence[str] = (),
@@ -137,6 +139,7 @@ def identify(
         delay: by how much the torque is logged later than the motion [s], or "estimate".
         hold: name -> value that a parameter keeps, SI or a text. free: names of parameters that are else held.
         stages: 1 (Stribeck curve), 2 (pre-sliding) or "both".
+        law: of the pre-sliding, "lugre" or "gms" (generalised Maxwell slip).
         fmus: folder of the archives.
         out: folder that the result is written to, "{axis}" in it is the axis in small letters; None:
             :meth:`Result.save` does it.
@@ -153,8 +156,13 @@ def identify(
     True
     """
     files = [Path(file) for file in ([traces] if isinstance(traces, str | Path) else traces)]
-    asked = _asked(axis, inertia, mass, delay, hold or {}, listed(free), stages)
+    if law not in (laws := (Friction.law, *FRICTION_UNITS)):
+        raise InputError(f"{spelt('law')} {law}: {' or '.join(laws)} is needed")
+    asked = _asked(axis, inertia, mass, delay, hold or {}, listed(free), stages, law)
     settings = _settings(inertia, mass, delay, hold or {}, listed(free), stages)
+    if law != Friction.law:
+        settings["law"] = law
+    unit = FRICTION_UNITS.get(law, FRICTION_ROLE.shipped)
     subject = load_subject(machine) if machine is not None else None
     described = subject.machine if subject is not None else None
     mapping = load_columns(columns) if columns is not None else None
@@ -170,10 +178,10 @@ def identify(
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
     asked_for = [f"{name}={value}" for name, value in settings.items()]
     with kept(folder, page.check_writable, watch, inputs, asked_for, force=force):
-        for sentence in cosim.executing(archives / "friction.fmu", "friction law") if archives is not None else ():
+        for sentence in cosim.executing(archives / f"{unit}.fmu", "friction law") if archives is not None else ():
             watch.announce(sentence)
-        with FrictionLaw(archives) as law:
-            found = identified_from(records, law, known, watch.progress)
+        with FrictionLaw(archives, unit) as friction:
+            found = identified_from(records, friction, known, watch.progress)
         found = replace(found, seconds=reading | dict(found.seconds))
         identified = Identified(found, records, sources, subject, settings, date.today().isoformat())
         result = IdentifyResult(identified, inputs)
@@ -190,6 +198,7 @@ def _asked(
     hold: Mapping[str, Value],
     free: tuple[str, ...],
     stages: str | int | Sequence[int],
+    law: str,
 ) -> Asked:
     """What the arguments say of the axis, as values. Raises InputError."""
     if inertia is not None and mass is not None:
@@ -220,6 +229,7 @@ def _asked(
         hold=by_name("hold", hold, value_of),
         free=free,
         stages=_stages(stages),
+        law=law,
     )
 
 

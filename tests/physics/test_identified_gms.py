@@ -1,0 +1,74 @@
+"""Identification by generalised Maxwell slip, of torque that scipy has solved for known parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from friction_reference import sine
+from gms_reference import Z_AXIS, solved
+
+from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.errors import InputError
+from feedsim.identify import Options, Record, identify
+from feedsim.identify.parameters import estimate
+
+I_P, J, M_0, H = 0.02 / (2 * pi), 0.0164, 0.2, 2e-3
+TRUE = Z_AXIS | {"spread": 35.0, "skew": 0.4, "sigma_1": 0.5}
+MOVES = ((5e-6, 10.0, 1.0), (20e-6, 5.0, 1.6), (100e-6, 2.0, 3.0), (400e-6, 1.0, 4.0))  # [m], [Hz], [s]
+
+
+@pytest.fixture(scope="module")
+def law(fmus: Path) -> Iterator[FrictionLaw]:
+    with FrictionLaw(fmus, "friction_gms") as law:
+        yield law
+
+
+@pytest.fixture(scope="module")
+def records() -> list[Record]:
+    """Sines from rest, and a stroke each way; white noise of 10 mN.m."""
+    random = np.random.default_rng(3)
+    made = []
+    for k, (amplitude, frequency, stop) in enumerate(MOVES):
+        w = 2 * pi * frequency
+        motion = sine(amplitude / I_P * w, frequency, 0.0, stop)
+        t = np.arange(round(stop / H) + 1) * H
+        friction = np.append(0.0, solved(TRUE, motion, t[1:]))
+        speed = amplitude / I_P * w * np.sin(w * t)
+        torque = friction + J * amplitude / I_P * w**2 * np.cos(w * t) + M_0
+        angle = amplitude / I_P * (1 - np.cos(w * t))
+        made.append(Record(f"sine {k}", t, torque + 0.01 * random.standard_normal(len(t)), speed=speed, angle=angle))
+    return made
+
+
+def options(**more: object) -> Options:
+    known = {"J": estimate("J", J, status="given"), "delay": 0.0, "law": "gms"}
+    return Options("Z", I_P, **{**known, **more})  # type: ignore[arg-type]
+
+
+def test_pre_sliding_comes_back(law: FrictionLaw, records: list[Record]) -> None:
+    """The curve over speed is held, as strokes at constant speed would determine it."""
+    curve = {name: TRUE[name] for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry")}
+    found = identify(records, law, options(hold=curve))
+    assert not {"W", "gamma"} & set(found.estimates)
+    assert found.dynamic is not None
+    assert found.dynamic.rms == pytest.approx(0.01, rel=0.1)  # what is left is the noise
+    for name, share in (("sigma_0", 0.01), ("spread", 0.03), ("sigma_1", 0.1)):
+        each = found.estimates[name]
+        assert each.status == "estimated", each
+        assert each.value == pytest.approx(TRUE[name], rel=share), name
+    assert found.estimates["skew"].value == pytest.approx(TRUE["skew"], abs=0.03)
+    for name in ("sigma_0", "spread", "skew", "M_0"):
+        each, true = found.estimates[name], {**TRUE, "M_0": M_0}[name]
+        # twice the interval: four of them at once, and what a log every 2 ms makes of kinks
+        assert abs(each.value - true) < 2 * 1.96 * each.sigma, each
+
+
+def test_a_parameter_of_another_law_is_none() -> None:
+    with pytest.raises(InputError, match=r"no parameter 'gamma'; there are sigma_0, .*spread, skew, C, M_0"):
+        options(hold={"gamma": 0.5})
+    with pytest.raises(InputError, match="no parameter 'spread'; there are sigma_0, "):
+        options(hold={"spread": 5.0}, law="lugre")

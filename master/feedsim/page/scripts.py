@@ -23,13 +23,14 @@ def computing() -> str:
 @cache
 def worker() -> str:
     """The worker's script."""
-    return '"use strict";\n' + computing() + text("worker.js")
+    return '"use strict";\n' + _without_comments(computing() + text("worker.js"))
 
 
 @cache
 def showing() -> str:
     """The page's own script: charts of reports, and what is about knobs."""
-    return '"use strict";\n(() => {\n' + drawing() + "".join(text(name) for name in SHOWING) + "})();\n"
+    script = drawing() + "".join(text(name) for name in SHOWING)
+    return '"use strict";\n(() => {\n' + _without_comments(script) + "})();\n"
 
 
 def styles() -> str:
@@ -40,3 +41,8 @@ def styles() -> str:
 def text(name: str) -> str:
     """A file of the template folder."""
     return (resources.files("feedsim.page") / "template" / name).read_text(encoding="utf-8")
+
+
+def _without_comments(script: str) -> str:
+    """Without the lines that are comments alone, which are for readers of the sources: pages travel by mail."""
+    return "".join(line for line in script.splitlines(keepends=True) if not line.lstrip().startswith("//"))

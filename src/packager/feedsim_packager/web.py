@@ -20,8 +20,9 @@ UNIT = "machine"
 FILE = "machine.wasm"  # beside the archives
 PAGE = SOURCES / "page"
 SECTION = "feedsim"  # of the module: what it was made from
+# -O3 takes 4 % less of a cycle, and 20 kB more of every page.
 FLAGS = (
-    *("-std=c99", "-O3", "-flto", "-msimd128", "-ffp-contract=off", "-fno-slp-vectorize"),
+    *("-std=c99", "-Os", "-flto", "-msimd128", "-ffp-contract=off", "-fno-slp-vectorize"),
     *("-Wall", "-Wextra", "-mexec-model=reactor", "-s"),
 )
 # The stack comes first, so that it cannot grow into data; 256 KiB is a fourth of what native threads have.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Record, read_records
-from feedsim.identify.position_loop import setpoint_delay, speed_setpoint
+from feedsim.identify.position_loop import gain_by_deviation, noisy_delay, setpoint_delay, speed_setpoint
 
 H = 2e-3
 
@@ -108,3 +109,36 @@ def test_a_real_control_to_the_nanometre(axis: str) -> None:
     assert speed.K_v == pytest.approx(100 / 3, rel=1e-4)
     assert speed.k_ffw == pytest.approx(1, abs=1e-4)
     assert I_P * speed.rms < 1e-7  # 1e-4 mm/s
+
+
+def test_noise_on_the_position_widens_the_delay_alone() -> None:
+    """95 % of 40 draws, as above; one weight alone stands for a delay of whole rows."""
+    for first, weights in ((3, [0.1875, 0.5, 0.3125]), (2, [1.0])):
+        misses = 0
+        for seed in range(40):
+            each = record(first, weights, noise=1e-3, seed=seed)
+            found = noisy_delay([each], setpoint_delay([each]))
+            true = H * sum(w * (first + i) for i, w in enumerate(weights))
+            misses += not abs(found.value - true) <= NORMAL_95 * found.sigma
+            assert found.sigma < 1e-5
+        assert misses <= 5
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-4])
+def test_gain_by_the_following_error(noise: float) -> None:
+    """n_s of a loop whose feedforward is 3.4 rows old; noise of x_e alone makes K_v small, and the interval says so."""
+    misses = 0
+    for seed in range(20):
+        each = record(3, [0.1875, 0.5, 0.3125], seed=seed)
+        assert each.deviation is not None
+        assert each.setpoint is not None
+        forward = np.gradient(each.setpoint, H)
+        aged = 0.6 * np.concatenate([np.full(3, forward[0]), forward[:-3]])
+        aged += 0.4 * np.concatenate([np.full(4, forward[0]), forward[:-4]])
+        n_s = 33.0 * each.deviation + aged + 0.5
+        noisy = each.deviation + noise * np.random.default_rng(seed).standard_normal(len(n_s))
+        whole = replace(each, deviation=noisy, speed_setpoint=n_s, feedforward=forward)
+        found = gain_by_deviation([whole], 6.25e-3)
+        misses += not abs(found.value - 33.0) <= NORMAL_95 * found.sigma + 1e-9
+        assert found.sigma < 0.33
+    assert misses <= 3

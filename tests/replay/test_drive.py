@@ -83,7 +83,8 @@ def test_the_shipped_drive_comes_back(machine: str, axis: str, tmp_path: Path) -
     )
     found, files = identified(logged(tmp_path, axis, machine=MACHINES / machine), axis, off)
     for name in TRUE:
-        assert found.estimates[name].value == pytest.approx(getattr(true, name), rel=1e-3), name
+        # T_dyn is 0 here: as a regression over rows has it, to a microsecond.
+        assert found.estimates[name].value == pytest.approx(getattr(true, name), rel=1e-3, abs=1e-6), name
         assert found.estimates[name].status == "estimated", name
     assert set(files) == {f"drive_{axis}.yaml", f"friction_{axis}.yaml"}
     # What is written is a drive that machines take, the filters and the motor of the machine included.
@@ -187,10 +188,11 @@ def test_the_cycle_of_the_position_loop_is_told(tmp_path: Path, capsys: pytest.C
     summary = json.loads((tmp_path / "own" / "summary.json").read_text())
     assert summary["figures"]["X.position_rms"]["value"] < 0.4  # um, of which 0.3 um are noise
     found = summary["axes"]["X"]["parameters"]
-    # The log has the torque at one phase of that cycle: J came out 25 % too small, as estimated.
-    for name in ("J", "K_p"):
-        assert found[name]["status"] == "undetermined", name
-        assert found[name]["reason"].startswith("the torque is recorded once a cycle of the position loop"), name
+    # The log has the torque at one phase of that cycle: the rigid line is 25 % too small, the units know the phase.
+    for name, value in (("J", checked_modes(load_machine(machine)).J_tot("X")), ("K_p", true.K_p)):
+        assert found[name]["status"] == "estimated", name
+        assert abs(found[name]["value"] - value) <= 2 * found[name]["sigma"], name
+        assert found[name]["value"] == pytest.approx(value, rel=0.1), name
     assert found["T_sym"]["value"] == pytest.approx(true.T_sym, abs=0.05e-3)
     assert found["k_ffw"]["value"] == pytest.approx(true.k_ffw, abs=1e-4)
 

@@ -12,7 +12,9 @@ import pytest
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.parameters import estimate
 from feedsim.identify.result import Estimate
-from feedsim.replay.estimates import STRETCHES, between_stretches, one_phase, shared_lag, with_undecided
+from feedsim.replay.estimates import STRETCHES, between_stretches, shared_lag, with_undecided
+from feedsim.replay.parameters import parameter
+from feedsim.replay.start import Begin, once_a_cycle
 
 
 def fits(*values: dict[str, float]) -> Any:
@@ -40,11 +42,11 @@ def test_an_interval_includes_what_an_undecided_part_makes_of_a_value() -> None:
     assert with_undecided(own, found, [found]) == own
 
 
-def test_a_torque_at_one_phase_of_the_cycle_determines_no_inertia() -> None:
-    own = {name: estimate(name, 1.0, 0.01) for name in ("J", "F_C")}
-    found = one_phase(own)
-    assert found["J"].status == "undetermined"
-    assert found["F_C"] == own["F_C"]
+def test_a_torque_at_one_phase_of_the_cycle_frees_the_inertia() -> None:
+    """The rigid line of such a record is up to a half off: the prior of the inertia must let the fit leave it."""
+    (start,) = once_a_cycle(Begin([{"J": 0.01, "J_sigma": 0.02, "F_C": 1.0}], "one way")).starts
+    assert parameter("J", start).scale == 1.0
+    assert start["J"] == 0.01
 
 
 def test_intervals_include_every_share_of_a_lag() -> None:

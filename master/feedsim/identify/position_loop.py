@@ -19,6 +19,8 @@ from math import log, nan
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.estimation.covariance import correlation_length
+from feedsim.estimation.interval import NORMAL_95, student
 from feedsim.identify.record import Array, Record
 
 MAX_SETPOINT_DELAY = 0.1  # [s]: no control delays its setpoint by more
@@ -30,6 +32,10 @@ MAX_TAPS = 6  # samples that an interpolation runs over
 BY_CHANCE = 3.84
 DIGITS, GROWS = 1e-5, 0.05
 LEAST_TRAVEL = 1e-3  # rad: a motor that turns less does not determine a delay
+STRETCHES = 8  # of a record, each of which is left out once
+BETWEEN_ROWS = 5e-4  # of K_v: a drive interpolates its feedforward, which weights of rows follow roughly
+FURTHER_ROWS = 4  # of the feedforward, beyond the delay of the setpoint
+MAX_FORWARD_ROWS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +73,14 @@ class Taps:
         return np.asarray(self.weights @ padded[rows], dtype=np.float64)
 
 
+@dataclass(frozen=True)
+class Constant:
+    """A constant of the position loop by regression, and its standard deviation, in SI units."""
+
+    value: float
+    sigma: float
+
+
 @dataclass(frozen=True, eq=False)
 class SpeedSetpoint:
     """How the speed setpoint comes about.
@@ -97,6 +111,73 @@ def setpoint_delay(records: Sequence[Record]) -> Taps:
     moved = _usable(records, ("setpoint", "angle", "deviation"))
     targets = [record.deviation + record.angle for record in moved]  # type: ignore[operator]
     return _window(moved, targets, [[] for _ in moved])[0]
+
+
+def noisy_delay(records: Sequence[Record], taps: Taps) -> Constant:
+    """The delay of the position setpoint [s], of a record whose position has noise, with what its stretches differ by.
+
+    The noise is in the target alone: x_e + x. So the weights of x_s have no bias.
+
+    taps: by setpoint_delay(). Raises InputError: as there.
+    """
+    moved = _usable(records, ("setpoint", "angle", "deviation"))
+    ages = taps.first + np.arange(max(len(taps.weights), 2))
+    columns, right = [], []
+    for record in moved:
+        setpoint = np.asarray(record.setpoint)
+        rows = np.arange(ages[-1], len(record))
+        lagged = np.column_stack([setpoint[rows - age] for age in ages])
+        columns.append(lagged[:, 1:] - lagged[:, :1])  # the first weight follows from the sum, which is 1
+        right.append(np.asarray(record.deviation)[rows] + np.asarray(record.angle)[rows] - lagged[:, 0])
+    further, sigma = _of_stretches(np.vstack(columns), np.concatenate(right), (ages[1:] - ages[0]) * taps.interval)
+    return Constant(float(ages[0]) * taps.interval + further, sigma)
+
+
+def gain_by_deviation(records: Sequence[Record], delay: float) -> Constant:
+    """K_v [1/s] by the control's own following error, from records with setpoint, deviation and speed setpoint:
+
+        n_s[k] = K_v x_e[k] + sum_i c_i n_ffw[k - i] + n_0
+
+    The weights c_i are the feedforward's, and what n_s takes of younger samples of the setpoint than x_e does. Where
+    x_e has a noise of its own, K_v comes out too small; by no more than if all that is left were that noise, which is
+    a part of the standard deviation.
+
+    delay: of the setpoint [s]. Raises InputError: a signal is missing, or nothing moves.
+    """
+    moved = _usable(records, ("setpoint", "deviation", "speed_setpoint"))
+    ages = range(round(delay / moved[0].interval) + FURTHER_ROWS)
+    if len(ages) > MAX_FORWARD_ROWS:
+        raise InputError(f"{moved[0].name}: a delay of {len(ages)} rows, at most {MAX_FORWARD_ROWS} are looked at")
+    with_forward = all(record.feedforward is not None for record in moved)
+    columns, right = [], []
+    for record in moved:
+        setpoint = np.asarray(record.setpoint)
+        forward = np.asarray(record.feedforward) if with_forward else np.diff(setpoint, prepend=setpoint[0])
+        rows = np.arange(len(ages), len(record))
+        own = [np.asarray(record.deviation)[rows], *(forward[rows - age] for age in ages), np.ones(len(rows))]
+        columns.append(np.column_stack(own))
+        right.append(np.asarray(record.speed_setpoint)[rows])
+    A, b = np.vstack(columns), np.concatenate(right)
+    K_v, sigma = _of_stretches(A, b, np.eye(A.shape[1])[0])
+    x_e, others = A[:, 0], A[:, 1:]
+    alone = float(np.sum((x_e - others @ _least_squares(others, x_e)[0]) ** 2))
+    left = float(np.sum((b - A @ _least_squares(A, b)[0]) ** 2))
+    small = left / (K_v * alone) if K_v and alone > 0 else np.inf
+    return Constant(K_v, float(np.linalg.norm([sigma, small, BETWEEN_ROWS * K_v])))
+
+
+def _of_stretches(A: Array, b: Array, weights: Array) -> tuple[float, float]:
+    """weights . x of least squares A x = b (N rows), and its standard deviation: the larger one of correlated residuals
+    and of what the STRETCHES say differently (grouped jackknife, by Student's distribution)."""
+    x, covariance = _least_squares(A, b)
+    variance = float(weights @ covariance @ weights) * correlation_length(b - A @ x)
+    values = []
+    for fold in np.array_split(np.arange(len(b)), STRETCHES):
+        others = np.delete(np.arange(len(b)), fold)
+        values.append(float(weights @ _least_squares(A[others], b[others])[0]))
+    scatter = (STRETCHES - 1) / STRETCHES * float(np.sum((np.array(values) - np.mean(values)) ** 2))
+    scatter *= (student(STRETCHES - 1) / NORMAL_95) ** 2
+    return float(weights @ x), float(np.sqrt(max(variance, scatter)))
 
 
 def speed_setpoint(records: Sequence[Record]) -> SpeedSetpoint:

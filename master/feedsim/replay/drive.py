@@ -24,7 +24,16 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify.parameters import EXCESS
-from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
+from feedsim.identify.position_loop import (
+    Constant,
+    SpeedSetpoint,
+    Taps,
+    gain_by_deviation,
+    noisy_delay,
+    rms,
+    setpoint_delay,
+    speed_setpoint,
+)
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
@@ -33,7 +42,6 @@ from feedsim.replay.estimates import (
     correlation_of,
     elastic_modes,
     estimates_of,
-    one_phase,
     one_way,
     refuse_poor,
     with_undecided,
@@ -57,6 +65,8 @@ Known = TypeVar("Known")
 
 # Of the way per row, of the top speed: a regression that leaves more is a start, not an answer.
 EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
+# Standard deviations of a delay [s], and of K_v over itself, below which a regression is better than a fit of the axis.
+DELAY_SIGMA, GAIN_SIGMA = 10e-6, 0.01
 MIN_MOVING_ROWS = 50  # in which the axis moves
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
 WEIGHT_TOLERANCE = 0.01  # change of a weight that moves no value by what its interval shows
@@ -128,21 +138,21 @@ def identify_drive(
     """
     taps = _where_recorded(setpoint_delay, records)
     speed = _where_recorded(speed_setpoint, records)
-    # Of all records, as the regressions are.
-    top = max(float(np.max(np.abs(np.diff(one.angle)))) / one.interval for one in records if one.angle is not None)
-    exact_delay = taps is not None and taps.rms <= EXACT_DELAY * top * each.record.interval
-    exact_gain = speed is not None and speed.rms <= EXACT_GAIN * top
+    delay, gain = _known_loop(records, taps, speed)
     J = checked_modes(machine).J_tot(each.axis)
-    total = taps.delay if taps is not None and exact_delay else None
+    total = delay.value if delay is not None else None
     candidates = [start_of(machine, each.axis) | dict(start) for start in (begin.starts if begin is not None else [{}])]
     for values in candidates:
-        if speed is not None and speed.K_v > 0:
+        if gain is not None:
+            values["K_v"] = gain.value
+        elif speed is not None and speed.K_v > 0:
             values["K_v"] = speed.K_v
         if (weight := feedforward_of(records)) is not None:
             values["k_ffw"] = weight
         if taps is not None:
-            values["T_sym"] = min(values["T_sym"], taps.delay)
-            values["T_dyn"] = taps.delay - values["T_sym"]
+            whole = total if total is not None else taps.delay
+            values["T_sym"] = min(values["T_sym"], whole)
+            values["T_dyn"] = whole - values["T_sym"]
     rows = np.flatnonzero(each.moving)
     if len(rows) < MIN_MOVING_ROWS:
         raise InputError(
@@ -155,7 +165,7 @@ def identify_drive(
     # Without a torque friction and load are the machine's: what they do to the position, the speed controller may, too.
     free += ["M_0", "delay", "F_C", "sigma_0", "sigma_1", "sigma_2"] if driven else []
     free += [] if structure_known else ["J"]
-    free += [] if exact_gain else ["K_v"]
+    free += [] if gain is not None else ["K_v"]
     free += [] if total is not None else ["T_dyn"]
     drive = machine.shipped_drive(each.axis, "the identification of a drive")
     free += ["omega_0", "D"] if drive.reference_model else []
@@ -189,23 +199,17 @@ def identify_drive(
     predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
     if not each.record.driven:
         predicted = predicted[0], nan
-    estimates = estimates_of(
-        problem, found, unseen, taps if exact_delay else None, speed if exact_gain else None, structure_known
-    )
+    estimates = estimates_of(problem, found, unseen, delay, gain, structure_known)
     if undecided:
         estimates = with_undecided(estimates, without, undecided)
     if begin is not None and begin.one_way:
         estimates = one_way(each, estimates, begin.one_way)
-    if machine.cycles.T_pos > 0.5 * each.record.interval and not structure_known:
-        estimates = one_phase(estimates)
     likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, found, other_cycle)}
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
         rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, likelier, problem.runs,
         elastic_modes(problem, found, unseen), elastic,
-        correlation_of(
-            problem, found, unseen, taps if exact_delay else None, speed if exact_gain else None, estimates
-        ),
+        correlation_of(problem, found, unseen, delay, gain, estimates),
     )  # fmt: skip
 
 
@@ -214,6 +218,31 @@ def _where_recorded(of: Callable[[Sequence[Record]], Known], records: Sequence[R
         return of(records)
     except InputError:
         return None
+
+
+def _known_loop(
+    records: Sequence[Record], taps: Taps | None, speed: SpeedSetpoint | None
+) -> tuple[Constant | None, Constant | None]:
+    """Delay of the setpoint, and K_v, where the record holds them: exactly, or with little enough noise.
+
+    What noise leaves open is a part of the intervals. A signal that does not follow from setpoint and position is not
+    what it is called: its stretches contradict one another, or what is left is large.
+    """
+    top = max(float(np.max(np.abs(np.diff(one.angle)))) / one.interval for one in records if one.angle is not None)
+    delay = gain = None
+    if speed is not None and speed.rms <= EXACT_GAIN * top:
+        gain = Constant(speed.K_v, speed.sigma[0])
+    if taps is not None:
+        noisy = noisy_delay(records, taps)
+        if gain is None and noisy.sigma <= DELAY_SIGMA:
+            with suppress(InputError):
+                by_deviation = gain_by_deviation(records, noisy.value)
+                gain = by_deviation if 0 < by_deviation.sigma <= GAIN_SIGMA * by_deviation.value else None
+        if taps.rms <= EXACT_DELAY * top * taps.interval:
+            delay = Constant(taps.delay, taps.sigma)
+        elif gain is not None and noisy.sigma <= DELAY_SIGMA:  # without K_v the lag is shared with an axis that bends
+            delay = noisy
+    return delay, gain
 
 
 def feedforward_of(records: Sequence[Record]) -> float | None:

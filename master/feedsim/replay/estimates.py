@@ -17,7 +17,7 @@ from feedsim.errors import InputError
 from feedsim.estimation.covariance import Covariance, correlation_length, stretched
 from feedsim.estimation.interval import NORMAL_95, half_width, student
 from feedsim.identify.parameters import EXCESS, estimate, inner_to_outer
-from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms
+from feedsim.identify.position_loop import Constant, rms
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.elastic import KEYS, ElasticMode, modes_of
@@ -33,10 +33,6 @@ PRIOR_SHARE = 0.8  # share of the usual deviation that is left: the record does 
 _CONTROLLER = variables.parameters("controller")
 ON_THE_MODEL = "{} it rests on an axis that is taken to be rigid"
 SHARED_LAG = "{} only the lag shows, T_dyn + T_sym + (1 - k_ffw)/K_v, and it may be shared otherwise"
-ONE_PHASE = (
-    "the torque is recorded once a cycle of the position loop, at one phase of it: it may be a quarter too small; rows "
-    "of a shorter interval show it"
-)
 SHARING = ("T_sym", "k_ffw")
 ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s",
          "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
@@ -66,11 +62,14 @@ def estimates_of(
     problem: Problem,
     found: Tuned,
     unseen: tuple[float, float],
-    taps: Taps | None,
-    speed: SpeedSetpoint | None,
+    delay: Constant | None,
+    gain: Constant | None,
     known: bool,
 ) -> dict[str, Estimate]:
-    """In the parameters of drive and friction, with intervals."""
+    """In the parameters of drive and friction, with intervals.
+
+    delay, gain: of the position loop, by regression over the record; None: the fit has them.
+    """
     values = problem.start | dict(found.values)
     covariance = _covariance(problem, found, unseen)
     spread = dict(zip(found.names, map(float, np.sqrt(np.diag(covariance))), strict=True))
@@ -85,19 +84,21 @@ def estimates_of(
     ratio = np.array([(n == "K_p") / values["K_p"] - (n == "K_i") / values["K_i"] for n in found.names])
     T_n = values["K_p"] / values["K_i"]
     put("T_n", T_n, T_n * float(np.sqrt(ratio @ covariance @ ratio)), "K_p")
-    if speed is not None:
-        result["K_v"] = _judged("K_v", values["K_v"], speed.sigma[0], 0.0)
+    if gain is not None:
+        result["K_v"] = _judged("K_v", values["K_v"], gain.sigma, 0.0)
     else:
         put("K_v", values["K_v"], spread["K_v"], "K_v")
         if not known:
             reason = ON_THE_MODEL.format(_without("speed setpoint", problem.each.record.speed_setpoint))
             result["K_v"] = replace(result["K_v"], status="undetermined", reason=reason)
-    if taps is not None:
-        result["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], taps.sigma), 0.0)
+    if delay is not None:
+        result["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], delay.sigma), 0.0)
+        # The lag that the position shows is the delay and (1 - k_ffw)/K_v.
+        further = hypot(values["K_v"] * delay.sigma, (1 - values["k_ffw"]) * result["K_v"].sigma / values["K_v"])
+        result["k_ffw"] = replace(result["k_ffw"], sigma=hypot(result["k_ffw"].sigma, further))
     else:
         put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
-        if not known:
-            result = shared_lag(result, _without("following error", problem.each.record.deviation))
+        result = shared_lag(result, _without("following error", problem.each.record.deviation))
     if EXCESS in found.names:
         rise = inner_to_outer(found.names, ["F_S"])[0]
         put("F_S", values["F_C"] + values[EXCESS], float(np.sqrt(rise @ covariance @ rise)), EXCESS)
@@ -110,8 +111,8 @@ def correlation_of(
     problem: Problem,
     found: Tuned,
     unseen: tuple[float, float],
-    taps: Taps | None,
-    speed: SpeedSetpoint | None,
+    delay: Constant | None,
+    gain: Constant | None,
     estimates: Mapping[str, Estimate],
 ) -> Correlation:
     """Correlations of the estimates that have an interval, by the fit that they are from. Arguments as estimates_of().
@@ -128,15 +129,15 @@ def correlation_of(
             rows[row] = [slopes.get(each, 0.0) for each in found.names]
         elif name == "F_S":
             rows[row] = inner_to_outer(found.names, ["F_S"])[0]
-        elif name == "K_v" and speed is not None:
+        elif name == "K_v" and gain is not None:
             further[row] = 1.0
-        elif name == "T_dyn" and taps is not None:
+        elif name == "T_dyn" and delay is not None:
             rows[row] = [-1.0 if each == "T_sym" else 0.0 for each in found.names]
-            further[row] = taps.sigma**2
+            further[row] = delay.sigma**2
         else:
             rows[row] = [float(each == name) for each in found.names]
     matrix = rows @ covariance @ rows.T + np.diag(further)
-    if taps is None:  # T_sym and k_ffw share the lag: what shared_lag() adds moves both
+    if delay is None:  # T_sym and k_ffw share the lag: what shared_lag() adds moves both
         added = [estimates[name].sigma ** 2 - matrix[k, k] if name in SHARING else 0 for k, name in enumerate(names)]
         matrix += np.outer(*2 * [np.sqrt(np.maximum(added, 0.0))])
     scale = np.sqrt(np.diag(matrix))
@@ -206,20 +207,6 @@ def with_undecided(estimates: Mapping[str, Estimate], found: Tuned, undecided: S
     return wider
 
 
-def one_phase(estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """Estimates of a record that has the torque once a cycle of the position loop.
-
-    A held speed setpoint makes the torque ripple within that cycle, and the record shows one phase of the ripple: the
-    torque that accelerates comes out too small, and with it inertia and gain of the speed controller.
-    """
-    return {
-        name: replace(one, status="undetermined", reason=ONE_PHASE)
-        if name in ("J", "K_p") and one.status in ("estimated", "undetermined")
-        else one
-        for name, one in estimates.items()
-    }
-
-
 def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:
     """The elastic modes of a fit, with standard deviations."""
     own = modes_of(found.values)
@@ -235,7 +222,7 @@ def _without(signal: str, recorded: Array | None) -> str:
     """Begin of a reason: the record lacks a signal, or has it of other samples than its setpoint and position."""
     if recorded is None:
         return f"without the control's own {signal}"
-    return f"as the recorded {signal} does not follow from setpoint and position to the last digits,"
+    return f"as the recorded {signal} follows from setpoint and position too roughly,"
 
 
 def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:

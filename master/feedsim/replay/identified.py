@@ -32,7 +32,7 @@ from feedsim.replay.machine_files import (
     simple_drive,
 )
 from feedsim.replay.outside import Line, without_outside
-from feedsim.replay.start import Begin, limits, start_values
+from feedsim.replay.start import Begin, limits, once_a_cycle, start_values
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.structure import checked_modes
 
@@ -101,6 +101,8 @@ def identify_drives(
                 progress(f"{axis}: {what}", done, total)
 
             begin = begins[axis]
+            if begin is not None and cycle > 0.5 * interval:
+                begin = once_a_cycle(begin)
             axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
             with (
                 _begun(machine, name, note, axes, interval, cycle) as own,

@@ -23,6 +23,7 @@ RESERVE = 1.5  # what the machine may do beyond what the record shows
 # Shares of the mean torque that friction may have of it, where the record does not separate it from the constant load.
 FRICTION_SHARES = (0.05, 0.15, 0.4)
 LEAST_TRAVEL = 0.01  # rad: a motor that turns less determines no drive
+ONE_PHASE_DEVIATION = 1.0  # of the logarithm of an inertia by a torque that is known once a position cycle
 CLIPPED_DEVIATION = 0.3  # of the logarithm of an inertia to which rows belong whose torque is cut off
 SEPARATED = 0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
 # A torque limit that is not known must not act: gentle moves determine nothing of the torque of rapid ones.
@@ -85,6 +86,15 @@ def start_values(each: AxisRecord) -> Begin:
     rows_left = "motion in one direction" if each.record.clipped is None else "torque that is not cut off"
     only = f"{rows_left} determines only M_0 {sign} friction: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
     return Begin(starts, only)
+
+
+def once_a_cycle(begin: Begin) -> Begin:
+    """The same where the record has the torque once a cycle of the position loop.
+
+    A held speed setpoint makes the torque ripple within that cycle, and the record shows one phase of the ripple: the
+    torque that accelerates comes out too small, and with it the inertia of the rigid line.
+    """
+    return replace(begin, starts=[{**start, "J_sigma": ONE_PHASE_DEVIATION} for start in begin.starts])
 
 
 def _rigid_line(record: Record) -> tuple[Inertia, float]:

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study identification-accuracy lock ansys clean
+.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -246,6 +246,12 @@ identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320
 
 drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of nine (two hours; docs/replay.md)
 	$(PY) benchmarks/drive_study.py
+
+compensation-study: fmus $(VENV)/.run ## what friction compensations take off on three machines (some five minutes; docs/tuning.md)
+	$(PY) benchmarks/compensation_study.py
+
+band-coverage: fmus $(VENV)/.run ## whether bands from sets identified at 5 % noise hold the truth (some ten minutes; docs/uncertainty.md)
+	$(PY) benchmarks/coverage.py --kinds pulse_characteristic,model
 
 identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/identification.md)
 	$(PY) benchmarks/identification.py

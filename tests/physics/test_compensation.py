@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, nc, scenario
-from feedsim.analysis import compensation as module
-from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
+from feedsim.analysis import compensation_errors as module
+from feedsim.analysis.compensation import Compensation, circle_task, compensate
+from feedsim.analysis.compensation_errors import Quality, quality
 from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
@@ -37,12 +38,21 @@ def done(fmus: Path) -> Iterator[Compensation]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DELAY_ERRORS", (1e-3,))
         patch.setattr(module, "VARIED", (("F_C", "F_S"),))
-        yield compensate(described, nc.plan(described), fmus=fmus)
+        yield compensate(
+            described, nc.plan(described), machines={"less friction": less_friction(described.machine)}, fmus=fmus
+        )
 
 
 def settings(*changes: str) -> Scenario:
     """The circle with changes of its drives: of all, or of one where the change names its axis."""
     return scenario.load(CIRCLE, [f"machine.axes.{'' if '.' in each else '*.drive.'}{each}" for each in changes])
+
+
+def less_friction(machine: Machine) -> Machine:
+    """Z with 30 % less friction."""
+    own = machine.axes["Z"]
+    friction = own.friction.model_copy(update={name: 0.7 * getattr(own.friction, name) for name in ("F_C", "F_S")})
+    return machine.model_copy(update={"axes": {**machine.axes, "Z": own.model_copy(update={"friction": friction})}})
 
 
 def cells_of(line: str) -> list[str]:
@@ -201,6 +211,21 @@ def test_results_have_the_table(done: Compensation, tmp_path: Path) -> None:
     text = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert 'id="compensation-errors"' in text
     assert "−10 %" in text
+
+
+def test_a_changed_machine_has_the_same_compensation(done: Compensation, tmp_path: Path, fmus: Path) -> None:
+    """Its runs beside whole ones: the control keeps the torque of the friction that it knows."""
+    (found,) = done.changed
+    scenario_ = done.scenario.model_copy(update={"machine": less_friction(done.scenario.machine)})
+    torque = {axis: done.feedforward[f"{axis}.M_ff"] for axis in done.frictions}
+    for left, applied in ((found.before, None), (found.after, torque)):
+        result = cosim.run(scenario_, program=nc.plan(scenario_), fmus=fmus, torque_feedforward=applied)
+        expected = quality(result.trace, done.turn)
+        assert pytest.approx(expected.G, rel=1e-6) == left.G
+        assert left.dip["Z"] == pytest.approx(expected.dip["Z"], rel=1e-6, abs=1e-12)
+    assert found.after.dip["Z"] < 3 * done.left_after.dip["Z"] < 0  # too much now: a dip
+    CompensateResult(done, {}).save(tmp_path / "out")
+    assert "With other effects of the machine" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_table_of_the_document(done: Compensation) -> None:

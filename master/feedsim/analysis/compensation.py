@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.analysis.circularity import Contour, Turn, circularity, contour, quadrant
+from feedsim.analysis.circularity import Turn, circularity, contour, quadrant
+from feedsim.analysis.compensation_errors import Changed, Quality, Variation, errors_and_changes, quality
 from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.analysis.figures import Array, Figure
-from feedsim.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
+from feedsim.cosim.feedforward import Lag, friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.run import run
 from feedsim.errors import InputError
@@ -23,38 +24,10 @@ from feedsim.trace import Trace
 
 Progress = Callable[[str, int, int], None]
 
-DELAY_ERRORS = (-1e-3, -0.5e-3, -0.2e-3, 0.2e-3, 0.5e-3, 1e-3)  # s
-# Parameters that are wrong together: a static torque below the Coulomb torque is none.
-VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("sigma_1",), ("v_s",))
-FRICTION_ERROR = 0.1
 RESTING = 1e-9  # m; what an axis that is held may move by, from rounding
 # A figure has become worse from this share of G without compensation on, and by this [m] at least.
 WORSE, LEAST_WORSE = 0.01, 1e-9
 REVERSAL = "reversal "
-OF_ENGAGING = ("W", "gamma")  # of no effect where W is 0
-
-
-@dataclass(frozen=True)
-class Quality:
-    """What is left on the evaluated turn, by the scales.
-
-    G: range of the radius deviation [m]. peak, dip: axis that reverses -> largest and smallest radius deviation within
-    +-45 deg of its reversals, less the turn's median [m]. Too little compensation leaves peaks, too much leaves dips.
-    """
-
-    G: float
-    peak: Mapping[str, float]
-    dip: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Variation:
-    """A compensation with an error. what: "delay" or names of parameters; change in unit ("ms", "%"), of all axes."""
-
-    what: str
-    change: float
-    unit: str
-    quality: Quality
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +44,7 @@ class Compensation:
         left_before, left_after: what is left on the turn of either.
         figures: "before.G", "after.glitch_X" ... as of a circle test, "before.dip_X" ..., "X.delay" ...
         table: what errors cost; empty where it was not asked for.
+        changed: what the compensation does on changed machines; empty without a table.
         warnings: what a user should know before believing the result, a sentence each.
     """
 
@@ -85,6 +59,7 @@ class Compensation:
     left_after: Quality
     figures: Mapping[str, Figure]
     table: tuple[Variation, ...]
+    changed: tuple[Changed, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -135,6 +110,7 @@ def compensate(
     frictions: Mapping[str, Friction] | None = None,
     delays: Mapping[str, float] | None = None,
     table: bool = True,
+    machines: Mapping[str, Machine] | None = None,
     fmus: Path | None = None,
     progress: Progress | None = None,
 ) -> Compensation:
@@ -144,7 +120,8 @@ def compensate(
         frictions: axis -> parameters for the compensation; the machine's own for the other axes. The machine keeps its
             friction.
         delays: axis -> delay [s] of the feedforward; by :func:`feedsim.cosim.feedforward.lag_of` for the other axes.
-        table: with the runs that show what errors cost.
+        table: with the runs that show what errors cost, and what the compensation does on `machines`.
+        machines: words, behind "with" -> changed machines of the same axes.
         fmus: folder of the archives.
         progress: called with (what is done, cycles done, cycles in all).
 
@@ -177,7 +154,9 @@ def compensate(
         after = judged(
             run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
         )
-        variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=tell) if table else ()
+        variations, changed = errors_and_changes(
+            scenario, program, turn, used, applied, law, machines or {}, fmus=fmus, progress=tell
+        ) if table else ((), ())  # fmt: skip
     left_before, left_after = (quality(result.trace, turn) for result in (before, after))
     figures = circle_figures(turn, before.trace, after.trace)
     T_c = machine.cycles.T_c
@@ -198,6 +177,7 @@ def compensate(
         left_after=left_after,
         figures=figures | _feedforward_figures(lags, applied, torque),
         table=variations,
+        changed=changed,
         warnings=(
             *_worse(figures, _reversals(before.trace, turn), _reversals(after.trace, turn)),
             *dict.fromkeys((*before.warnings, *after.warnings)),
@@ -205,16 +185,6 @@ def compensate(
             *_not_judged(axes, turn),
             *_same_model(machine, used, lags, variations),
         ),
-    )
-
-
-def quality(trace: Trace, turn: Turn) -> Quality:
-    """What is left on a turn."""
-    measured = contour(trace, turn)
-    return Quality(
-        G=float(np.ptp(measured.deviation)),
-        peak={axis: max(g.height for g in measured.glitches if g.axis == axis) for axis in turn.axes},
-        dip={axis: _dip(measured, axis) for axis in turn.axes},
     )
 
 
@@ -301,14 +271,6 @@ def _same_model(
     ]
 
 
-def _dip(measured: Contour, axis: str) -> float:
-    return min(
-        float(measured.deviation[quadrant(measured.angle, glitch.crossing)].min()) - measured.median
-        for glitch in measured.glitches
-        if glitch.axis == axis
-    )
-
-
 def lags_of(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
     """Axis -> lags of its drive. Raises InputError where the parameters of a drive do not determine them."""
     lags: dict[str, Lag] = {}
@@ -332,62 +294,6 @@ def _fully_recorded(scenario: Scenario, turn: Turn) -> Scenario:
         needed = [f"{axis}.{signal}" for axis in turn.axes for signal in ("x_a", "n_a", "M_fr")]
         recording = Recording(interval=recording.interval, variables=(*recording.variables, *needed))
     return scenario.model_copy(update={"recording": recording, "logging": None})
-
-
-def _table(
-    scenario: Scenario,
-    program: Program,
-    turn: Turn,
-    frictions: Mapping[str, Friction],
-    delays: Mapping[str, float],
-    law: Law,
-    *,
-    fmus: Path | None,
-    progress: Progress,
-) -> tuple[Variation, ...]:
-    """One run up to the end of the turn for every error."""
-    machine = scenario.machine
-    columns = tuple(f"{axis}.x_a" for axis in turn.axes)
-    lean = scenario.model_copy(
-        update={"recording": Recording(interval=scenario.recording.interval, variables=columns), "logging": None}
-    )
-    last = min(int(np.searchsorted(program.time, turn.end)) + 1, len(program.time) - 1)
-    cut = replace(
-        program,
-        time=program.time[: last + 1],
-        x_s={axis: x[: last + 1] for axis, x in program.x_s.items()},
-        n_ffw={axis: n[: last + 1] for axis, n in program.n_ffw.items()},
-    )
-    instants = last * round(machine.cycles.T_pos / machine.cycles.T_c) + 1
-    wanted: list[tuple[str, float, str, Mapping[str, Friction], Mapping[str, float]]] = [
-        ("delay", error * 1e3, "ms", frictions, {axis: delay + error for axis, delay in delays.items()})
-        for error in DELAY_ERRORS
-    ]
-    for names in VARIED:
-        for share in (-FRICTION_ERROR, FRICTION_ERROR):
-            varied = {axis: _varied(friction, names, 1 + share) for axis, friction in frictions.items()}
-            if varied != frictions:
-                wanted.append((", ".join(names), share * 100, "%", varied, delays))
-    found = []
-    for done, (what, change, unit, set_, delay) in enumerate(wanted):
-        progress("what errors cost", done, len(wanted))
-        # Of the whole program, then cut: a delay below 0 looks ahead.
-        torque = friction_feedforward(machine, program, set_, delay, law)
-        torque = {axis: values[:instants] for axis, values in torque.items()}
-        result = run(lean, program=cut, fmus=fmus, torque_feedforward=torque)
-        found.append(Variation(what, change, unit, quality(result.trace, turn)))
-    progress("what errors cost", len(wanted), len(wanted))
-    return tuple(found)
-
-
-def _varied(friction: Friction, names: Sequence[str], factor: float) -> Friction:
-    """A set with some parameters multiplied; the same where they have no effect."""
-    if friction.W == 0 and any(name in OF_ENGAGING for name in names):
-        return friction
-    values = {name: getattr(friction, name) * factor for name in names}
-    if "gamma" in values:
-        values["gamma"] = min(values["gamma"], 1.0)
-    return friction.model_copy(update=values)
 
 
 def circle_figures(turn: Turn, before: Trace, after: Trace) -> dict[str, Figure]:

@@ -142,7 +142,8 @@ def compensate(
         friction: axis -> file of the parameters that its compensation uses; the machine's own for the other axes.
         delay: of the feedforward behind the speed setpoint [s], of all axes or axis -> delay; of the drive's parameters
             where it is not given. Values may be texts, "4.2 ms". In a mapping "" is all axes.
-        table: with the runs that show what errors of the delay and of the parameters cost.
+        table: with the runs that show what errors of the delay and of the parameters cost, and what the compensation
+            does where the machine has other effects.
         uncertain: draws of identified values, 19 or more, which give intervals of figures and bands of contours: of the
             machine, and of the files of `friction` of axes whose machine values do not vary; 0: none.
         set: changes of the scenario, as behind ``--set``.
@@ -175,8 +176,9 @@ def compensate(
     with kept(out, page.check_writable, watch, [*input_paths(plan), *files.values()], changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
         done = compensation.compensate(
-            plan, program, frictions=sets, delays=delays, table=table, fmus=archives, progress=watch.progress
-        )
+            plan, program, frictions=sets, delays=delays, table=table,
+            machines=_changed(plan, program) if table else {}, fmus=archives, progress=watch.progress,
+        )  # fmt: skip
         uncertainty = None
         if uncertain:
             uncertainty = of_compensation(done, known, cloud, uncertain, fmus=archives, progress=watch.progress)
@@ -201,6 +203,13 @@ def _open_of(
     of_machine = known_values(plan.machine)
     known = {axis: each for axis, each in found.items() if each.names and axis not in of_machine}
     return known, None if known and not of_machine else cloud_of(plan.machine)
+
+
+def _changed(plan: scenarios.Scenario, program: nc.Program) -> dict[str, scenarios.Machine]:
+    """Words -> machine with another effect, that the compensation is tried on, too."""
+    from feedsim.tune.effects import effects_of  # without the table nobody needs it
+
+    return {effect.words: machine for effect, machine in effects_of(plan.machine, moving_axes(program))}
 
 
 def _file(axis: str, file: File, program: nc.Program) -> Path:

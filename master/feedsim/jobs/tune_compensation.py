@@ -20,6 +20,7 @@ from feedsim.report import tune as page
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
+from feedsim.report.tune.drive_files import lines_of
 from feedsim.report.tune.report import SETTINGS, SHEET
 from feedsim.tune.closed_forms import check_controlled
 from feedsim.tune.compensation import Judged, tune
@@ -58,7 +59,7 @@ class TuneCompensationResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """The answer, and the values to type."""
-        return [*self.answers, *(f"  {line}" for line in page.sheet(self.judged).splitlines()[1:])]
+        return [*self.answers, *lines_of(line.split(",") for line in page.sheet(self.judged).splitlines()[1:])]
 
     def files(self) -> Mapping[str, Content]:
         """Values to load and values to type."""

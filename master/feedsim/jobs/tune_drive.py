@@ -77,7 +77,7 @@ class TuneDriveResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """The answer, and the values to type."""
-        return [*self.answers, *drive_files.lines_of(self.tuned, self.control)]
+        return [*self.answers, *drive_files.lines_of(drive_files.rows(self.tuned, self.control))]
 
     def files(self) -> Mapping[str, Content]:
         """Values to load, values to type, and a drive file for the tuned axis and for every other that changes."""

@@ -15,8 +15,10 @@ from feedsim.errors import InputError
 from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
 from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table, together, without
-from feedsim.tune.effects import Effect, effects_of
+from feedsim.tune.effects import Effect, effects_of, frictionless
 from feedsim.uncertainty import JUDGE_SEED, SEARCH_DRAWS, SEARCH_SEED, Cloud, draw_named, torque_scale
+
+OTHER_CAUSES = 0.1  # of the error without compensation, from where on a part that is not friction's is named
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +30,7 @@ class Judged:
         found: kind and values.
         tuned, held: pairs that it was found on, and other ones. Errors are (pairs, 2 axes of the plane) [m]:
         tuned_before, tuned_after, held_before, held_after: without and with it.
+        held_frictionless: errors of the machine without friction, which no friction compensation takes off.
         changed: effect of the machine -> (2, pairs, 2) errors [m] of the pairs held out, without and with it.
         drawn: (draws, 2, pairs, 2) the same, of draws of the machine from cloud; None without.
     """
@@ -43,6 +46,7 @@ class Judged:
     tuned_after: Array
     held_before: Array
     held_after: Array
+    held_frictionless: Array
     changed: Mapping[Effect, Array]
     drawn: Array | None = None
     cloud: Cloud | None = None
@@ -56,6 +60,21 @@ class Judged:
         """(pairs, compensated axes) by how much the error falls [1]; below 0 it grows."""
         columns = self.columns
         return np.asarray(1 - after[:, columns] / before[:, columns])
+
+    @property
+    def beyond_friction(self) -> list[tuple[str, Pair, float, float]]:
+        """Axis, pair, error without friction and before [m], of pairs held out whose error is more than friction's, the
+        largest share first."""
+        found = [
+            (axis, pair, float(self.held_frictionless[i, k]), float(self.held_before[i, k]))
+            for k, axis in zip(self.columns, self.axes, strict=True)
+            for i, pair in enumerate(self.held)
+        ]
+        return sorted(
+            (each for each in found if each[2] > OTHER_CAUSES * each[3]),
+            key=lambda each: each[2] / each[3],
+            reverse=True,
+        )
 
     @property
     def worse(self) -> list[tuple[str, Pair, float, float]]:
@@ -104,7 +123,7 @@ def tune(
         return size(circles.errors(found.on(own, machine), fmus=fmus, torque=torque))
 
     names = list(effects_of(machine, axes))
-    total, done = 4 + len(names) + count, 0
+    total, done = 5 + len(names) + count, 0
 
     def both(own: Machine) -> Array:
         nonlocal done
@@ -115,6 +134,7 @@ def tune(
     progress("judging", done, total)
     tuned_before, tuned_after = (errors(on, machine, compensated=each) for each in (False, True))
     held_before, held_after = both(machine)
+    free = errors(off, frictionless(machine, plane), compensated=False)
     changed = {effect: both(own) for effect, own in names}
     drawn = []
     for k, own in enumerate(draws(count, JUDGE_SEED)):
@@ -123,7 +143,7 @@ def tune(
     progress("judging", total, total)
     return Judged(
         scenario, plane, tuple(axes), objective, found, tuple(tuned), tuple(held), tuned_before, tuned_after,
-        held_before, held_after, changed, np.array(drawn) if drawn else None, cloud,
+        held_before, held_after, free, changed, np.array(drawn) if drawn else None, cloud,
     )  # fmt: skip
 
 

@@ -7,18 +7,24 @@ measured ones; an axis that has an effect in its machine file keeps its own.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from feedsim.scenario import Drive, Friction, Machine
-from feedsim.scenario.axis_units import Guide
+from feedsim.scenario.axis_units import SHARED_WITH_GUIDE, Guide, Transmission
+from feedsim.structure import checked_modes
 from feedsim.tune.compensators import compensated
 
 STRENGTH = 0.2  # of the friction, either way
+NO_FRICTION = 1e-6  # of all torques of a friction law: it has to have some
 GUIDE = 0.5  # share of the friction at the guide
 COGGING = 0.1  # of the Coulomb friction
 ORDER = 10.0  # of the cogging per turn, where the number of pole pairs is not known
 PLAY = 2e-6  # [m]
+# Contact that the play of an axis measured directly lies in: the motor against a slide that stands still.
+CONTACT, CONTACT_DAMPING = 300.0, 0.1  # [Hz], [1]
+MOTOR = 0.5  # share of the motor in the inertia that answers a torque at once
 # Wear takes preload away and widens the engaging zone; warm grease is half as viscous.
 WORN = {"F_C": 0.7, "F_S": 0.7, "F_log": 0.7, "sigma_0": 0.7, "W": 2.0}
 WARM = {"F_log": 0.5, "sigma_2": 0.5}
@@ -64,6 +70,14 @@ def _friction(factors: Mapping[str, float]) -> Callable[[Machine, str], Machine 
     return of
 
 
+def frictionless(machine: Machine, axes: Sequence[str]) -> Machine:
+    """The machine with friction of no effect on some axes, motor and guide."""
+    for axis in axes:
+        machine = _friction(dict.fromkeys(SHARED_WITH_GUIDE, NO_FRICTION))(machine, axis) or machine
+        machine = _with(machine, axis, guide=None)
+    return machine
+
+
 def _guide(machine: Machine, axis: str) -> Machine | None:
     own = machine.axes[axis]
     if own.guide is not None or not isinstance(own.friction, Friction):
@@ -80,11 +94,20 @@ def _cogging(machine: Machine, axis: str) -> Machine | None:
 
 
 def _play(machine: Machine, axis: str) -> Machine | None:
-    """Play without dynamics fits axes that are measured at the motor."""
+    """Play of an axis measured at the motor shows in its position; measured directly it lies in a contact that the
+    motor works against."""
     own = machine.axes[axis]
-    if own.play or own.transmission is not None or not isinstance(own.drive, Drive) or not own.drive.indirect:
+    if own.play or own.transmission is not None or not isinstance(own.drive, Drive):
         return None
-    return _with(machine, axis, play=PLAY)
+    if own.drive.indirect:
+        return _with(machine, axis, play=PLAY)
+    if machine.plant is not None:
+        return None
+    inertia = MOTOR * checked_modes(machine).J_inf(axis)
+    omega = 2 * math.pi * CONTACT
+    stiffness = inertia / own.I_P**2 * omega**2
+    values = {"stiffness": stiffness, "damping": 2 * CONTACT_DAMPING * stiffness / omega, "inertia": inertia}
+    return _with(machine, axis, transmission=Transmission.model_validate({**values, "play": PLAY}))
 
 
 _LEVEL = ("F_C", "F_S", "F_log")
@@ -96,7 +119,4 @@ EFFECTS = (
     Effect("guide", f"{100 * GUIDE:.0f} % of the friction at the guide", _guide),
     Effect("cogging", f"cogging of {100 * COGGING:.0f} % of F_C, twice per pole pair", _cogging),
     Effect("play", f"play of {1e6 * PLAY:.0f} um", _play),
-)
-WITHOUT_PLAY = (
-    "Play is tried on axes that are measured at the motor; measured directly it needs a model of the contact."
 )

@@ -9,7 +9,8 @@ import numpy as np
 
 from feedsim.analysis import Contour, Turn, contour
 from feedsim.analysis.circularity import quadrant
-from feedsim.analysis.compensation import Compensation, Variation
+from feedsim.analysis.compensation import Compensation
+from feedsim.analysis.compensation_errors import Variation
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel, spans
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture

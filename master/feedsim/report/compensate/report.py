@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
-from feedsim.analysis.compensation import Compensation, Quality
+from feedsim.analysis.compensation import Compensation
+from feedsim.analysis.compensation_errors import Quality
 from feedsim.report.compensate.plots import pictures_of
 from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import display_unit, minus, powers, typeset
@@ -57,6 +58,7 @@ def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
         main=[
             *pictures,
             _errors(compensation) if compensation.table else None,
+            _effects(compensation) if compensation.changed else None,
             _frictions(compensation, files),
             figures_section(compensation.figures),
             motions_section(compensation.after),
@@ -81,6 +83,12 @@ def answers(compensation: Compensation) -> list[str]:
         lines.append(
             f"It is as good as its model: {worst.what} wrong by {worst.change:+.3g} {worst.unit} leaves G at "
             f"{1e6 * worst.quality.G:.2f} um."
+        )
+    if compensation.changed:
+        most = max(compensation.changed, key=lambda each: each.after.G)
+        lines.append(
+            f"With {most.words} it takes G from {1e6 * most.before.G:.2f} to {1e6 * most.after.G:.2f} um, the largest "
+            "of the effects that were tried."
         )
     return lines
 
@@ -118,6 +126,25 @@ def _errors(compensation: Compensation) -> Section:
     )
     table = Table("lrr" + "r" * len(each), ("Compensation", "Error", *each, "G [µm]"), rows, note)
     return Section("What errors cost", [table], "errors")
+
+
+def _effects(compensation: Compensation) -> Section:
+    """G and peaks on changed machines, without and with the same compensation."""
+    rows: list[tuple[Text, ...]] = []
+    nominal = ("as the machine file has it", compensation.left_before, compensation.left_after)
+    for words, before, after in (nominal, *((each.words, each.before, each.after) for each in compensation.changed)):
+        cells = [1e6 * left.G for left in (before, after)]
+        cells += [
+            1e6 * max(left.peak[axis], -left.dip[axis])
+            for axis in compensation.turn.axes for left in (before, after)
+        ]  # fmt: skip
+        rows.append((words, *(minus(f"{cell:.2f}") for cell in cells)))
+    each = ["G without [µm]", "with"]
+    for axis in compensation.turn.axes:
+        each += [f"peak or dip, {axis} reverses, without [µm]", "with"]
+    note = "The same compensation on a changed machine. The sizes are usual ones, not measured ones."
+    table = Table("l" + "r" * len(each), ("Machine", *each), rows, note)
+    return Section("With other effects of the machine", [table], "effects")
 
 
 def _frictions(compensation: Compensation, files: Mapping[str, Path]) -> Section:
@@ -191,6 +218,14 @@ def summary(compensation: Compensation, files: Mapping[str, Path], written: Sequ
             }
             for axis, friction in compensation.frictions.items()
         },
+        "effects": [
+            {
+                "with": each.words,
+                "G_before": quantity(1e6 * each.before.G, "um"),
+                "G_after": quantity(1e6 * each.after.G, "um"),
+            }
+            for each in compensation.changed
+        ],
         "errors": [
             {
                 "of": what,

@@ -35,11 +35,17 @@ from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, RESIDUAL_COLOUR
+from feedsim.report.tune.drive_draws import (
+    drawn_answer,
+    drawn_findings,
+    drawn_intervals,
+    drawn_section,
+    reductions,
+    share_text,
+)
 from feedsim.report.tune.drive_files import SETTINGS, SHEET, names_for, rows
-from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.drive import NOISE, TORQUE
 from feedsim.tune.drive_result import WORSE, Case, Margins, Point, Tuned, decibels
-from feedsim.uncertainty import interval, share_of
 
 KIND = "tune-drive"
 BINDS = 0.06  # of a limit: a margin that is as near to it binds
@@ -76,8 +82,8 @@ def figures_of(tuned: Tuned) -> dict[str, Figure]:
                 value, unit, f"{words}, {when} tuning; motions not used for tuning"
             )
     for name, words in (("peak", "peak where the axis reverses"), ("overshoot", "overshoot")):
-        nominal = _reductions(first, name)
-        every = np.concatenate([_reductions(case, name) for case in tuned.judged])
+        nominal = reductions(first, name)
+        every = np.concatenate([reductions(case, name) for case in tuned.judged])
         figures[f"{axis}.{name}_reduction"] = Figure(
             float(np.median(nominal)), "%", f"median reduction of the {words}, motions not used for tuning"
         )
@@ -97,40 +103,11 @@ def figures_of(tuned: Tuned) -> dict[str, Figure]:
             f"standard deviation of the motor torque by the encoder's noise, {when} tuning",
         )  # fmt: skip
     for name, (low, high) in drawn_intervals(tuned).items():
+        words = f"of the interval of {axis}.{name}, {share_text(tuned)} of draws of the machine"
         of = figures[f"{axis}.{name}"]
         for key, end, value in (("from", "lower", low), ("to", "upper", high)):
-            figures[f"{axis}.{name}_{key}"] = Figure(
-                value, of.unit, f"{end} end of the interval of {axis}.{name}, {_share(tuned)} of draws of the machine"
-            )
+            figures[f"{axis}.{name}_{key}"] = Figure(value, of.unit, f"{end} end {words}")
     return figures
-
-
-def drawn_intervals(tuned: Tuned) -> dict[str, tuple[float, float]]:
-    """Figure -> interval over draws of the machine: margins, and reductions of a drive that changes; empty without."""
-    drawn = tuned.drawn
-    if drawn is None:
-        return {}
-    values = {
-        "gain_margin_after": [each.gain for each in drawn.margins],
-        "phase_margin_after": [each.phase for each in drawn.margins],
-    }
-    for name in ("peak", "overshoot") if drawn.cases else ():
-        values[f"{name}_reduction"] = [float(np.median(_reductions(case, name))) for case in drawn.cases]
-    return {
-        name: tuple(map(float, interval(np.array(each))))  # type: ignore[misc]
-        for name, each in values.items()
-        if np.isfinite(each).all()
-    }
-
-
-def _share(tuned: Tuned) -> str:
-    assert tuned.drawn is not None
-    return f"{100 * share_of(tuned.drawn.count):.0f} %"
-
-
-def _reductions(case: Case, name: str) -> Any:
-    before, after = (np.maximum(getattr(errors, name), 1e-9) for errors in (case.before, case.after))
-    return 100 * (1 - after / before)
 
 
 def worse(tuned: Tuned) -> list[str]:
@@ -148,7 +125,7 @@ def findings(tuned: Tuned) -> list[str]:
     if bad := worse(tuned):
         found.append(Wrong(f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"))
     found += present_misses(tuned)
-    found += _drawn_findings(tuned)
+    found += drawn_findings(tuned)
     if not tuned.elastic:
         found.append(RIGID_WARNING if tuned.changes else Note(RIGID_WARNING))
     drive = tuned.machine.shipped_drive(tuned.axis, "a report")
@@ -156,23 +133,6 @@ def findings(tuned: Tuned) -> list[str]:
         found.append(f"{tuned.axis}: {COMPENSATED}")
     if tuned.changes:
         found.append(Note(CHECK))
-    return found
-
-
-def _drawn_findings(tuned: Tuned) -> list[str]:
-    """What draws of the machine lack: margins, and motions that get worse."""
-    drawn, limits = tuned.drawn, tuned.limits
-    if drawn is None:
-        return []
-    found = []
-    if thin := [each for each in drawn.margins if limits.missing(each) > 0]:
-        least = f"{decibels(min(each.gain for each in thin))} and {min(each.phase for each in thin):.3g} deg"
-        found.append(
-            f"in {len(thin)} of {drawn.count} draws of the machine a margin is below {limits.gain_margin:g} dB or "
-            f"{limits.phase_margin:g} deg; the least are {least}"
-        )
-    if bad := [case for case in drawn.cases if case.worse]:
-        found.append(f"in {len(bad)} of {drawn.count} draws of the machine a motion gets worse than before")
     return found
 
 
@@ -202,7 +162,7 @@ def answers(tuned: Tuned) -> list[str]:
     margins = f"{decibels(after.gain)} and {after.phase:.3g} deg"
     if tuned.kept:
         kept = f"{axis}: the drive stays as it is: {tuned.kept}. The present drive has {margins}."
-        return [kept, *_drawn_answer(tuned)]
+        return [kept, *drawn_answer(tuned)]
     changed = ", with elastic modes 10 % lower and higher" if tuned.elastic else ""
     found = [
         f"{axis}: peaks at reversals fall by {_percent(figures[f'{axis}.peak_reduction'])}, overshoot by "
@@ -212,19 +172,7 @@ def answers(tuned: Tuned) -> list[str]:
     others = [change.axis for change in tuned.changes if change.axis != axis]
     if others:
         found.append(f"{', '.join(dict.fromkeys(others))}: T_dyn is raised, so that the axes stay equally late.")
-    return found + _drawn_answer(tuned)
-
-
-def _drawn_answer(tuned: Tuned) -> list[str]:
-    """What the intervals of identified values make of it."""
-    words = {"peak_reduction": "peaks fall by {} to {} %", "overshoot_reduction": "overshoot by {} to {} %",
-             "gain_margin_after": "the gain margin is {} to {} dB",
-             "phase_margin_after": "the phase margin {} to {} deg"}  # fmt: skip
-    found = drawn_intervals(tuned)
-    if not found or tuned.drawn is None:
-        return []
-    parts = [words[name].format(*(f"{end:.3g}" for end in found[name])) for name in words if name in found]
-    return [f"With what identification leaves open: {', '.join(parts)} ({_share(tuned)}, {tuned.drawn.count} draws)."]
+    return found + drawn_answer(tuned)
 
 
 def _percent(figure: Figure) -> str:
@@ -318,7 +266,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
             *values(tuned, control),
             Section("Why these values", [Bullets(list(why(tuned)))]),
             _margins(tuned),
-            *_drawn(tuned, figures),
+            *drawn_section(tuned, figures),
             *(_errors(case) for case in tuned.judged if not tuned.kept),
             sections.figures_section(shown),
         ],
@@ -347,23 +295,6 @@ def values(tuned: Tuned, control: str = "") -> Iterator[Part]:
     count = 8 if named else 5
     yield Paragraph("Values to type:")
     yield Table("llrrllll"[:count], heads[:count], [line[:count] for line in lines])
-
-
-def _drawn(tuned: Tuned, figures: Mapping[str, Figure]) -> Iterator[Section]:
-    """Intervals over draws of the machine, and what was drawn."""
-    if tuned.drawn is None:
-        return
-    lines: list[tuple[Text, ...]] = []
-    for name, ends in drawn_intervals(tuned).items():
-        figure = figures[f"{tuned.axis}.{name}"]
-        values = (minus(f"{value:.3g}") for value in (figure.value, *ends))
-        lines.append((code(f"{tuned.axis}.{name}"), *values, typeset(figure.unit)))
-    note = (
-        f"{tuned.drawn.count} draws of the machine, which the values were not found on. An interval holds "
-        f"{_share(tuned)} of further draws. Margins: the least over loops, poses and modes."
-    )
-    table = Table("lrrrl", ("Figure", "Value", "From", "To", "Unit"), lines, note)
-    yield Section("What identification leaves open", [table, drawn_values(tuned.drawn.cloud)])
 
 
 def _margins(tuned: Tuned) -> Section:

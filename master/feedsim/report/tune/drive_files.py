@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from feedsim.control import Name, names_of
@@ -83,10 +83,10 @@ def _shown(change: Changed) -> tuple[str, str, str]:
     return text(change.old), text(change.new), unit
 
 
-def lines_of(tuned: Tuned, control: str = "") -> list[str]:
-    """A line for every value to type."""
+def lines_of(rows: Iterable[Sequence[str]]) -> list[str]:
+    """A line for every value to type, as the terminal shows it. rows: as of :func:`rows` and of sheets."""
     found = []
-    for axis, number, name, old, new, unit, confirmed, parameter in rows(tuned, control):
+    for axis, number, name, old, new, unit, confirmed, parameter in rows:
         what = f"{number} {name} ({parameter})" if number else parameter
         doubt = " (unit not confirmed)" if confirmed == "no" else ""
         found.append(f"  {axis}: {what} {old} -> {new}{'' if unit in ('', '1') else f' {unit}'}{doubt}")

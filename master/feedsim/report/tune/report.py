@@ -23,7 +23,6 @@ from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensation import Judged
 from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, amplitude
-from feedsim.tune.effects import WITHOUT_PLAY
 from feedsim.uncertainty import interval, share_of
 from feedsim.units import convert
 from feedsim.variables import parameters
@@ -108,6 +107,13 @@ def findings(judged: Judged) -> list[str]:
         bad = int((worst < 100 * (1 - NEVER_WORSE)).sum())
         if bad:
             found.append(f"in {bad} of {len(worst)} draws of the machine a circle gets worse than without compensation")
+    if others := judged.beyond_friction:
+        axis, pair, free, before = others[0]
+        more = f" (and {len(others) - 1} more)" if len(others) > 1 else ""
+        found.append(
+            f"{axis} on {pair.text}{more}: {1e6 * free:.3g} of {1e6 * before:.3g} um at the reversals are there "
+            "without friction, too: the drives make them, and no friction compensation takes them off"
+        )
     if judged.found.kind == "model":
         found.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
     else:
@@ -214,7 +220,14 @@ def report_of(judged: Judged) -> Report:
             *pictures_of(judged),
             _values(judged),
             _effects(judged, figures),
-            _errors("Circles not used for tuning", judged.held, judged.held_before, judged.held_after, judged),
+            _errors(
+                "Circles not used for tuning",
+                judged.held,
+                judged.held_before,
+                judged.held_after,
+                judged,
+                judged.held_frictionless,
+            ),
             _errors("Circles tuned on", judged.tuned, judged.tuned_before, judged.tuned_after, judged),
             sections.figures_section(figures),
         ],
@@ -244,7 +257,7 @@ def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:
             lines.append(
                 ("draws of identified values", *(minus(f"{a:.0f} to {b:.0f}") for a, b in ((low, high), worst)))
             )
-    note = f"The same values on a changed machine. The sizes are usual ones, not measured ones. {WITHOUT_PLAY}"
+    note = "The same values on a changed machine. The sizes are usual ones, not measured ones."
     heads = ("Machine", "Median reduction [%]", "Least reduction [%]")
     drawn = [] if judged.cloud is None else [drawn_values(judged.cloud)]
     return Section("With other effects of the machine", [Table("lrr", heads, lines, note), *drawn], "effects")
@@ -255,7 +268,10 @@ def _both(figures: Mapping[str, Figure], name: str) -> tuple[str, str]:
     return minus(f"{median:.0f}"), minus(f"{worst:.0f}")
 
 
-def _errors(title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: Judged) -> Section:
+def _errors(
+    title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: Judged, free: Any = None
+) -> Section:  # fmt: skip
+    """free: errors without friction, where they are known."""
     lines: list[tuple[Text, ...]] = []
     for i, pair in enumerate(pairs):
         cells = [f"{pair.radius * 1e3:.4g}", f"{pair.feed * 60:.4g}", f"{pair.acceleration:.3g}"]
@@ -264,10 +280,12 @@ def _errors(title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: 
                 f"{1e6 * before[i, k]:.2f}", f"{1e6 * after[i, k]:.2f}",
                 minus(f"{100 * (1 - after[i, k] / before[i, k]):.0f}"),
             ]  # fmt: skip
+            cells += [f"{1e6 * free[i, k]:.2f}"] if free is not None else []
         lines.append(tuple(cells))
     heads = ["Radius [mm]", "Feed [m/min]", "v²/r [m/s²]"]
     for axis in judged.axes:
         heads += [f"{axis} without [µm]", f"{axis} with [µm]", f"{axis} less by [%]"]
+        heads += [f"{axis} without friction [µm]"] if free is not None else []
     return Section(title, [Table("r" * len(heads), heads, lines)])
 
 

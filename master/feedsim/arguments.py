@@ -91,11 +91,11 @@ def between(name: str, band: Band, lowest: str, highest: str) -> tuple[float, fl
 
 def by_name(name: str, values: Mapping[str, V], read: Callable[[str, V], T]) -> dict[str, T]:
     """Key -> what `read` makes of key and value. Raises InputError, which names argument, key and value."""
-    found: dict[str, T] = {}
+    result: dict[str, T] = {}
     for key, value in values.items():
         with given(name, f"{key}={value}" if key else value):
-            found[key] = read(key, value)
-    return found
+            result[key] = read(key, value)
+    return result
 
 
 def lengths(name: str, values: Mapping[str, Value], example: str, *, positive: bool = False) -> dict[str, float]:

@@ -74,7 +74,7 @@ def own_folder(kind: str, code: Sequence[Path]) -> Path | None:
     try:
         if not own.is_dir():
             own.mkdir(mode=0o700, parents=True)
-            others = sorted(place.glob(f"{kind}-*/"), key=lambda each: each.stat().st_mtime)
+            others = sorted(place.glob(f"{kind}-*/"), key=lambda path: path.stat().st_mtime)
             for old in others[:-5]:
                 shutil.rmtree(old, ignore_errors=True)
         return own if _private(own) else None
@@ -86,8 +86,8 @@ def _private(place: Path) -> bool:
     """Whether nobody else can write there: what is compiled is executed. Raises OSError."""
     if sys.platform == "win32":  # the folder is below the user's profile, where no other user writes
         return True
-    found = place.stat()
-    return found.st_uid == os.getuid() and not found.st_mode & 0o022
+    result = place.stat()
+    return result.st_uid == os.getuid() and not result.st_mode & 0o022
 
 
 def digest(file: Path) -> str:
@@ -99,10 +99,10 @@ def digest(file: Path) -> str:
 def _versions(code: tuple[Path, ...]) -> list[str]:
     """The code that finds an answer, the libraries that it computes with, and the processor."""
     sources = hashlib.sha256()
-    for each in code:
-        for file in sorted(each.rglob("*.py")) if each.is_dir() else [each]:
+    for path in code:
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             sources.update(file.read_bytes())
-    libraries = [f"{name} {found}" for name in LIBRARIES if (found := version(name))]
+    libraries = [f"{name} {text}" for name in LIBRARIES if (text := version(name))]
     return [sources.hexdigest(), *libraries, platform.machine(), sys.byteorder]
 
 
@@ -121,7 +121,7 @@ def _keep(file: Path, kind: str, text: str) -> None:
             with suppress(OSError):
                 fresh.unlink()
             raise
-    others = sorted(file.parent.glob(f"{kind}-*.json"), key=lambda each: each.stat().st_mtime)
+    others = sorted(file.parent.glob(f"{kind}-*.json"), key=lambda path: path.stat().st_mtime)
     for old in others[:-MAX_ANSWERS]:
         with suppress(OSError):
             old.unlink()

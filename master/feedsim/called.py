@@ -32,8 +32,8 @@ class _CalledRoom(ModuleType):
     @property
     def _call(self) -> Callable[..., Any]:
         package, _, name = self.__name__.rpartition(".")
-        found: Callable[..., Any] = import_module(package).__getattr__(name)
-        return found
+        result: Callable[..., Any] = import_module(package).__getattr__(name)
+        return result
 
     @property
     def __signature__(self) -> inspect.Signature:

@@ -41,10 +41,10 @@ class InputError(FeedsimError):
     @classmethod
     def of(cls, what: str, problems: Iterable[str]) -> "InputError":
         """One error from several faults: the fault itself if it is alone, else a headline and a line per fault."""
-        found = tuple(problems)
-        if len(found) == 1:
-            return cls(found[0])
-        return cls("\n  ".join((f"{what}: {len(found)} problems", *found)), found)
+        result = tuple(problems)
+        if len(result) == 1:
+            return cls(result[0])
+        return cls("\n  ".join((f"{what}: {len(result)} problems", *result)), result)
 
 
 class SimulationError(FeedsimError):

@@ -53,14 +53,14 @@ def examples() -> list[Example]:
     ['emps', 'one_axis', 'sinumerik_840d', 'test_centre']
     """
     root = shipped("scenarios")
-    found = [
+    result = [
         Example(file.parent.name if kind in ("machine", "structure") else file.stem, kind, file, _about(file))
         for kind, pattern in _KINDS.items()
         for file in sorted(root.glob(pattern))
     ]
-    if not found:
+    if not result:
         raise InputError(f"{root}: has no scenarios; {mend('them')}")
-    return found
+    return result
 
 
 def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
@@ -104,25 +104,27 @@ def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
 
 def _asked(names: Iterable[str]) -> list[Example]:
     known = examples()
-    found: list[Example] = []
+    result: list[Example] = []
     for name in names:
-        if not (meant := [each for each in known if each.name == name.removesuffix(".yaml").removesuffix(".ipynb")]):
-            others = sorted({each.name for each in known})
+        if not (
+            meant := [example for example in known if example.name == name.removesuffix(".yaml").removesuffix(".ipynb")]
+        ):
+            others = sorted({example.name for example in known})
             near = "".join(f", did you mean {other}?" for other in get_close_matches(name, others, 1))
             raise InputError(f"{name}: no such example{near} (there are: {', '.join(others)})")
-        found += meant
-    return found
+        result += meant
+    return result
 
 
 def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
     """What stands for the examples, and every file that one of them names, or that lies in a folder that it names."""
-    waiting = [each.file for each in asked]
-    found: dict[Path, None] = {}
+    waiting = [example.file for example in asked]
+    result: dict[Path, None] = {}
     while waiting:
         file = waiting.pop()
-        if file in found:
+        if file in result:
             continue
-        found[file] = None
+        result[file] = None
         if file.name in ("machine.yaml", "structure.yaml"):
             waiting += [other for other in file.parent.iterdir() if other.is_file()]
         if file.suffix == ".yaml":
@@ -130,7 +132,7 @@ def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
             for named in _named(file):
                 inside = [named] if named.is_file() else [other for other in named.rglob("*") if other.is_file()]
                 waiting += [other for other in inside if other.is_relative_to(root)]
-    return sorted(found)
+    return sorted(result)
 
 
 def _named(file: Path) -> Iterator[Path]:

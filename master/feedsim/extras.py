@@ -48,7 +48,7 @@ def missing(error: ImportError, what: str = "this") -> MissingPackage | None:
     if isinstance(error, ModuleNotFoundError):
         for extra in (work, *EXTRAS):
             if module in EXTRAS.get(extra, ()):
-                lacking = (each for each in EXTRAS[extra] if each == module or not _is_there(each))
+                lacking = (name for name in EXTRAS[extra] if name == module or not _is_there(name))
                 return _told(what, lacking, [extra])
     return None
 

@@ -51,8 +51,8 @@ class Reading:
 
 def _without_examples(schema: dict[str, Any]) -> None:
     """Schemas say what docstrings say; their examples are for a Python prompt."""
-    if told := schema.get("description"):
-        schema["description"] = told.partition("\n\n>>> ")[0]
+    if reported := schema.get("description"):
+        schema["description"] = reported.partition("\n\n>>> ")[0]
 
 
 class Model(BaseModel):
@@ -145,7 +145,9 @@ class Quantity:
         """A number and known symbols; a symbol that stands alone must have the right dimension."""
         dimension = units.unit(self.unit).dimension
         symbols = sorted(_symbols(), key=len, reverse=True)
-        refused = rf"\s*{units.NUMBER}\s*(?:{'|'.join(each for each in symbols if _symbols()[each] != dimension)})\s*$"
+        refused = (
+            rf"\s*{units.NUMBER}\s*(?:{'|'.join(symbol for symbol in symbols if _symbols()[symbol] != dimension)})\s*$"
+        )
         if self.unit != "1":
             refused += rf"|\s*{units.NUMBER}\s*$"
         expression = rf"(?:{'|'.join(symbols)}|[-0-9 .*/^()·⋅²³+])*"

@@ -26,4 +26,4 @@ def severity(finding: str) -> str:
 
 def ranked(findings: Iterable[str]) -> list[str]:
     """Each once, the wrong ones first and notes last, else in their order."""
-    return sorted(dict.fromkeys(findings), key=lambda each: ("wrong", "doubt", "note").index(severity(each)))
+    return sorted(dict.fromkeys(findings), key=lambda text: ("wrong", "doubt", "note").index(severity(text)))

@@ -72,14 +72,14 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
             raise OutputError(f"{directory}: cannot be written, {path} is a file; allowed: a directory")
         break
     try:
-        held = _taken(directory, lock, time.monotonic() + wait)
+        locks = _taken(directory, lock, time.monotonic() + wait)
         try:
             _claims.add(key)
             yield
         finally:
             _claims.discard(key)
-            for each in held:
-                each.release()
+            for entry in locks:
+                entry.release()
     finally:
         for path in made:
             with suppress(OSError):  # not empty, as a rule
@@ -99,26 +99,26 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
                 time.sleep(_BETWEEN)  # not in step with the other
                 continue
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
-        held = [lock]
+        locks = [lock]
         if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
-            told = lock.told()
-            if told and f" on {platform.node()} since " not in told:
+            reported = lock.told()
+            if reported and f" on {platform.node()} since " not in reported:
                 lock.close()
                 raise OutputError(
-                    f"{directory}: another process writes its results there, as {lock.path} says: {told}. If it is "
+                    f"{directory}: another process writes its results there, as {lock.path} says: {reported}. If it is "
                     "not at work any more, remove that file; or take another directory"
                 )
             unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]
             with suppress(OSError):
-                held.append(_Lock(Path(tempfile.gettempdir()) / f"{PREFIX}{unique}.lock"))
-        if all(each.state is not False for each in held):
+                locks.append(_Lock(Path(tempfile.gettempdir()) / f"{PREFIX}{unique}.lock"))
+        if all(lock.state is not False for lock in locks):
             lock.tell(_self())
-            return held
-        told = lock.told()
-        for each in held:
-            each.close()
+            return locks
+        reported = lock.told()
+        for entry in locks:
+            entry.close()
         if time.monotonic() >= until:
-            who = f": {told}" if told else ""
+            who = f": {reported}" if reported else ""
             raise OutputError(
                 f"{directory}: another process writes its results there{who}; wait until it has ended, or take another "
                 "directory"
@@ -238,23 +238,23 @@ class TemporaryFolder:
             parent = within or Path(tempfile.gettempdir())
             while True:
                 self.path = parent / (PREFIX + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
-                held: list[int] = []
+                indexes: list[int] = []
                 # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
-                self._end = weakref.finalize(self, _remove, self.path, held, os.getpid())
+                self._end = weakref.finalize(self, _remove, self.path, indexes, os.getpid())
                 try:
                     self.path.mkdir(0o700)
                 except FileExistsError:  # another's
                     self._end.detach()
                     continue
                 try:
-                    held.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
+                    indexes.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
                 except FileNotFoundError:  # taken for one that a killed process has left, while it was empty
                     self._end.detach()
                     continue
-                if locked(held[0]) is not False and _is(self.path / LOCK, held[0]):
+                if locked(indexes[0]) is not False and _is(self.path / LOCK, indexes[0]):
                     break
                 self._end.detach()
-                os.close(held[0])
+                os.close(indexes[0])
         except OSError as error:
             where = f"{within}: a folder" if within else "a folder for temporary files (TMPDIR)"
             raise OutputError(f"{where} cannot be made: {error.strerror or error}") from error
@@ -272,28 +272,28 @@ class TemporaryFolder:
         self.close()
 
 
-def _remove(folder: Path, held: list[int], owner: int) -> None:
+def _remove(folder: Path, indexes: list[int], owner: int) -> None:
     """A process that was forked off leaves its parent's folders alone."""
     if os.getpid() != owner:
         return
     until = time.monotonic() + WRITING
     while not _emptied(folder) and time.monotonic() < until:
         time.sleep(_LOOK)
-    while held:  # ahead of the rest: Windows does not remove what is open
-        os.close(held.pop())
+    while indexes:  # ahead of the rest: Windows does not remove what is open
+        os.close(indexes.pop())
     shutil.rmtree(folder, ignore_errors=True)
 
 
 def _emptied(folder: Path) -> bool:
     """Remove what is in a folder, but for what shows whose it is: a folder that is half removed still has an owner."""
-    left = [path for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else []
-    for path in left:
+    remaining = [path for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else []
+    for path in remaining:
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
         else:
             with suppress(OSError):
                 path.unlink()
-    return not any(os.path.lexists(path) for path in left)
+    return not any(os.path.lexists(path) for path in remaining)
 
 
 def remove_orphans() -> None:
@@ -303,13 +303,13 @@ def remove_orphans() -> None:
         folders += Path(tempfile.gettempdir()).glob(f"{PREFIX}*")
     for folder in folders:
         with suppress(OSError):
-            found = folder.lstat()
+            result = folder.lstat()
             if (
                 _OWNED_NAME.fullmatch(folder.name)
-                and stat.S_ISDIR(found.st_mode)
-                and (not hasattr(os, "geteuid") or found.st_uid == os.geteuid())
+                and stat.S_ISDIR(result.st_mode)
+                and (not hasattr(os, "geteuid") or result.st_uid == os.geteuid())
             ):
-                _remove_orphan(folder, time.time() - found.st_mtime)
+                _remove_orphan(folder, time.time() - result.st_mtime)
 
 
 def _remove_orphan(folder: Path, age: float) -> None:

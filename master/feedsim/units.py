@@ -203,10 +203,10 @@ def unit(text: str) -> Unit:
     if not _EXPRESSION.fullmatch(plain) or _unbalanced(plain):
         raise InputError(f"unit {text!r} cannot be read")
     try:
-        found = algebra.parse(plain.replace("^+", "^") or DIMENSIONLESS)
+        result = algebra.parse(plain.replace("^+", "^") or DIMENSIONLESS)
     except (algebra.UnitError, RecursionError):
         raise InputError(f"unit {text!r} cannot be read") from None
-    return Unit(text, found.exact, _dimension(found.exponents))
+    return Unit(text, result.exact, _dimension(result.exponents))
 
 
 @cache

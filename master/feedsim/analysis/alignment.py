@@ -64,8 +64,8 @@ def _shifted(source: Source, onto: Source) -> Source:
         return replace(source, aligned="by the program, which is the same")
     for signal, words in WORDS.items():
         columns, reference = (
-            {name: curve for axis in each.axes if (curve := each.curve(name := f"{axis}.{signal}", "m")) is not None}
-            for each in (source, onto)
+            {name: curve for axis in entry.axes if (curve := entry.curve(name := f"{axis}.{signal}", "m")) is not None}
+            for entry in (source, onto)
         )
         shared = [name for name in columns if name in reference and np.ptp(columns[name]) and np.ptp(reference[name])]
         if not shared:
@@ -101,28 +101,28 @@ def _misfit(here: Trace, there: Trace, seconds: float) -> float:
 
 def _with_circles(source: Source, circles: Mapping[str, Sequence[Turn]]) -> Source:
     """The source with the circles that others have and it has driven, too; found by the angle alone."""
-    found, notes = dict(source.circles), []
+    result, notes = dict(source.circles), []
     for prefix, turns in circles.items():
         axes = turns[0].axes
-        if prefix in found or any(source.curve(f"{axis}.x_a", "m") is None for axis in axes):
+        if prefix in result or any(source.curve(f"{axis}.x_a", "m") is None for axis in axes):
             continue
         try:
-            found[prefix], centred = _turns(source, turns[0])
+            result[prefix], centred = _turns(source, turns[0])
         except InputError as error:
             notes.append(f"circle {prefix}: not, {error}")
             continue
         where = "the centre that fits them" if centred else "the programmed centre"
         notes.append(f"circle {prefix}: turns found in the positions, by the angle about {where}")
-    return replace(source, circles=found, aligned="; ".join([source.aligned, *notes]).removeprefix("; "))
+    return replace(source, circles=result, aligned="; ".join([source.aligned, *notes]).removeprefix("; "))
 
 
 def _turns(source: Source, turn: Turn) -> tuple[tuple[Turn, ...], bool]:
     """Recorded turns of a circle, and whether they are about a centre of their own."""
     x, y = (np.asarray(source.curve(f"{axis}.x_a", "m")) for axis in turn.axes)
     spans = [
-        (each.path.sense, each.begin, each.begin + each.duration)
-        for each in read_circle([source.recording.path], turn.axes, radius=turn.radius).turns
-        if each.begin is not None and each.duration is not None
+        (recorded_turn.path.sense, recorded_turn.begin, recorded_turn.begin + recorded_turn.duration)
+        for recorded_turn in read_circle([source.recording.path], turn.axes, radius=turn.radius).turns
+        if recorded_turn.begin is not None and recorded_turn.duration is not None
     ]
     inside = np.any([(source.time >= begin) & (source.time <= end) for _, begin, end in spans], axis=0)
     own, _ = fitted_circle(x[inside], y[inside])
@@ -137,17 +137,17 @@ def stops(sources: Sequence[Source]) -> list[tuple[Approach, ...]]:
     Times are those of ``Source.t``.
     """
     own = [_stops(source) for source in sources]
-    first = next((found for found in own if found), ())
-    return [found or (first if source.shift is not None else ()) for found, source in zip(own, sources, strict=True)]
+    first = next((entry for entry in own if entry), ())
+    return [value or (first if source.shift is not None else ()) for value, source in zip(own, sources, strict=True)]
 
 
 def _stops(source: Source) -> tuple[Approach, ...]:
-    found: list[Approach] = []
+    result: list[Approach] = []
     for axis in source.axes:
         setpoint = source.curve(f"{axis}.x_s", "m")
         if setpoint is not None:
-            found += approaches(axis, source.t, setpoint)
-    return tuple(found)
+            result += approaches(axis, source.t, setpoint)
+    return tuple(result)
 
 
 def approaches(axis: str, time: Array, setpoint: Array) -> list[Approach]:

@@ -115,11 +115,11 @@ def run_campaign(
             _measure(machine, axis, inject, plan, realisation, fmus, progress, call_limit)
             for realisation in range(plan.realisations)
         ]
-        found = measured(measurements, pairs)
-        frequency = found.frequency
-        columns |= found.columns
-        units |= found.units
-        coherence |= found.coherence
+        frequency_response = measured(measurements, pairs)
+        frequency = frequency_response.frequency
+        columns |= frequency_response.columns
+        units |= frequency_response.units
+        coherence |= frequency_response.coherence
         first = measurements[0]
         excited.append(
             Excited(
@@ -132,9 +132,9 @@ def run_campaign(
             )
         )
         instances |= first.units
-        warnings += [warning for each in measurements for warning in each.warnings]
-        wall_time += sum(each.wall_time for each in measurements)
-        simulated += sum(float(each.trace.time[-1]) for each in measurements)
+        warnings += [warning for measurement in measurements for warning in measurement.warnings]
+        wall_time += sum(measurement.wall_time for measurement in measurements)
+        simulated += sum(float(measurement.trace.time[-1]) for measurement in measurements)
     assert frequency is not None  # there is an axis
     return Campaign(
         plan=plan,

@@ -47,12 +47,12 @@ def diagnosed(
     """
     turn = turns[0]
     paths = []
-    for each in turns:
-        measured = contour(trace, each, columns)
+    for entry in turns:
+        measured = contour(trace, entry, columns)
         if len(measured.angle) < MIN_PEAK_TURN_SAMPLES:
             return None
-        phase = (measured.time - measured.time[0]) * (2 * math.pi / (each.end - each.begin))
-        paths.append(TurnedPath(measured.angle, measured.deviation, each.sense, phase))
+        phase = (measured.time - measured.time[0]) * (2 * math.pi / (entry.end - entry.begin))
+        paths.append(TurnedPath(measured.angle, measured.deviation, entry.sense, phase))
     speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
     circle = CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}, recorded, response)
     return diagnose(circle, paths)
@@ -60,7 +60,7 @@ def diagnosed(
 
 def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
     """Figures of what makes the circle not round."""
-    found = {}
+    figures = {}
     first, second = diagnosis.circle.axes
     meanings = {
         "offset": "distance of the centre from the programmed one",
@@ -80,26 +80,26 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
         "centres": "distance of the centres of both directions",
         "rest": "what no cause explains, from peak to valley",
     }  # fmt: skip
-    for term in sorted(diagnosis.terms, key=lambda each: (FIGURE_ORDER.index(each.key), each.axis, each.order)):
+    for term in sorted(diagnosis.terms, key=lambda term: (FIGURE_ORDER.index(term.key), term.axis, term.order)):
         factor, unit = FIGURE_UNITS[term.unit]
-        found[figure_name(term)] = Figure(
+        figures[figure_name(term)] = Figure(
             factor * term.value, unit, meanings[term.key].format(axis=term.axis, order=term.order)
         )
     if diagnosis.lag is not None:
         meaning = "part of the mean radius deviation that path lag makes, by the response of the position loops"
-        found["radius_lag"] = Figure(1e6 * diagnosis.lag, "um", meaning)
+        figures["radius_lag"] = Figure(1e6 * diagnosis.lag, "um", meaning)
     vibration = diagnosis.vibration
     amplitude, frequency = (vibration.amplitude * 1e6, vibration.frequency) if vibration else (0.0, math.nan)
-    found["vibration"] = Figure(amplitude, "um", "amplitude of the strongest vibration; 0 where none stands out")
-    found["vibration_frequency"] = Figure(frequency, "Hz", "frequency of that vibration")
-    for each in diagnosis.vibrations:
-        if each.axis:
-            found[f"vibration_{each.axis}"] = Figure(
-                1e6 * each.amplitude, "um", f"amplitude of what {each.axis} swings"
+    figures["vibration"] = Figure(amplitude, "um", "amplitude of the strongest vibration; 0 where none stands out")
+    figures["vibration_frequency"] = Figure(frequency, "Hz", "frequency of that vibration")
+    for entry in diagnosis.vibrations:
+        if entry.axis:
+            figures[f"vibration_{entry.axis}"] = Figure(
+                1e6 * entry.amplitude, "um", f"amplitude of what {entry.axis} swings"
             )
-            meaning = f"frequency of what {each.axis} swings"
-            found[f"vibration_frequency_{each.axis}"] = Figure(each.frequency, "Hz", meaning)
-    return found
+            meaning = f"frequency of what {entry.axis} swings"
+            figures[f"vibration_frequency_{entry.axis}"] = Figure(entry.frequency, "Hz", meaning)
+    return figures
 
 
 def figure_name(term: Term) -> str:
@@ -112,25 +112,25 @@ def figure_name(term: Term) -> str:
 
 def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str]:
     """A sentence for every axis whose quadrant glitch, largest deviation in the quadrant, is not friction's peak."""
-    found = []
+    result = []
     for axis in diagnosis.circle.axes:
         peak, old = diagnosis[f"peaks {axis}"], glitches[f"glitch_{axis}"]
         off = abs(old.value * 1e-6 - peak.value)
         if off > max(MISLEADING * abs(peak.value), LEAST_MISLEADING):
             largest = max(
-                (term for term in diagnosis.terms if term.key not in ("peaks", "rest")), key=lambda each: each.size
+                (term for term in diagnosis.terms if term.key not in ("peaks", "rest")), key=lambda term: term.size
             )
-            found.append(
+            result.append(
                 f"glitch_{axis}, {old}, is the largest deviation in the quadrant whatever its cause; what stands out "
                 f"where {axis} reverses is peak_{axis}, {peak.value * 1e6:.3g} um. The rest is form, most of it "
                 f"{name(largest)}"
             )
-    return found
+    return result
 
 
 def bidirectional(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
     """ISO 230-4's figures of two turns in opposite senses, about the centre of the circle fitted to both."""
-    measured = [contour(trace, each) for each in (turn, back)]
+    measured = [contour(trace, entry) for entry in (turn, back)]
     return both_directions([(m.angle, m.deviation) for m in measured], turn.radius, turn.axes)
 
 

@@ -95,12 +95,12 @@ class CircleTask:
 
     def figures(self, trace: Trace) -> dict[str, Figure]:
         """Figures of the task, without prefix."""
-        found = circularity(trace, self.turn)
+        result = circularity(trace, self.turn)
         if self.back is not None:
-            found |= bidirectional(trace, self.turn, self.back)
-            found |= {f"clockwise.{name}": figure for name, figure in circularity(trace, self.back).items()}
+            result |= bidirectional(trace, self.turn, self.back)
+            result |= {f"clockwise.{name}": figure for name, figure in circularity(trace, self.back).items()}
         diagnosis = self.diagnosis(trace)
-        return found | (cause_figures(diagnosis) if diagnosis is not None else {})
+        return result | (cause_figures(diagnosis) if diagnosis is not None else {})
 
     def diagnosis(self, trace: Trace) -> Diagnosis | None:
         """Why the circle is not round; None where it has too few samples to say.
@@ -188,8 +188,8 @@ class AccuracyTask:
         """Figures of the task, without prefix."""
         return {
             f"{place}{name}": figure
-            for place, each in self.found(trace).items()
-            for name, figure in each.figures.items()
+            for place, accuracy in self.found(trace).items()
+            for name, figure in accuracy.figures.items()
         }
 
 
@@ -201,7 +201,7 @@ def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
 
     Raises InputError that lists every entry for which the program has nothing to evaluate.
     """
-    found: list[Task] = []
+    result: list[Task] = []
     problems: list[str] = []
     for i, item in enumerate(scenario.evaluate):
         try:
@@ -209,13 +209,13 @@ def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
         except InputError as error:
             problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in error.problems]
             continue
-        same = sum(other.prefix.partition("#")[0] == task.prefix for other in found)
+        same = sum(other.prefix.partition("#")[0] == task.prefix for other in result)
         if same:  # the same axis or plane once more: X, X#2, X#3
             task = replace(task, prefix=f"{task.prefix}#{same + 1}")
-        found.append(task)
+        result.append(task)
     if problems:
         raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
-    return tuple(found)
+    return tuple(result)
 
 
 def check(scenario: Scenario, program: Program) -> None:
@@ -226,14 +226,14 @@ def check(scenario: Scenario, program: Program) -> None:
     patterns = scenario.recording.variables
     problems = []
     for i, task in enumerate(tasks(scenario, program)):
-        found = [
+        result = [
             f"evaluation of {task.prefix} needs {name}, which recording.variables leaves out"
             for name in task.needs
             if patterns is not None and not any(matches(name, pattern) for pattern in patterns)
         ]
         if isinstance(task, PositioningTask):
-            found += _short_rest(task, program)
-        problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in found]
+            result += _short_rest(task, program)
+        problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in result]
     if problems:
         raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
 
@@ -242,17 +242,17 @@ def diagnoses(result: Result, asked: Sequence[Task] | None = None) -> dict[str, 
     """Why its circles are not round: prefix of a circle's figures -> what it is made of. asked: as of evaluate()."""
     asked = tasks(result.scenario, result.program) if asked is None else asked
     circles = [task for task in asked if isinstance(task, CircleTask)]
-    found = {task.prefix: task.diagnosis(result.trace) for task in circles}
-    return {prefix: diagnosis for prefix, diagnosis in found.items() if diagnosis is not None}
+    diagnoses = {task.prefix: task.diagnosis(result.trace) for task in circles}
+    return {prefix: diagnosis for prefix, diagnosis in diagnoses.items() if diagnosis is not None}
 
 
 def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Note, ...]:
     """Figures that do not mean what their names say, of this result."""
-    found = []
+    notes = []
     for prefix, diagnosis in diagnoses.items():
         own = {name.removeprefix(f"{prefix}."): f for name, f in figures.items() if name.startswith(f"{prefix}.")}
-        found += [Note(f"{prefix}: {sentence}") for sentence in misleading(diagnosis, own)]
-    return tuple(found)
+        notes += [Note(f"{prefix}: {sentence}") for sentence in misleading(diagnosis, own)]
+    return tuple(notes)
 
 
 def evaluate(result: Result, asked: Sequence[Task] | None = None) -> dict[str, Figure]:
@@ -325,9 +325,9 @@ def _turn(item: CircleTest, scenario: Scenario, program: Program) -> CircleTask:
     if (item.turn or 0) > turns:
         raise InputError(f"circularity: turn {item.turn} of a circle of {turns} turn{'s'[: turns != 1]}")
     turn, *back = (
-        Turn(each.axes, each.centre, each.radius, each.sense, *_even_turn(each, item.turn, program))
-        for each in (circle, circle.back)
-        if each is not None
+        Turn(circular.axes, circular.centre, circular.radius, circular.sense, *_even_turn(circular, item.turn, program))
+        for circular in (circle, circle.back)
+        if circular is not None
     )
     return CircleTask(axis_letters(circle.axes), turn, scenario.machine, back[0] if back else None)
 

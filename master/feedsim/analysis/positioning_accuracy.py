@@ -63,7 +63,7 @@ class Accuracy:
         def um(value: float | np.floating[Any], meaning: str) -> Figure:
             return Figure(1e6 * float(value), "um", meaning)
 
-        found = {
+        result = {
             "A": um(np.max(mean + 2 * s) - np.min(mean - 2 * s), "bidirectional accuracy of positioning (ISO 230-2)"),
             "R": um(np.max(self.R), "bidirectional repeatability of positioning, largest of all targets (ISO 230-2)"),
             "M": um(np.ptp(middle), "range of the mean bidirectional deviations (ISO 230-2)"),
@@ -72,13 +72,13 @@ class Accuracy:
             "E": um(np.ptp(mean), "bidirectional systematic deviation of positioning (ISO 230-2)"),
         }
         for side, m, d in zip(SIDES, mean, s, strict=True):
-            told = f"of approaches {side}wards (ISO 230-2)"
-            found |= {
-                f"A_{side}": um(np.max(m + 2 * d) - np.min(m - 2 * d), f"accuracy {told}"),
-                f"R_{side}": um(4 * np.max(d), f"repeatability {told}"),
-                f"E_{side}": um(np.ptp(m), f"systematic deviation {told}"),
+            reported = f"of approaches {side}wards (ISO 230-2)"
+            result |= {
+                f"A_{side}": um(np.max(m + 2 * d) - np.min(m - 2 * d), f"accuracy {reported}"),
+                f"R_{side}": um(4 * np.max(d), f"repeatability {reported}"),
+                f"E_{side}": um(np.ptp(m), f"systematic deviation {reported}"),
             }
-        return found
+        return result
 
 
 def readings(trace: Trace, visits: Visits, name: str, noise: float, rng: np.random.Generator) -> Array:
@@ -89,10 +89,10 @@ def readings(trace: Trace, visits: Visits, name: str, noise: float, rng: np.rand
     """
     purpose = f"positioning accuracy of axis {visits.axis}"
     position = column(trace, name, purpose)
-    found = np.empty((len(SIDES), len(visits.targets), visits.runs))
+    values = np.empty((len(SIDES), len(visits.targets), visits.runs))
     places = {target: i for i, target in enumerate(visits.targets)}
     for visit in visits.visits:
         rows = window(trace, visit.begin, visit.end, purpose)
         at = (0 if visit.sense > 0 else 1, places[visit.target], visit.run)
-        found[at] = position[rows.stop - 1] - visit.target + noise * rng.standard_normal()
-    return found
+        values[at] = position[rows.stop - 1] - visit.target + noise * rng.standard_normal()
+    return values

@@ -138,7 +138,7 @@ def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figu
     speed of the axis that was excited.
     """
     low, high = COMPARED
-    found: dict[str, Figure] = {}
+    figures: dict[str, Figure] = {}
     measured, speed = campaign.response, campaign.plan.offset_speed
     at_rest = system
     for name in measured:
@@ -155,7 +155,7 @@ def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figu
             decibel = float(np.max(np.abs(20 * np.log10(np.abs(quotient)))))
             degrees = float(np.max(np.abs(np.degrees(np.angle(quotient)))))
         key = figure_key(name)
-        found |= {
+        figures |= {
             f"{key}.measured_magnitude": Figure(
                 decibel, "dB", f"largest deviation of measured {name} from the closed form, {where}"
             ),
@@ -168,4 +168,4 @@ def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figu
                 f"share of the measured lines of {name}, {low:g} to {high:g} Hz, with a coherence above {COHERENT:g}",
             ),
         }
-    return found
+    return figures

@@ -75,22 +75,22 @@ class Source:
 
 def read_sources(paths: Sequence[Path]) -> list[Source]:
     """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such."""
-    found, problems = [], []
+    sources, problems = [], []
     for path, name in zip(paths, named_apart(paths), strict=True):
         try:
-            found.append(_read(path, name))
+            sources.append(_read(path, name))
         except InputError as error:
             problems += list(error.problems)
     if problems:
         raise InputError.of("nothing can be shown", problems)
-    return found
+    return sources
 
 
 def named_apart(paths: Sequence[Path]) -> list[str]:
     """The shortest ends of the paths that differ."""
     parts = [path.absolute().parts for path in paths]
     for count in range(1, max(map(len, parts), default=0) + 1):
-        names = ["/".join(each[-count:]) for each in parts]
+        names = ["/".join(part[-count:]) for part in parts]
         if len(set(names)) == len(names):
             return names
     return [f"{path} ({k})" for k, path in enumerate(paths, 1)]
@@ -104,7 +104,7 @@ def _read(path: Path, name: str) -> Source:
             "(FOLDER:17, FOLDER:max=FIGURE) is needed"
         )
     recording = read_recording(curves)
-    column = next((each for each in recording.names if each.lower() in TIME_NAMES), None)
+    column = next((name for name in recording.names if name.lower() in TIME_NAMES), None)
     if column is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
     factor = float(units.factor(recording.units[column] or "s", "s"))
@@ -115,14 +115,14 @@ def _read(path: Path, name: str) -> Source:
     if curves.name != RESULT or not summary.is_file():
         return Source(name, path, recording, time)
     try:
-        told = json.loads(summary.read_text(encoding="utf-8"))
+        reported = json.loads(summary.read_text(encoding="utf-8"))
         return Source(
             name, path, recording, time,
-            figures=_figures(told),
-            parameters=_parameters(told),
-            circles={prefix: tuple(map(_turn, turns)) for prefix, turns in told.get("circles", {}).items()},
-            answer=tuple(map(str, told.get("answer", ()))),
-            notes=tuple(str(told.get(part, {}).get("note") or "") for part in ("machine", "scenario")),
+            figures=_figures(reported),
+            parameters=_parameters(reported),
+            circles={prefix: tuple(map(_turn, turns)) for prefix, turns in reported.get("circles", {}).items()},
+            answer=tuple(map(str, reported.get("answer", ()))),
+            notes=tuple(str(reported.get(part, {}).get("note") or "") for part in ("machine", "scenario")),
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{summary}: is no summary of `feedsim run`: {type(error).__name__}: {error}") from None
@@ -130,46 +130,48 @@ def _read(path: Path, name: str) -> Source:
 
 def _figures(summary: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     """Name -> value and unit; of a compensation those of its compensated turn, by the names that a run gives them."""
-    found = {
-        key: (math.nan if each["value"] is None else float(each["value"]), str(each["unit"]))
-        for key, each in summary["figures"].items()
+    result = {
+        key: (math.nan if value["value"] is None else float(value["value"]), str(value["unit"]))
+        for key, value in summary["figures"].items()
     }
     if summary.get("kind") != "compensate":
-        return found
+        return result
     label = "".join(map(str, summary["compensation"]["turn"]["plane"]))
-    kept = {key: each for key, each in found.items() if not key.startswith("before.")}
+    kept = {key: value for key, value in result.items() if not key.startswith("before.")}
     return {f"{label}.{key.removeprefix('after.')}" if key.startswith("after.") else key: e for key, e in kept.items()}
 
 
-def _turn(told: Mapping[str, Any]) -> Turn:
-    first, second = map(str, told["axes"])
-    x, y = map(float, told["centre"]["value"])
-    span = float(told["begin"]["value"]), float(told["end"]["value"])
-    sense = {word: sense for sense, word in SENSE_WORDS.items()}[told["direction"]]
-    return Turn((first, second), (x, y), float(told["radius"]["value"]), sense, *span)
+def _turn(reported: Mapping[str, Any]) -> Turn:
+    first, second = map(str, reported["axes"])
+    x, y = map(float, reported["centre"]["value"])
+    span = float(reported["begin"]["value"]), float(reported["end"]["value"])
+    sense = {word: sense for sense, word in SENSE_WORDS.items()}[reported["direction"]]
+    return Turn((first, second), (x, y), float(reported["radius"]["value"]), sense, *span)
 
 
 def _parameters(summary: Mapping[str, Any]) -> dict[str, str]:
     """Everything that a person sets, dotted: of the machine, and of the scenario."""
-    found = {"scenario.motions": "; ".join(each["description"] for each in summary["scenario"]["motions"])}
+    result = {"scenario.motions": "; ".join(entry["description"] for entry in summary["scenario"]["motions"])}
     for group in ("coupling", "recording_interval"):
-        found |= _flat(f"scenario.{group}", summary["scenario"][group])
-    return found | _flat("machine", {key: summary["machine"][key] for key in ("name", "pose", "axes")})
+        result |= _flat(f"scenario.{group}", summary["scenario"][group])
+    return result | _flat("machine", {key: summary["machine"][key] for key in ("name", "pose", "axes")})
 
 
 def _flat(name: str, value: Any) -> dict[str, str]:
     if isinstance(value, Mapping):
         if set(value) == {"value", "unit"}:
             return {name: f"{value['value']:.9g} {value['unit']}" if value["value"] is not None else "none"}
-        return {key: text for part, each in value.items() for key, text in _flat(f"{name}.{part}", each).items()}
+        return {key: text for part, entry in value.items() for key, text in _flat(f"{name}.{part}", entry).items()}
     return {name: str(value)}
 
 
 def differing(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:
     """Parameters in which the results among the sources differ: name, and the value of every source, "" of records."""
-    told = [source.parameters for source in sources]
-    names = dict.fromkeys(name for each in told for name in each)
-    rows = [(name, [each.get(name, "") for each in told]) for name in names]
+    reported = [source.parameters for source in sources]
+    names = dict.fromkeys(name for entry in reported for name in entry)
+    rows = [(name, [entry.get(name, "") for entry in reported]) for name in names]
     return [
-        (name, values) for name, values in rows if len({v for v, each in zip(values, told, strict=True) if each}) > 1
+        (name, values)
+        for name, values in rows
+        if len({v for v, value in zip(values, reported, strict=True) if value}) > 1
     ]

@@ -69,7 +69,7 @@ def truncation(structure: Structure, pose: Mapping[str, float]) -> Truncation | 
 
 
 def figures(
-    found: Truncation, axes: Sequence[str], frequency: Floats, *, shown: Sequence[str] | None = None, tool: bool = True
+    result: Truncation, axes: Sequence[str], frequency: Floats, *, shown: Sequence[str] | None = None, tool: bool = True
 ) -> dict[str, Figure]:
     """Largest deviations of the reduced tables from the full one over `frequency` (F,) [Hz]; see deviations().
 
@@ -82,10 +82,10 @@ def figures(
     if tool:
         chosen += [loops.COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS]
     responses = {
-        name: structure_responses(modes, axes, frequency).select(chosen) for name, modes in found.tables.items()
+        name: structure_responses(modes, axes, frequency).select(chosen) for name, modes in result.tables.items()
     }
     full = responses.pop(FULL)
-    return deviations(responses, full, found.cutoff)
+    return deviations(responses, full, result.cutoff)
 
 
 def structure_responses(modes: Modes, axes: Sequence[str], frequency: Floats) -> FrequencyResponse:
@@ -113,17 +113,17 @@ def deviations(responses: Mapping[str, FrequencyResponse], full: FrequencyRespon
     Names are "Z.n_M.truncation_below" and "Z.n_M.truncation" of the reduced table, "Z.n_M.truncation_below_corrected"
     and "Z.n_M.truncation_corrected" of that with static correction, "tool.compliance_X.truncation" at the tool.
     """
-    found = {}
+    result = {}
     for model, response in responses.items():
         for name in full:
             size = np.abs(deviation(response, full, name))
             for key, limit in (("truncation_below", TRUSTED * cutoff), ("truncation", cutoff)):
                 within = full.frequency <= limit
                 largest = float(size[within].max()) if within.any() else np.nan
-                found[f"{loops.figure_key(name)}.{key}{_suffix(model)}"] = Figure(
+                result[f"{loops.figure_key(name)}.{key}{_suffix(model)}"] = Figure(
                     largest, "dB", f"largest deviation of {name}, {model}, from the full model up to {limit:g} Hz"
                 )
-    return found
+    return result
 
 
 def _suffix(model: str) -> str:

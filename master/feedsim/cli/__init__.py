@@ -145,10 +145,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _say(_kind_meant(options) if error.exit_code == 2 else "", error)
         return error.exit_code
     except ModuleNotFoundError as error:
-        if (told := missing(error, options.called)) is None:
+        if (missing_package := missing(error, options.called)) is None:
             raise
-        _say("", told)
-        return told.exit_code
+        _say("", missing_package)
+        return missing_package.exit_code
     except KeyboardInterrupt:
         print("feedsim: interrupted", file=sys.stderr)
         return 130

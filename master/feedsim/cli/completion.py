@@ -60,19 +60,19 @@ def _examples() -> list[str]:
     return sorted({example.name for example in examples()})
 
 
-def bash(found: Sequence[Place]) -> str:
+def bash(result: Sequence[Place]) -> str:
     """The script for bash."""
     offers = [f"    {_key(place)}) offered={_word(_joined(place.offered))} options={_word(_joined(place.options))} ;;"
-              for place in found]  # fmt: skip
+              for place in result]  # fmt: skip
     values = [f"    {_word(f'{place.command} {option}')}) options={_word(' '.join(known))} ;;"
-              for place in found for option, known in place.values]  # fmt: skip
+              for place in result for option, known in place.values]  # fmt: skip
     return "\n".join([
         "# feedsim completion bash: eval \"$(feedsim completion bash)\" in ~/.bashrc",
         "_feedsim() {",
         "  local i command='' offered='' options='' current=\"${COMP_WORDS[COMP_CWORD]}\"",
         "  for ((i = 1; i < COMP_CWORD; i++)); do",
         "    case \"$command ${COMP_WORDS[i]}\" in",
-        *(f"      {_word(walked)}) command={_word(place)} ;;" for walked, place in _walk(found)),
+        *(f"      {_word(walked)}) command={_word(place)} ;;" for walked, place in _walk(result)),
         "    esac",
         "  done",
         "  case \"$command\" in",
@@ -90,14 +90,14 @@ def bash(found: Sequence[Place]) -> str:
     ])  # fmt: skip
 
 
-def zsh(found: Sequence[Place]) -> str:
+def zsh(result: Sequence[Place]) -> str:
     """The script for zsh."""
 
     def listed(name: str, pairs: Sequence[tuple[str, str]]) -> str:
         return f"{name}=({' '.join(_word(f'{word}:{text}' if text else word) for word, text in pairs)})"
 
     values = [f"    {_word(f'{place.command} {option}')}) compadd -- {' '.join(known)}; return ;;"
-              for place in found for option, known in place.values]  # fmt: skip
+              for place in result for option, known in place.values]  # fmt: skip
     return "\n".join([
         "#compdef feedsim",
         "# feedsim completion zsh: eval \"$(feedsim completion zsh)\" in ~/.zshrc, behind compinit",
@@ -106,12 +106,12 @@ def zsh(found: Sequence[Place]) -> str:
         "  local -a offered options",
         "  for word in \"${(@)words[2,CURRENT-1]}\"; do",
         "    case \"$command $word\" in",
-        *(f"      {_word(walked)}) command={_word(place)} ;;" for walked, place in _walk(found)),
+        *(f"      {_word(walked)}) command={_word(place)} ;;" for walked, place in _walk(result)),
         "    esac",
         "  done",
         "  case \"$command\" in",
         *(f"    {_key(place)}) {listed('offered', place.offered)}; {listed('options', place.options)} ;;"
-          for place in found),
+          for place in result),
         "  esac",
         "  case \"$command ${words[CURRENT-1]}\" in",
         *values,
@@ -125,7 +125,7 @@ def zsh(found: Sequence[Place]) -> str:
     ])  # fmt: skip
 
 
-def fish(found: Sequence[Place]) -> str:
+def fish(result: Sequence[Place]) -> str:
     """The script for fish."""
     lines = [
         "# feedsim completion fish > ~/.config/fish/completions/feedsim.fish",
@@ -133,13 +133,13 @@ def fish(found: Sequence[Place]) -> str:
         "  set -l command ''",
         "  for word in (commandline -opc)[2..-1]",
         "    switch \"$command $word\"",
-        *(f"      case {_word(walked)}\n        set command {_word(place)}" for walked, place in _walk(found)),
+        *(f"      case {_word(walked)}\n        set command {_word(place)}" for walked, place in _walk(result)),
         "    end",
         "  end",
         "  test \"$command\" = \"$argv\"",
         "end",
     ]  # fmt: skip
-    for place in found:
+    for place in result:
         at = f"complete -c feedsim -n {_word(f'__feedsim_at {place.command}'.strip())}"
         lines += [f"{at} -f -a {_word(word)} -d {_word(text)}" for word, text in place.offered]
         known = dict(place.values)
@@ -149,9 +149,9 @@ def fish(found: Sequence[Place]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _walk(found: Sequence[Place]) -> Iterator[tuple[str, str]]:
+def _walk(result: Sequence[Place]) -> Iterator[tuple[str, str]]:
     """The command so far and the next word -> the command then."""
-    for place in found:
+    for place in result:
         if place.command:
             above, _, last = place.command.rpartition(" ")
             yield f"{above} {last}", place.command

@@ -14,16 +14,16 @@ def example(options: Namespace) -> None:
 
     there = examples.examples()
     if options.names or options.to:
-        written = examples.copy(options.names or [each.name for each in there], options.to or Path())
+        written = examples.copy(options.names or [entry.name for entry in there], options.to or Path())
         print("\n".join(map(str, written)) or "all there already")
         return
     kind = ""
-    width = max(len(each.name) for each in there)
-    for each in there:
-        if each.kind != kind:
-            kind = each.kind
+    width = max(len(entry.name) for entry in there)
+    for item in there:
+        if item.kind != kind:
+            kind = item.kind
             print(f"{kind}:")
-        print(f"  {each.name:{width}}  {each.about}")
+        print(f"  {item.name:{width}}  {item.about}")
     print("\nfeedsim example NAME copies one into the working folder, with the files that it names")
     print("feedsim example --to scenarios copies all, to where the commands of the documentation have them")
 

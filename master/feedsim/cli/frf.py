@@ -54,9 +54,9 @@ def frf(options: Namespace) -> None:
 
 
 def _names(text: str) -> tuple[str, ...]:
-    if not (found := names(text)):
+    if not (result := names(text)):
         raise ArgumentTypeError("names of axes are needed, such as X,Z")
-    return found
+    return result
 
 
 COMMAND = Command(

@@ -130,14 +130,14 @@ INPUT_KINDS = (
 def kind(path: Path) -> Kind | None:
     """What a file or folder is, as far as its names and its beginning show; None: nothing that is known here."""
     try:
-        return next((each for each in INPUT_KINDS if each.is_one(path)), None)
+        return next((entry for entry in INPUT_KINDS if entry.is_one(path)), None)
     except OSError:
         return None
 
 
 def taken(command: str) -> list[str]:
     """Names of the kinds that a command takes."""
-    return [*dict.fromkeys(each.name for each in INPUT_KINDS if command in each.commands)]
+    return [*dict.fromkeys(entry.name for entry in INPUT_KINDS if command in entry.commands)]
 
 
 def meant(command: str, values: Iterable[Any]) -> str:
@@ -148,11 +148,11 @@ def meant(command: str, values: Iterable[Any]) -> str:
     """
     own = taken(command)
     for path in _paths(values) if own else ():
-        found = kind(path)
-        if found is not None and command not in found.commands:
-            other = f", which feedsim {found.commands[0]} takes" if found.commands else ""
-            what = _result(path) if found.name == NO_RECORD else ""
-            return f"{path} {what or f'is {found.name}{other}'}; feedsim {command} takes {_either(own)}"
+        result = kind(path)
+        if result is not None and command not in result.commands:
+            other = f", which feedsim {result.commands[0]} takes" if result.commands else ""
+            what = _result(path) if result.name == NO_RECORD else ""
+            return f"{path} {what or f'is {result.name}{other}'}; feedsim {command} takes {_either(own)}"
     return ""
 
 

@@ -185,10 +185,10 @@ def amount(text: str, unit: str, example: str = "", *, positive: bool = False) -
 
 def halves(option: str, text: str, needed: str) -> tuple[str, str]:
     """What stands before and behind the first "=". needed: of the message of InputError, where a half is missing."""
-    left, equals, right = (part.strip() for part in text.partition("="))
-    if not (left and equals and right):
+    remaining, equals, right = (part.strip() for part in text.partition("="))
+    if not (remaining and equals and right):
         raise InputError(f"--{option} {text}: {needed}")
-    return left, right
+    return remaining, right
 
 
 def by_name(
@@ -199,14 +199,14 @@ def by_name(
     needed: as for :func:`halves`. common: a value without a name is allowed, and stands under "".
     Raises InputError, which names the option and the text: no such form, a name twice, what `read` finds.
     """
-    found: dict[str, T] = {}
+    result: dict[str, T] = {}
     for text in texts:
         name, value = ("", text) if common and "=" not in text else halves(option, text, needed)
         with given(option, text):
-            if name in found:
+            if name in result:
                 raise InputError(f"{name or 'that of all axes'} is given twice")
-            found[name] = read(name, value)
-    return found
+            result[name] = read(name, value)
+    return result
 
 
 def pairs(option: str, texts: Sequence[str], needed: str, *, common: bool = False) -> dict[str, str]:

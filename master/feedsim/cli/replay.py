@@ -74,10 +74,12 @@ def identify_drive(options: Namespace) -> None:
             control=options.control,
             watch=watch,
         )
-    found = result.drives.found
-    head = f"drive of {', '.join(found.drives)} from {options.record.name} -> {out / 'report.html'}"
+    drives_found = result.drives.found
+    head = f"drive of {', '.join(drives_found.drives)} from {options.record.name} -> {out / 'report.html'}"
     written = (
-        [f"  feedsim replay RECORD --machine {out} replays records on it"] if "machine.yaml" in found.files else []
+        [f"  feedsim replay RECORD --machine {out} replays records on it"]
+        if "machine.yaml" in drives_found.files
+        else []
     )
     finish(options.quiet, result.findings, head, *result.lines, *written)
 

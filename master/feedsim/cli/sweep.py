@@ -107,19 +107,19 @@ def _dry_run(study: Study, planned: Design, options: Namespace) -> int:
     for i, parameter in enumerate(planned.parameters):
         column = planned.values[:, i]
         if parameter.worded:
-            told = ", ".join(choice.label for choice in parameter.choices)
+            reported = ", ".join(choice.label for choice in parameter.choices)
         else:
-            told = f"{column.min():.6g} to {column.max():.6g} {parameter.unit}".removesuffix(" 1")
+            reported = f"{column.min():.6g} to {column.max():.6g} {parameter.unit}".removesuffix(" 1")
         times = "factor " if parameter.factor else ""
-        print(f"  {parameter.name}: {times}{told} ({', '.join(parameter.keys)})")
-    found = trial(study, planned, options.fmus)
-    warn(f"run {run} fails: {why}" for run, why in found.failed.items())
-    names = ", ".join(chosen(found.figures, study.figures))
+        print(f"  {parameter.name}: {times}{reported} ({', '.join(parameter.keys)})")
+    result = trial(study, planned, options.fmus)
+    warn(f"run {run} fails: {why}" for run, why in result.failed.items())
+    names = ", ".join(chosen(result.figures, study.figures))
     print(f"  figures: {names}")
-    if found.failed:
-        print(f"  {len(found.failed)} of the {found.tried} runs tried fail")
-    least, most = found.seconds
-    which = f"run{'s'[: len(found.runs) != 1]} {', '.join(map(str, found.runs))}"
+    if result.failed:
+        print(f"  {len(result.failed)} of the {result.tried} runs tried fail")
+    least, most = result.seconds
+    which = f"run{'s'[: len(result.runs) != 1]} {', '.join(map(str, result.runs))}"
     print(
         f"  {which} took {_range(least, most, '{:.2g} s'.format)}; all together about "
         f"{_range(least * planned.runs, most * planned.runs, _duration)} on one core"

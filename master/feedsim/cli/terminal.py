@@ -144,11 +144,11 @@ def painted(text: str, colour: str, stream: Any) -> str:
 
 def warn(warnings: Iterable[str]) -> None:
     """Say on standard error what the user should know before believing the results; what is wrong first."""
-    for each in ranked(warnings):
+    for name in ranked(warnings):
         kind, colour = {"wrong": (WRONG, "red"), "doubt": ("warning: ", "yellow"), "note": ("note: ", "")}[
-            severity(each)
+            severity(name)
         ]
-        print(painted(f"feedsim: {kind}{each}", colour, sys.stderr), file=sys.stderr)
+        print(painted(f"feedsim: {kind}{name}", colour, sys.stderr), file=sys.stderr)
 
 
 def announce(
@@ -178,5 +178,7 @@ def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:
     warnings = ranked(warnings)
     warn(warnings)
     if not quiet:
-        wrong = [painted(WRONG + each, "red", sys.stdout) for each in warnings[:1] if severity(each) == "wrong"]
+        wrong = [
+            painted(WRONG + warning, "red", sys.stdout) for warning in warnings[:1] if severity(warning) == "wrong"
+        ]
         print(*wrong, *lines, sep="\n")

@@ -44,8 +44,8 @@ def _beside_the_line(time: Array, values: Array, rows: Rows) -> tuple[Array, Arr
         return np.zeros(len(rows)), np.zeros(len(rows))
     off = values - along(time[rows], values[rows], time)
     off[rows] = 0.0
-    found = [np.r_[0.0, extreme.reduceat(off, rows[:-1])] for extreme in (np.minimum, np.maximum)]
-    return np.minimum(found[0], 0.0), np.maximum(found[1], 0.0)
+    result = [np.r_[0.0, extreme.reduceat(off, rows[:-1])] for extreme in (np.minimum, np.maximum)]
+    return np.minimum(result[0], 0.0), np.maximum(result[1], 0.0)
 
 
 def bounds_of(reference: Path) -> Series | None:
@@ -67,7 +67,7 @@ def check_bounds(between: Series, reference: Series) -> None:
     for name in names:
         stem = name.removesuffix(BELOW).removesuffix(ABOVE)
         pair = (stem + BELOW, stem + ABOVE)
-        if stem not in reference.all_names or stem == name or not all(each in between for each in pair):
+        if stem not in reference.all_names or stem == name or not all(name in between for name in pair):
             raise InputError(
                 f"the bounds beside the reference have a column {name!r}; pairs NAME{BELOW}, NAME{ABOVE} of numbers "
                 "are needed, NAME a column of the reference"
@@ -88,7 +88,7 @@ class Between:
         self.rows = time
         # Lines beside the one from row to row; they jump at the rows.
         ends = np.repeat(values, 2)[1:-1]
-        lines = [ends + np.repeat(np.asarray(each)[1:], 2) for each in (below, above)]
+        lines = [ends + np.repeat(np.asarray(values)[1:], 2) for values in (below, above)]
         known = np.isfinite(lines[0]) & np.isfinite(lines[1])
         self.time = np.repeat(time, 2)[1:-1][known]
         self.low, self.high = (line[known] for line in lines)

@@ -58,11 +58,11 @@ def compare(
     def again(options: Options) -> Comparison:
         return _compared(result, reference, tolerances, options, between, names)
 
-    found = again(options)
-    if found.those("different"):
+    comparison = again(options)
+    if comparison.those("different"):
         ours, theirs = with_units(result, options.units), with_units(reference, options.reference_units)
-        found = replace(found, looks_like=likeness(found, ours, theirs, tolerances, options, again))
-    return replace(found, variables=_light(found.variables))
+        comparison = replace(comparison, looks_like=likeness(comparison, ours, theirs, tolerances, options, again))
+    return replace(comparison, variables=_light(comparison.variables))
 
 
 def _compared(
@@ -75,46 +75,46 @@ def _compared(
 ) -> Comparison:
     """compare(), with the curves of all variables."""
     asked = [name for name in chosen(reference.all_names, options) if not tolerances.of(name).ignore]
-    found = sources((*result.all_names, *result.skipped), asked, options)
+    results = sources((*result.all_names, *result.skipped), asked, options)
     notes = _unused(result, reference, tolerances, options)
     notes += units_told(reference.units, asked, options.reference_units, "reference")
-    notes += units_told(result.units, found.values(), options.units, "result")
+    notes += units_told(result.units, results.values(), options.units, "result")
     result, reference = with_units(result, options.units), with_units(reference, options.reference_units)
     unused = tuple(tolerances.unused(reference.all_names))
     blank = Comparison(*names, "unusable", notes=tuple(notes), shift=options.shift, unused=unused)
-    if not found:
+    if not results:
         wanted = missing(asked[0], result.names) if asked else "every column of the reference is left out"
         return replace(blank, problem=f"no column in common: {wanted}")
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
-    held = _held(between, reference)
-    reach = min(tolerances.of(name).time or 0.0 for name in found)
-    over = Overlap(result, reference, options, reach, bounded=held.keys() >= found.keys())
+    fixed = _held(between, reference)
+    reach = min(tolerances.of(name).time or 0.0 for name in results)
+    over = Overlap(result, reference, options, reach, bounded=fixed.keys() >= results.keys())
     peers = _magnitudes(reference, asked)
     blank = replace(blank, start=over.start, end=over.end)
     if over.problem:
         return replace(blank, problem=over.problem)
     notes += over.notes
-    told: dict[str, list[str]] = {}
+    reported: dict[str, list[str]] = {}
     variables = []
     for name in asked:
-        if fault := _not_read(reference, name, found.get(name), result):
+        if fault := _not_read(reference, name, results.get(name), result):
             variables.append(
-                Variable(name, "unusable", found.get(name, ""), reference.units.get(name, ""), reason=fault)
+                Variable(name, "unusable", results.get(name, ""), reference.units.get(name, ""), reason=fault)
             )
-        elif name in found:
-            variable, remarks = _variable(over, name, found[name], tolerances, peers, held.get(name))
+        elif name in results:
+            variable, remarks = _variable(over, name, results[name], tolerances, peers, fixed.get(name))
             for remark in remarks:
-                told.setdefault(remark, []).append(name)
+                reported.setdefault(remark, []).append(name)
             variables.append(variable)
         elif not options.common:
             variables.append(Variable(name, "missing", reason=missing(name, result.names)))
-    notes += [f"{few(who, LISTED)}: {remark}" for remark, who in told.items()]
+    notes += [f"{few(who, LISTED)}: {remark}" for remark, who in reported.items()]
     notes += _default(variables, reference, tolerances)
     verdict: Verdict = "same"
-    if over.uncovered or any(each.verdict in ("different", "missing") for each in variables):
+    if over.uncovered or any(variable.verdict in ("different", "missing") for variable in variables):
         verdict = "different"
-    if any(each.verdict == "unusable" for each in variables):
+    if any(variable.verdict == "unusable" for variable in variables):
         verdict = "unusable"
     coverage = _coverage(over, variables)
     problem = over.uncovered
@@ -140,14 +140,14 @@ def _held(between: Series | None, reference: Series) -> dict[str, Between]:
 
 
 def _coverage(over: Overlap, variables: Sequence[Variable]) -> Coverage | None:
-    compared = [each for each in variables if each.verdict in ("same", "different")]
+    compared = [variable for variable in variables if variable.verdict in ("same", "different")]
     if not compared:
         return None
     result, reference = over.result, over.reference
     return Coverage(
-        rows=min(each.covered for each in compared),
+        rows=min(variable.covered for variable in compared),
         of_rows=len(result),
-        columns=len({each.source for each in compared}),
+        columns=len({variable.source for variable in compared}),
         of_columns=len(result.all_names) + len(result.skipped),
         of_reference=len(reference.all_names) + len(reference.skipped),
         time=over.time_compared,
@@ -243,10 +243,10 @@ def _variable(
 
 def _light(variables: Sequence[Variable]) -> tuple[Variable, ...]:
     """Curves of the worst ones only."""
-    ranked = sorted(variables, key=lambda each: (-each.ratio, -each.deviation))
-    kept = [each.name for each in ranked if each.curves is not None][:CURVES]
+    ranked = sorted(variables, key=lambda variable: (-variable.ratio, -variable.deviation))
+    kept = [variable.name for variable in ranked if variable.curves is not None][:CURVES]
     keep = {name for i, name in enumerate(kept) if i == 0 or next(v for v in variables if v.name == name).outside}
-    return tuple(each if each.name in keep else replace(each, curves=None) for each in variables)
+    return tuple(variable if variable.name in keep else replace(variable, curves=None) for variable in variables)
 
 
 def _unused(result: Series, reference: Series, tolerances: Tolerances, options: Options) -> list[str]:
@@ -270,20 +270,20 @@ def _default(variables: Sequence[Variable], reference: Series, tolerances: Toler
     """What the default allows where no tolerance is given, beside what matters: how near a variable is to another one
     that it follows, such as a position to its setpoint."""
     compared = [
-        each
-        for each in variables
-        if each.verdict in ("same", "different") and each.deviation > 0 and not tolerances.given(each.name)
+        variable
+        for variable in variables
+        if variable.verdict in ("same", "different") and variable.deviation > 0 and not tolerances.given(variable.name)
     ]
     if not compared:
         return []
-    names = few([each.name for each in compared], LISTED)
+    names = few([variable.name for variable in compared], LISTED)
     text = f"no tolerance is given for {names}: {DEFAULT:g} of the range is allowed"
-    followed = [(each, *_leader(each, reference)) for each in compared]
-    each, leader, apart = max(followed, key=lambda item: item[0].allowed / item[2] if item[2] else 0.0)
+    followed = [(variable, *_leader(variable, reference)) for variable in compared]
+    entry, leader, apart = max(followed, key=lambda item: item[0].allowed / item[2] if item[2] else 0.0)
     if apart:
         text += (
-            f", {each.allowed:.3g} {each.unit} of {each.name}, which differs from {leader} by {apart:.3g} {each.unit} "
-            f"at most; --tol '{each.name}={DEFAULT * apart:.1g} {each.unit}' is a thousandth of that"
+            f", {entry.allowed:.3g} {entry.unit} of {entry.name}, which differs from {leader} by {apart:.3g} "
+            f"{entry.unit} at most; --tol '{entry.name}={DEFAULT * apart:.1g} {entry.unit}' is a thousandth of that"
         )
     return [text]
 
@@ -307,12 +307,12 @@ def _leader(variable: Variable, reference: Series) -> tuple[str, float]:
 
 def _magnitudes(reference: Series, names: Sequence[str]) -> dict[str, float]:
     """Unit -> largest magnitude of the reference's columns in it; of plain numbers none."""
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for name in names:
         if name in reference and (unit := reference.units[name]) not in ("", "1"):
             values = np.abs(reference[name])
-            found[unit] = max(found.get(unit, 0.0), float(values[np.isfinite(values)].max(initial=0.0)))
-    return found
+            result[unit] = max(result.get(unit, 0.0), float(values[np.isfinite(values)].max(initial=0.0)))
+    return result
 
 
 def _not_read(reference: Series, name: str, source: str | None, result: Series) -> str:

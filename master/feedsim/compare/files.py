@@ -30,7 +30,7 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
     """
     if len(paths) % 2 or not paths:
         raise InputError(f"{len(paths)} files given; RESULT and REFERENCE are needed in turn")
-    found: list[tuple[Path, Path]] = []
+    results: list[tuple[Path, Path]] = []
     for result, reference in zip(paths[::2], paths[1::2], strict=True):
         if reference.is_dir() and result.is_dir():
             files = sorted(path for path in reference.rglob("*") if path.suffix.lower() == ".csv" and path.is_file())
@@ -39,14 +39,14 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
             files = [path for path in files if not path.name.endswith(BOUNDS)]
             if not files:
                 raise InputError(f"{reference}: there is no CSV file in the folder of references")
-            found += [(_counterpart(result, path.relative_to(reference)), path) for path in files]
+            results += [(_counterpart(result, path.relative_to(reference)), path) for path in files]
         elif reference.is_dir() and not result.is_file():
             raise InputError(f"{result}: no such folder of results")
         elif reference.is_dir():
-            found.append((result, reference / result.name))
+            results.append((result, reference / result.name))
         else:
-            found.append((result / reference.name if result.is_dir() else result, reference))
-    return found
+            results.append((result / reference.name if result.is_dir() else result, reference))
+    return results
 
 
 def compare_files(

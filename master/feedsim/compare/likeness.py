@@ -43,7 +43,7 @@ class _Guess:
 
 
 def likeness(
-    found: Comparison,
+    comparison: Comparison,
     result: Series,
     reference: Series,
     tolerances: Tolerances,
@@ -54,46 +54,54 @@ def likeness(
 
     found: with the curves of all variables. again: the same comparison with other options.
     """
-    asked = [each for each in found.those("different") if each.curves is not None and _enough(each.curves)]
+    asked = [
+        variable
+        for variable in comparison.those("different")
+        if variable.curves is not None and _enough(variable.curves)
+    ]
     if not asked:
         return ()
     guessed: dict[str, _Guess] = {}
     open_ones: list[Variable] = []  # that no guess of their values explains to the last row
-    for each in asked:
-        assert each.curves is not None
-        guesses = [] if each.curves.hold else list(_guesses(each, each.curves, result))
+    for entry in asked:
+        assert entry.curves is not None
+        guesses = [] if entry.curves.hold else list(_guesses(entry, entry.curves, result))
         if guesses:
-            guessed[each.name] = min(guesses, key=lambda guess: guess.left)
-        if not guesses or guessed[each.name].outside:
-            open_ones.append(each)
+            guessed[entry.name] = min(guesses, key=lambda guess: guess.left)
+        if not guesses or guessed[entry.name].outside:
+            open_ones.append(entry)
     shift = _shifted(open_ones, result, reference, tolerances, options) if open_ones else None
     if shift is not None and abs(shift - options.shift) <= WHOLE_ROW_TOLERANCE * usual_step(result.time):
         shift = None  # where it is now it fits best
     late: list[Variable] = []
-    for each in open_ones:
-        assert each.curves is not None
-        left = np.inf if shift is None else _rest(each.curves, shift - options.shift)
-        if left <= EXPLAINED * _rms(_difference(each.curves)) and (
-            each.name not in guessed or left < guessed[each.name].left
+    for entry in open_ones:
+        assert entry.curves is not None
+        remaining = np.inf if shift is None else _rest(entry.curves, shift - options.shift)
+        if remaining <= EXPLAINED * _rms(_difference(entry.curves)) and (
+            entry.name not in guessed or remaining < guessed[entry.name].left
         ):
-            late.append(each)
-            guessed.pop(each.name, None)
+            late.append(entry)
+            guessed.pop(entry.name, None)
     groups: dict[str, list[Variable]] = {}
-    for each in asked:
-        if each.name in guessed:
-            groups.setdefault(guessed[each.name].words, []).append(each)
+    for entry in asked:
+        if entry.name in guessed:
+            groups.setdefault(guessed[entry.name].words, []).append(entry)
     outside = {name: guess.outside for name, guess in guessed.items()}
     made = [_told(those, words, outside) for words, those in groups.items()]
     if late and shift is not None:
-        after = {each.name: each.outside for each in again(replace(options, shift=shift)).variables}
+        after = {variable.name: variable.outside for variable in again(replace(options, shift=shift)).variables}
         made.insert(0, _told(late, _time_words(shift, options.shift, result), after))
     return tuple(made)
 
 
 def _told(those: Sequence[Variable], words: str, outside: Mapping[str, int | None]) -> Proposal:
     """The same words of several variables, and what it would change; outside: rows that it would leave outside."""
-    names = [each.name for each in those]
-    rest = [f"{outside[each.name]} of {each.rows} rows of {each.name}" for each in those if outside.get(each.name)]
+    names = [variable.name for variable in those]
+    rest = [
+        f"{outside[variable.name]} of {variable.rows} rows of {variable.name}"
+        for variable in those
+        if outside.get(variable.name)
+    ]
     if all(outside.get(name) is None for name in names):
         then = ""
     elif rest:
@@ -135,16 +143,16 @@ def _shifted(
     begin = max(float(reference.time[0]), -np.inf if options.start is None else options.start)
     end = min(float(reference.time[-1]), np.inf if options.end is None else options.end)
     most = min(MAX_SHIFT_SHARE * (end - begin), max(MAX_SHIFT_TIME, MAX_SHIFT_STEPS * step)) + abs(options.shift)
-    names = [each.name for each in sorted(asked, key=lambda each: -each.ratio)[:VARIABLES_SEARCHED]]
+    names = [variable.name for variable in sorted(asked, key=lambda entry: -entry.ratio)[:VARIABLES_SEARCHED]]
     thin = max(1, len(result) // ROWS_SEARCHED)
     every = Series(result.time[::thin], {name: y[::thin] for name, y in result.columns.items()}, result.units)
     others = [name for name in reference.all_names if name not in names]
     try:
-        found = estimated_shift(every, reference, most, replace(options, only=(), ignore=others), tolerances).seconds
+        value = estimated_shift(every, reference, most, replace(options, only=(), ignore=others), tolerances).seconds
     except InputError:
         return None
-    rows = round(found / step) if step else 0
-    return rows * step if rows and abs(found - rows * step) <= WHOLE_ROW_TOLERANCE * step else found
+    rows = round(value / step) if step else 0
+    return rows * step if rows and abs(value - rows * step) <= WHOLE_ROW_TOLERANCE * step else value
 
 
 def _time_words(shift: float, before: float, result: Series) -> str:
@@ -183,15 +191,15 @@ def _guesses(variable: Variable, curves: Curves, result: Series) -> Iterator[_Gu
     gain = float((y[known] / size) @ (x[known] / size) / ((x[known] / size) @ (x[known] / size))) if size else 0.0
     if gain and np.isfinite(gain) and abs(gain - 1) > LIKE_A_UNIT and size:
         words, exact = _factor_words(gain, variable, header)
-        left = _rms(y - exact * x)
-        if left <= EXPLAINED * min(off, _rms(y)):
-            yield _Guess(left, words, _outside(curves, y / exact))
+        remaining = _rms(y - exact * x)
+        if remaining <= EXPLAINED * min(off, _rms(y)):
+            yield _Guess(remaining, words, _outside(curves, y / exact))
     constant = float(np.median((y - x)[known]))
-    left = _rms(y - x - constant)
-    if constant and left <= EXPLAINED * off:
+    remaining = _rms(y - x - constant)
+    if constant and remaining <= EXPLAINED * off:
         unit = f" {variable.unit}" if variable.unit not in ("", "1") else ""
         words = f"{'more' if constant > 0 else 'less'} by {abs(constant):.4g}{unit} throughout: another zero point?"
-        yield _Guess(left, words, _outside(curves, y - constant))
+        yield _Guess(remaining, words, _outside(curves, y - constant))
 
 
 def _outside(curves: Curves, values: Array) -> int:
@@ -209,13 +217,13 @@ def _factor_words(gain: float, variable: Variable, header: str) -> tuple[str, fl
     meant = header or variable.unit
     for unit in MISTAKEN:
         try:
-            each = factor(meant, variable.unit)[0] / factor(unit, variable.unit or meant)[0]
+            value = factor(meant, variable.unit)[0] / factor(unit, variable.unit or meant)[0]
         except InputError:
             continue
-        if unit != meant and abs(abs(gain) / each - 1) <= LIKE_A_UNIT:
+        if unit != meant and abs(abs(gain) / value - 1) <= LIKE_A_UNIT:
             cure = f"its header says {header}" if header else f"--unit '{variable.source}={unit}'"
-            parts = [turned, f"factor {each:.6g}: in {unit}? ({cure})"]
-            return ", ".join(part for part in parts if part), sign * each
+            parts = [turned, f"factor {value:.6g}: in {unit}? ({cure})"]
+            return ", ".join(part for part in parts if part), sign * value
     parts = [turned, f"{abs(gain):.6g} times the reference throughout"]
     return ", ".join(part for part in parts if part), gain
 

@@ -25,9 +25,9 @@ def lines_of(
     """
     # Of many pairs those that are the same take one line.
     full = everything or len(comparisons) == 1
-    found = [line for pair in comparisons for line in _lines(pair, everything, full)]
+    result = [line for pair in comparisons for line in _lines(pair, everything, full)]
     return [
-        *found,
+        *result,
         *_default(comparisons),
         *_unused(comparisons, tolerances),
         *_unreferenced(comparisons, asked),
@@ -37,18 +37,18 @@ def lines_of(
 
 def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
     """What the terminal shows of a pair; notes: although it is the same."""
-    found = [f"{comparison.result} against {comparison.reference}: {comparison.line}"]
+    results = [f"{comparison.result} against {comparison.reference}: {comparison.line}"]
     if comparison.shift:
-        found.append(f"  shifted by {seconds(comparison.shift)}")
-    ranked = sorted(comparison.variables, key=lambda each: (-each.ratio, each.verdict == "same"))
-    shown = [each for each in ranked if everything or each.verdict != "same"]
+        results.append(f"  shifted by {seconds(comparison.shift)}")
+    ranked = sorted(comparison.variables, key=lambda variable: (-variable.ratio, variable.verdict == "same"))
+    shown = [variable for variable in ranked if everything or variable.verdict != "same"]
     cut = shown if everything else shown[:MOST_LINES]
-    width = max((len(each.name) for each in cut), default=0)
-    found += [f"  {each.name:<{width}}  {_variable_line(each)}" for each in cut]
+    width = max((len(variable.name) for variable in cut), default=0)
+    results += [f"  {variable.name:<{width}}  {_variable_line(variable)}" for variable in cut]
     if len(shown) > len(cut):
-        found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
-    found += [f"  looks like: {each.text}" for each in comparison.looks_like]
-    return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
+        results.append(f"  and {len(shown) - len(cut)} more; --all lists them")
+    results += [f"  looks like: {proposal.text}" for proposal in comparison.looks_like]
+    return results + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
 
 
 def _variable_line(variable: Variable) -> str:
@@ -61,7 +61,11 @@ def _default(comparisons: Sequence[Comparison]) -> list[str]:
     if len(comparisons) == 1:
         return []
     hidden = [
-        (each, note) for each in comparisons if each.same for note in each.notes if note.startswith("no tolerance")
+        (comparison, note)
+        for comparison in comparisons
+        if comparison.same
+        for note in comparison.notes
+        if note.startswith("no tolerance")
     ]
     more = f" (as in {len(hidden) - 1} more)" if len(hidden) > 1 else ""
     return [f"note: {hidden[0][0].result}: {hidden[0][1]}{more}"] if hidden else []
@@ -74,35 +78,41 @@ def _unused(comparisons: Sequence[Comparison], tolerances: Path | None) -> list[
     that there a note is made only where none of its patterns matches.
     """
     by_file: dict[Path, list[set[str]]] = {}
-    for each in comparisons:
-        if (file := tolerances or beside(Path(each.reference))) is not None and each.variables:
-            by_file.setdefault(file, []).append(set(each.unused))
-    found = []
+    for comparison in comparisons:
+        if (file := tolerances or beside(Path(comparison.reference))) is not None and comparison.variables:
+            by_file.setdefault(file, []).append(set(comparison.unused))
+    result = []
     for file, unused in by_file.items():
         own = [pattern for pattern, _ in tolerances_of(file, file, ()).rules if pattern != "*"]
-        nowhere = [pattern for pattern in own if all(pattern in each for each in unused)]
+        nowhere = [pattern for pattern in own if all(pattern in entry for entry in unused)]
         if nowhere and (tolerances is not None or nowhere == own):
-            found.append(f"note: {file}: matches no column: {', '.join(map(repr, nowhere))}")
-    return found
+            result.append(f"note: {file}: matches no column: {', '.join(map(repr, nowhere))}")
+    return result
 
 
 def _unreferenced(comparisons: Sequence[Comparison], asked: Sequence[Path]) -> list[str]:
     """That files of a folder of results have no reference."""
-    compared = {Path(each.result) for each in comparisons}
-    found = []
+    compared = {Path(comparison.result) for comparison in comparisons}
+    results = []
     for folder, reference in zip(asked[::2], asked[1::2], strict=False):
         if folder.is_dir() and reference.is_dir():
             more = sorted({path for path in folder.rglob("*.csv") if path.is_file()} - compared)
             named = ", ".join(str(path.relative_to(folder)) for path in more[:3]) + (", ..." if len(more) > 3 else "")
-            found += [f"note: {folder}: {len(more)} CSV files have no reference: {named}"] if more else []
-    return found
+            results += [f"note: {folder}: {len(more)} CSV files have no reference: {named}"] if more else []
+    return results
 
 
 def _sum(comparisons: Sequence[Comparison]) -> list[str]:
     if len(comparisons) == 1:
         return []
-    counts = [(sum(each.verdict == kind for each in comparisons), kind) for kind in ("same", "different", "unusable")]
+    counts = [
+        (sum(comparison.verdict == kind for comparison in comparisons), kind)
+        for kind in ("same", "different", "unusable")
+    ]
     counted = ", ".join(f"{number} {kind}" for number, kind in counts if number)
-    partly = sum(each.coverage is not None and each.same and each.coverage.share < 1 for each in comparisons)
+    partly = sum(
+        comparison.coverage is not None and comparison.same and comparison.coverage.share < 1
+        for comparison in comparisons
+    )
     counted += f"; in {partly} of them not all rows are compared" if partly else ""
     return [f"{len(comparisons)} comparisons: {counted}"]

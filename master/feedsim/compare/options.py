@@ -60,7 +60,7 @@ def sources(result: Sequence[str], reference: Sequence[str], options: Options) -
 
     InputError: a renaming that matches nothing, or gives two columns one name.
     """
-    found: dict[str, str] = {}
+    results: dict[str, str] = {}
     for theirs, ours in options.columns:
         pattern, target = _renaming(theirs, ours)
         renamed = {match.expand(target): name for name in result if (match := pattern.fullmatch(name))}
@@ -71,15 +71,15 @@ def sources(result: Sequence[str], reference: Sequence[str], options: Options) -
                 f"--column {theirs}={ours}: the reference has no column {ours!r}{suggest(ours, reference)}"
             )
         for name, source in renamed.items():
-            if found.get(name, source) != source:
-                raise InputError(f"--column: both {found[name]!r} and {source!r} of the result would be {name!r}")
-            found[name] = source
-    return {name: found.get(name, name) for name in reference if name in found or name in result}
+            if results.get(name, source) != source:
+                raise InputError(f"--column: both {results[name]!r} and {source!r} of the result would be {name!r}")
+            results[name] = source
+    return {name: results.get(name, name) for name in reference if name in results or name in result}
 
 
 def missing(name: str, result: Sequence[str]) -> str:
     """That a reference's column is not in the result, and what could be meant."""
-    alike = [each for each in result if re.fullmatch(rf".*[.:/|]{re.escape(name)}", each)]
+    alike = [entry for entry in result if re.fullmatch(rf".*[.:/|]{re.escape(name)}", entry)]
     if len(alike) == 1:
         prefix = alike[0].removesuffix(name)
         return f"the result has no column {name!r}; is it {alike[0]!r}? Then --column '{prefix}*=*'"

@@ -59,7 +59,7 @@ class Overlap:
         instants = np.unique(time[self._inside(time, self.start, self.end)])
         # A shift takes rows away at the end that it moves the result from; a tolerance in time at both.
         longest = LACKING * (self.end - self.start)
-        forgiven = [min(max(reach, each, 0.0), longest) for each in (options.shift, -options.shift)]
+        forgiven = [min(max(reach, value, 0.0), longest) for value in (options.shift, -options.shift)]
         # Tools begin or end a step apart; a step of a reference with few rows would be much.
         most = max(steps[1], 0.01 * (self.end - self.start))
         first, last = (
@@ -116,8 +116,8 @@ class Overlap:
         broken = self._inside(self.theirs, self.start, self.end)
         broken = broken[~np.isfinite(whole[broken])]
         # Those at an instant that shows it already do not count twice.
-        told = np.r_[self.at[~np.isfinite(values)], inf]
-        behind = told[np.searchsorted(told, self.theirs[broken] - self.slack, side="left")]
+        reported = np.r_[self.at[~np.isfinite(values)], inf]
+        behind = reported[np.searchsorted(reported, self.theirs[broken] - self.slack, side="left")]
         broken = broken[behind > self.theirs[broken] + self.slack]
         at, values = np.r_[self.at, self.theirs[broken]], np.r_[values, whole[broken]]
         order = np.argsort(at, kind="stable")

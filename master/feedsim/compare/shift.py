@@ -64,7 +64,7 @@ def estimated_shift(
     near = (result.time >= begin - most) & (result.time <= end + most)
     result, reference = with_units(result, options.units), with_units(reference, options.reference_units)
     asked = [n for n in chosen(reference.all_names, options) if n in reference and not tolerances.of(n).ignore]
-    found: dict[str, tuple[Array, Array]] = {}
+    results: dict[str, tuple[Array, Array]] = {}
     left_out: dict[str, str] = {}
     for name, source in sources(result.all_names, asked, options).items():
         if source not in result:
@@ -81,15 +81,15 @@ def estimated_shift(
         elif not 0 < (span := float(np.ptp(known))) < np.inf:
             left_out[name] = "the reference does not move"
         else:
-            found[name] = expected / span, values / span
-    if not found:
+            results[name] = expected / span, values / span
+    if not results:
         why = f" ({few([*left_out], LISTED)}: {next(iter(left_out.values()))})" if left_out else ""
         raise InputError(f"the shift in time cannot be found: no column of the reference moves{why}")
     misfit = _Misfit(
         reference.time,
-        np.array([expected for expected, _ in found.values()]),
+        np.array([expected for expected, _ in results.values()]),
         result.time[near],
-        np.array([values for _, values in found.values()]),
+        np.array([values for _, values in results.values()]),
         (begin, end),
     )
     step = max(min(usual_step(reference.time), usual_step(result.time)), 2 * most / (TRIES - 1))
@@ -99,7 +99,7 @@ def estimated_shift(
         raise InputError(f"the shift in time cannot be found within +-{most:.6g} s; allow a larger one")
     refined = _lowest(misfit.of, float(tried[best - 1]), float(tried[best + 1]), 1e-8 * step)
     # No more digits than rounding of the misfit leaves.
-    return Shift(round(refined, -floor(log10(1e-6 * step))) + 0.0, tuple(found), left_out)
+    return Shift(round(refined, -floor(log10(1e-6 * step))) + 0.0, tuple(results), left_out)
 
 
 def _lowest(of: Callable[[float], float], low: float, high: float, width: float) -> float:

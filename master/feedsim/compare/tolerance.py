@@ -97,11 +97,11 @@ class Tolerances:
 
     def of(self, name: str) -> Tolerance:
         """All that holds for a variable."""
-        found = Tolerance(value=DEFAULT, relative=True, time=0.0)
+        result = Tolerance(value=DEFAULT, relative=True, time=0.0)
         for pattern, tolerance in self.rules:
             if matches(name, pattern):
-                found = tolerance.over(found)
-        return found
+                result = tolerance.over(result)
+        return result
 
     def given(self, name: str) -> bool:
         """Whether a rule says a tolerance in value, so that the default does not count."""
@@ -135,15 +135,15 @@ def specification(spec: str) -> Tolerance:
     """Tolerance of "1e-6", "0.1 %", "2 nm", "1 ms", "1e-3 N.m,1 ms". InputError."""
     if spec.strip() == "ignore":
         return Tolerance(ignore=True)
-    found = Tolerance()
+    tolerance = Tolerance()
     for part in spec.split(","):
         given = _part(part.strip())
-        twice = found.value if given.time is None else found.time
+        twice = tolerance.value if given.time is None else tolerance.time
         if twice is not None:
             hint = "; write a decimal point, not a comma" if re.match(r"\s*[-+]?[0-9]+,[0-9]", spec) else ""
             raise InputError(f"two tolerances in {'value' if given.time is None else 'time'}{hint}")
-        found = given.over(found)
-    return found
+        tolerance = given.over(tolerance)
+    return tolerance
 
 
 def _part(text: str) -> Tolerance:
@@ -164,10 +164,10 @@ def allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> f
     span, magnitude: range of the reference, and largest magnitude of its kind. InputError: a unit of another kind, or
     what comes of it is too large for a number.
     """
-    found = _allowed(tolerance, unit, span, magnitude)
-    if not isfinite(found):
+    value = _allowed(tolerance, unit, span, magnitude)
+    if not isfinite(value):
         raise InputError(f"{tolerance.text} of a range of {span:.6g} is no finite number")
-    return found
+    return value
 
 
 def _allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:

@@ -173,12 +173,12 @@ class Comparison:
     @property
     def worst(self) -> Variable | None:
         """The compared variable that is nearest to its limit or farthest beyond; the first one among equals."""
-        compared = [each for each in self.variables if each.verdict in ("same", "different")]
-        return max(compared, key=lambda each: (each.ratio, each.deviation), default=None)
+        compared = [variable for variable in self.variables if variable.verdict in ("same", "different")]
+        return max(compared, key=lambda variable: (variable.ratio, variable.deviation), default=None)
 
     def those(self, *verdicts: str) -> tuple[Variable, ...]:
         """Variables of these verdicts."""
-        return tuple(each for each in self.variables if each.verdict in verdicts)
+        return tuple(variable for variable in self.variables if variable.verdict in verdicts)
 
     @property
     def heading(self) -> str:
@@ -198,7 +198,7 @@ class Comparison:
         for kind, words in (("missing", "missing: "), ("unusable", "cannot be compared: ")):
             if named := self.those(kind):
                 why = f" ({named[0].reason})" if kind == "unusable" else ""
-                parts.append(words + few([each.name for each in named], 3) + why)
+                parts.append(words + few([variable.name for variable in named], 3) + why)
         if self.verdict == "same":
             parts.append(f"{len(compared)} variable{'s'[: len(compared) != 1]}")
         if self.coverage is not None:

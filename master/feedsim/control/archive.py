@@ -83,11 +83,11 @@ class Archive:
     @cached_property
     def by_key(self) -> Mapping[str, Sequence[Entry]]:
         """Entries by key and by number; asked for when the file has been read."""
-        found: dict[str, list[Entry]] = {}
+        result: dict[str, list[Entry]] = {}
         for entry in self.entries:
             for key in {entry.key, entry.number} - {""}:
-                found.setdefault(key, []).append(entry)
-        return found
+                result.setdefault(key, []).append(entry)
+        return result
 
     def add_odd(self, line: int, text: str, reason: str) -> None:
         """Note a line that was not understood."""

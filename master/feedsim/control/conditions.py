@@ -63,14 +63,14 @@ def judged(acts: str, look: Look, lack: Lack = absent) -> Judged:
                 doubts.append(f"{name} is {shown(look(name))}, not {clause[1:].partition('=')[2]}")
             continue
         unfit, clause = clause.startswith("!"), clause.removeprefix("!")
-        found = [_holds(term.strip(), look) for term in clause.split(" or ")]
-        if any(holds for holds, _ in found):
+        result = [_holds(term.strip(), look) for term in clause.split(" or ")]
+        if any(holds for holds, _ in result):
             continue
-        unknown = [name for holds, name in found if holds is None]
+        unknown = [name for holds, name in result if holds is None]
         if unknown:
             reason = f"it acts where {clause.removesuffix('?')}, and {lack(unknown[0])}"
             return Judged("unknown", reason=reason)
-        name = found[0][1]
+        name = result[0][1]
         reason = f"it acts where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
         if unfit:
             reason = f"it can be taken where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
@@ -80,25 +80,25 @@ def judged(acts: str, look: Look, lack: Lack = absent) -> Judged:
 
 def tied(acts: str) -> list[tuple[str, str, float]]:
     """Pairs of parameters that are to be equal: name, other, and the sign of the other."""
-    found = []
+    result = []
     for clause in re.split(r";| or ", acts):
         term = _TERM.match(clause.strip().lstrip("~!"))
         if term and re.match(r"^-?[pA-Z]\w*$", term["right"].strip()) and not term["right"].strip().isupper():
             right = term["right"].strip()
-            found.append((term["name"] + (term["element"] or ""), right.lstrip("-"), -1.0 if right[0] == "-" else 1.0))
-    return found
+            result.append((term["name"] + (term["element"] or ""), right.lstrip("-"), -1.0 if right[0] == "-" else 1.0))
+    return result
 
 
 def depends(acts: str) -> list[str]:
     """Names that the conditions look up."""
-    found = []
+    result = []
     for clause in acts.split(";"):
         for part in clause.partition(": ")[0].split(" or "):
             if term := _TERM.match(part.strip().lstrip("~!")):
-                found.append(term["name"] + (term["element"] or ""))
+                result.append(term["name"] + (term["element"] or ""))
                 rights = (right.strip().lstrip("-") for right in term["right"].split("|"))
-                found += [right for right in rights if not re.match(r"^[+]?[\d.]", right)]
-    return found
+                result += [right for right in rights if not re.match(r"^[+]?[\d.]", right)]
+    return result
 
 
 def shown(value: float | bool | str | None) -> str:
@@ -108,20 +108,20 @@ def shown(value: float | bool | str | None) -> str:
 
 def _holds(term: str, look: Look) -> tuple[bool | None, str]:
     """Whether a term holds, None where the file does not say; and the name that it is of."""
-    found = _TERM.match(term)
-    assert found is not None, term
-    name = found["name"] + (found["element"] or "")
+    result = _TERM.match(term)
+    assert result is not None, term
+    name = result["name"] + (result["element"] or "")
     value = look(name)
     if value is None:
-        return (True if found["free"] else None), name
-    for right in found["right"].split("|"):
+        return (True if result["free"] else None), name
+    for right in result["right"].split("|"):
         right = right.strip()
         if re.match(r"^[+-]?[\d.]", right):
             wanted: float | bool | str | None = float(right)
         else:
             other = look(right.lstrip("-"))
             if other is None:
-                return (True if found["free"] else None), right.lstrip("-")
+                return (True if result["free"] else None), right.lstrip("-")
             wanted = -float(other) if right.startswith("-") and not isinstance(other, str) else other
         if isinstance(value, str) or isinstance(wanted, str):
             if value == wanted:

@@ -94,9 +94,9 @@ def _without_comment(text: str, mark: str = ";") -> str:
 def _sinumerik(archive: Archive) -> None:
     place, branches = "", 0
     for number, start, line, ended in _lines(archive.text):
-        if found := _DRIVE_OBJECT.findall(line):
+        if result := _DRIVE_OBJECT.findall(line):
             slaves = _SLAVE.findall(line)
-            own = f"PS{int(found[-1]):06d}"
+            own = f"PS{int(result[-1]):06d}"
             if slaves:
                 place = f"SLAVE{int(slaves[-1])}.{own}"
             elif not place.endswith(f".{own}"):  # the header names the file again, without its unit
@@ -128,12 +128,12 @@ def _sinumerik(archive: Archive) -> None:
         else:
             damaged = bool(_BINARY.search(line))
             archive.add_odd(number, line, "binary" if damaged else "no assignment of a parameter")
-    for each in [each for each in archive.entries if each.key == "AXCONF_MACHAX_NAME_TAB" and each.index is not None]:
-        name = each.text.strip().strip('"')
-        if name and archive.axis_names.setdefault(f"AX{each.index + 1}", name) != name:  # type: ignore[operator]
-            archive.add_odd(each.line, each.text, "another name of an axis that has one")
-    for place in dict.fromkeys(each.place for each in archive.entries if each.place):
-        codes = {each.index: each.text for each in archive.entries if each.place == place and each.key == "p199"}
+    for entry in [item for item in archive.entries if item.key == "AXCONF_MACHAX_NAME_TAB" and item.index is not None]:
+        name = entry.text.strip().strip('"')
+        if name and archive.axis_names.setdefault(f"AX{entry.index + 1}", name) != name:  # type: ignore[operator]
+            archive.add_odd(entry.line, entry.text, "another name of an axis that has one")
+    for place in dict.fromkeys(item.place for item in archive.entries if item.place):
+        codes = {item.index: item.text for item in archive.entries if item.place == place and item.key == "p199"}
         archive.places[place] = "".join(
             chr(int(codes[k])) for k in sorted(k for k in codes if k is not None)
             if codes[k].isdecimal() and 32 <= int(codes[k]) < 127
@@ -151,14 +151,14 @@ def _value(line: str, at: int) -> tuple[str, int, bool]:
 
 
 def _machine_datum(
-    archive: Archive, number: int, start: int, line: str, found: re.Match[str], whole: bool, doubt: str
+    archive: Archive, number: int, start: int, line: str, match: re.Match[str], whole: bool, doubt: str
 ) -> None:
-    if not whole or _BINARY.search(line[found.start() :]):
-        archive.add_odd(number, line[found.start() :], "cut by a binary record, or not whole")
+    if not whole or _BINARY.search(line[match.start() :]):
+        archive.add_odd(number, line[match.start() :], "cut by a binary record, or not whole")
         return
-    text, at, checked = _value(line, found.start("value"))
+    text, at, checked = _value(line, match.start("value"))
     index, axis, odd = None, "", ""
-    for part in (each.strip() for each in (found["index"] or "").split(",")):
+    for part in (entry.strip() for entry in (match["index"] or "").split(",")):
         if part.isdecimal() and len(part) < 6 and index is None:
             index = int(part)
         elif part and not axis and re.fullmatch(r"[A-Za-z_]\w{0,31}", part):
@@ -166,30 +166,30 @@ def _machine_datum(
         elif part:
             odd = "an index that is not known"
     if not text or odd:
-        archive.add_odd(number, line[found.start() :], odd or "no value behind the sign of equality")
+        archive.add_odd(number, line[match.start() :], odd or "no value behind the sign of equality")
         return
-    if found["kind"] == "MA" and not axis:
-        archive.add_odd(number, line[found.start() :], "machine data of an axis, without the axis")
+    if match["kind"] == "MA" and not axis:
+        archive.add_odd(number, line[match.start() :], "machine data of an axis, without the axis")
         return
-    filed = f"MD{found['number']}" if found["number"] else ""
+    filed = f"MD{match['number']}" if match["number"] else ""
     archive.entries.append(
         Entry(
-            found["name"], text, index, axis if found["kind"] == "MA" else "", "", number,
+            match["name"], text, index, axis if match["kind"] == "MA" else "", "", number,
             (start + at, start + at + len(text)), doubt=doubt, number=filed, checksum=checked,
         )
     )  # fmt: skip
 
 
 def _drive_parameter(
-    archive: Archive, number: int, start: int, line: str, found: re.Match[str], place: str, whole: bool
+    archive: Archive, number: int, start: int, line: str, match: re.Match[str], place: str, whole: bool
 ) -> None:
-    text, at, checked = _value(line, found.start("value"))
+    text, at, checked = _value(line, match.start("value"))
     if not whole or _BINARY.search(line) or not text:
         archive.add_odd(number, line, "no value behind the sign of equality" if whole else "cut, or not whole")
         return
-    index = int(found["index"]) if found["index"] else None
+    index = int(match["index"]) if match["index"] else None
     archive.entries.append(
-        Entry(f"p{int(found['number'])}", text, index, "", place, number, (start + at, start + at + len(text)),
+        Entry(f"p{int(match['number'])}", text, index, "", place, number, (start + at, start + at + len(text)),
               checksum=checked)
     )  # fmt: skip
 
@@ -198,23 +198,25 @@ def _isg(archive: Archive) -> None:
     place = PurePath(archive.name).stem
     archive.places[place] = ""
     for number, start, line, _ in _lines(archive.text):
-        found = _ISG.match(line)
+        result = _ISG.match(line)
         if not line.strip() or line.lstrip().startswith("#"):
             archive.comments += 1
-        elif found is None or not found["value"] or _BINARY.search(line):
+        elif result is None or not result["value"] or _BINARY.search(line):
             archive.add_odd(number, line, "no parameter with its value")
         else:
-            indices = [int(each) for each in re.findall(r"\[(\d{1,6})\]", found["name"])]
-            key = re.sub(r"\[\d+\]", "", found["name"])
+            indices = [int(entry) for entry in re.findall(r"\[(\d{1,6})\]", result["name"])]
+            key = re.sub(r"\[\d+\]", "", result["name"])
             if key.endswith("log_achs_name"):
-                archive.places[place] = found["value"].strip().strip('"')
-            span = (start + found.start("value"), start + found.start("value") + len(found["value"]))
-            archive.entries.append(Entry(key, found["value"], indices[0] if indices else None, "", place, number, span))
+                archive.places[place] = result["value"].strip().strip('"')
+            span = (start + result.start("value"), start + result.start("value") + len(result["value"]))
+            archive.entries.append(
+                Entry(key, result["value"], indices[0] if indices else None, "", place, number, span)
+            )
 
 
 def _xti(archive: Archive) -> None:
     blank = re.sub(
-        r"<!--.*?-->|<!\[CDATA\[.*?\]\]>", lambda each: re.sub(r"[^\n]", " ", each[0]), archive.text, flags=re.DOTALL
+        r"<!--.*?-->|<!\[CDATA\[.*?\]\]>", lambda match: re.sub(r"[^\n]", " ", match[0]), archive.text, flags=re.DOTALL
     )
     way: list[str] = []
     place, axes = "", 0
@@ -233,11 +235,11 @@ def _xti(archive: Archive) -> None:
             text = blank[tag.end() : blank.find("<", tag.end())].strip()
             archive.places[place] = "" if text == "__FILENAME__" else text[:64]
         if "Axis" in way or name == "Axis":
-            for found in _ATTRIBUTE.finditer(tag["rest"]):
-                at = tag.start("rest") + found.start(2) + 1
-                text = found[3] if found[3] is not None else found[4]
+            for entry in _ATTRIBUTE.finditer(tag["rest"]):
+                at = tag.start("rest") + entry.start(2) + 1
+                text = entry[3] if entry[3] is not None else entry[4]
                 archive.entries.append(
-                    Entry(f"{name}@{found[1]}", text, None, "", place, lines.of(at), (at, at + len(text)))
+                    Entry(f"{name}@{entry[1]}", text, None, "", place, lines.of(at), (at, at + len(text)))
                 )
         if not tag["single"]:
             way.append(name)
@@ -259,14 +261,14 @@ class _LineNumbers:
 
 def _table(archive: Archive) -> None:
     rows = [(n, start, line) for n, start, line, _ in _lines(archive.text)]
-    mark = max(";\t,", key=lambda each: sum(line.count(each) for _, _, line in rows))
+    mark = max(";\t,", key=lambda text: sum(line.count(text) for _, _, line in rows))
     place = PurePath(archive.name).stem
     archive.places[place] = ""
     heads: list[str] = []
     for number, start, line in rows:
         cells = list(_cells(line, mark))
         named = [
-            (k, found) for k, (text, _) in enumerate(cells) if (found := _PARAMETER.match(text.strip("\"' \ufeff")))
+            (k, result) for k, (text, _) in enumerate(cells) if (result := _PARAMETER.match(text.strip("\"' \ufeff")))
         ]
         if not line.strip():
             archive.comments += 1
@@ -279,25 +281,25 @@ def _table(archive: Archive) -> None:
             else:
                 archive.add_odd(number, line, "no parameter with its value")
             continue
-        at, found = named[0]
+        at, results = named[0]
         values = _value_cells(cells, heads, at)
         if len(named) > 1 or len(values) != 1 or _BINARY.search(line):
             archive.add_odd(number, line, "which cell is the value is not known")
             continue
         text, where = cells[values[0]]
-        if found["p"]:
-            key, index = f"p{int(found['number'])}", int(found["index"]) if found["index"] else None
-        elif found["md"]:
-            key, index = f"MD{found['mdn']}", int(found["mdi"]) if found["mdi"] else None
+        if results["p"]:
+            key, index = f"p{int(results['number'])}", int(results["index"]) if results["index"] else None
+        elif results["md"]:
+            key, index = f"MD{results['mdn']}", int(results["mdi"]) if results["mdi"] else None
         else:
-            key, index = (found["idn"] or found["isg"]).partition(".")[0], None
+            key, index = (results["idn"] or results["isg"]).partition(".")[0], None
         shift = len(text) - len(text.lstrip("\"' "))
         bare = text.strip("\"' ")
         units = [k for k, head in enumerate(heads) if head in _UNIT_HEADS and k < len(cells)]
         unit = cells[units[0]][0].strip("\"' []") if len(units) == 1 else ""
         span = (start + where + shift, start + where + shift + len(bare))
         archive.entries.append(Entry(key, bare, index, "", place, number, span, unit=unit))
-    controls = {"sinumerik" if re.match(r"p\d|MD", each.key) else "twincat" for each in archive.entries}
+    controls = {"sinumerik" if re.match(r"p\d|MD", entry.key) else "twincat" for entry in archive.entries}
     if len(controls) == 1:
         archive.control = controls.pop()
     elif controls:
@@ -321,35 +323,35 @@ def _value_cells(cells: Sequence[tuple[str, int]], heads: Sequence[str], named: 
     by_head = [k for k, head in enumerate(heads) if head in _VALUE_HEADS and k < len(cells) and k != named]
     if heads:
         return by_head
-    found = []
+    indexes = []
     for k, (text, _) in enumerate(cells):
         try:
             bare = text.strip("\"' ")
             word = bare.isalpha() and HEXADECIMAL.match(bare)  # EACH is a word ahead of a number
             if k != named and not word and not isinstance(scalar(bare), str):
-                found.append(k)
+                indexes.append(k)
         except ValueError:
             continue
-    return found
+    return indexes
 
 
 def _linuxcnc(archive: Archive) -> None:
-    section, held = "", ""
+    section, fixed = "", ""
     scales: dict[str, tuple[float, str]] = {}
     entries: list[tuple[str, str, str, int, tuple[int, int]]] = []
     for number, start, line, _ in _lines(archive.text):
-        if held or line.rstrip().endswith("\\"):  # goes on in the next line: names of files, no values of ours
-            held = "more" if line.rstrip().endswith("\\") else ""
+        if fixed or line.rstrip().endswith("\\"):  # goes on in the next line: names of files, no values of ours
+            fixed = "more" if line.rstrip().endswith("\\") else ""
             archive.add_odd(number, line, "a value of several lines")
         elif not line.strip() or line.lstrip().startswith(("#", ";")):
             archive.comments += 1
-        elif found := _SECTION.match(line):
-            section = found["name"].upper()
+        elif result := _SECTION.match(line):
+            section = result["name"].upper()
             archive.comments += 1
-        elif (found := _INI_KEY.match(line)) and section and not _BINARY.search(line):
-            text = re.split(r"\s[#;]", found["value"], maxsplit=1)[0].rstrip()
-            at = start + found.start("value")
-            entries.append((section, found["name"].upper(), text, number, (at, at + len(text))))
+        elif (result := _INI_KEY.match(line)) and section and not _BINARY.search(line):
+            text = re.split(r"\s[#;]", result["value"], maxsplit=1)[0].rstrip()
+            at = start + result.start("value")
+            entries.append((section, result["name"].upper(), text, number, (at, at + len(text))))
         else:
             archive.add_odd(number, line, "no KEY = VALUE below a section")
     for section, key, text, _, _ in entries:

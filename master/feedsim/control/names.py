@@ -94,13 +94,13 @@ def names_of(control: str) -> Mapping[str, Name]:
     """Our parameter -> its name in a control. InputError: no such control."""
     if control not in CONTROLS:
         raise InputError(f"control {control!r} is not known; known are {', '.join(CONTROLS)}")
-    found: dict[str, Name] = {}
-    for each in table():
-        if each.control == control:
-            found.setdefault(each.parameter, each)
-    return found
+    names: dict[str, Name] = {}
+    for name in table():
+        if name.control == control:
+            names.setdefault(name.parameter, name)
+    return names
 
 
 def known(number: str) -> Name | None:
     """The parameter that is filed under a number, such as MD32200, p1460 or S-0-0100; None where there is none."""
-    return next((each for each in table() if each.number == number), None)
+    return next((name for name in table() if name.number == number), None)

@@ -135,15 +135,15 @@ def read(
         raise InputError(f"files of several controls: {', '.join(sorted(controls))}; import one control at a time")
     rows = [name for name in table() if name.control in controls]
     numbers = {name.number for name in rows}
-    if unknown := [each for each in checked if each != ALL and each not in numbers]:
+    if unknown := [name for name in checked if name != ALL and name not in numbers]:
         raise InputError(f"{unknown[0]} is no number of the table of names of the control {controls.pop()}")
-    found = Reading(controls.pop(), dict(axes))
+    reading = Reading(controls.pop(), dict(axes))
     asked = _asked(rows)
     if unknown := [
-        each for each in assume if each not in asked and each not in {name_parts(name)[0] for name in asked}
+        entry for entry in assume if entry not in asked and entry not in {name_parts(name)[0] for name in asked}
     ]:
         raise InputError(
-            f"{unknown[0]} is nothing that a value of the control {found.control} depends on; that can be assumed of "
+            f"{unknown[0]} is nothing that a value of the control {reading.control} depends on; that can be assumed of "
             f"{', '.join(asked) or 'no parameter'}"
         )
     seen: dict[object, str] = {}
@@ -153,51 +153,51 @@ def read(
             if (other := seen.setdefault(one, axis)) != axis:
                 given = f"{other}={axes[other]} and {axis}={theirs}"
                 raise InputError(f"{given}: the same axis of the control, given to two axes")
-        found.places[axis] = view.places
-        found.notes += view.notes
+        reading.places[axis] = view.places
+        reading.notes += view.notes
         for name in rows:
-            _read(found, view, name, checked)
-    _of_machine(found)
-    found.doubts += [doubt for each in found.taken if (doubt := _unusual(each))]
-    return found
+            _read(reading, view, name, checked)
+    _of_machine(reading)
+    reading.doubts += [doubt for entry in reading.taken if (doubt := _unusual(entry))]
+    return reading
 
 
-def _unusual(each: Taken) -> str:
+def _unusual(taken: Taken) -> str:
     """A sentence on a value far outside of what feed axes have; "" of any other."""
-    usual = usual_ranges().get(each.parameter)
-    if usual is None or each.condition or isinstance(each.value, bool | str) or usual.holds(each.value):
+    usual = usual_ranges().get(taken.parameter)
+    if usual is None or taken.condition or isinstance(taken.value, bool | str) or usual.holds(taken.value):
         return ""
-    said = f"{each.name.number} {each.name.name} = {each.text[:40]} ({each.where}) is {each.value:.4g}"
-    axis = f"{each.axis}: " if each.axis else ""
+    said = f"{taken.name.number} {taken.name.name} = {taken.text[:40]} ({taken.where}) is {taken.value:.4g}"
+    axis = f"{taken.axis}: " if taken.axis else ""
     return f"{axis}{said} {usual.unit}, usual is {usual.low:g} to {usual.high:g} {usual.unit}: check the unit"
 
 
 def _asked(rows: Sequence[Name]) -> list[str]:
     """Parameters whose values decide about others: conditions, ratios, units of machine data."""
-    found = [name for row in rows for name in (*depends(row.acts), *row.times)]
+    result = [name for row in rows for name in (*depends(row.acts), *row.times)]
     if any(row.number.startswith("MD") for row in rows):
-        found += _OF_UNITS
-    return sorted(dict.fromkeys(found))
+        result += _OF_UNITS
+    return sorted(dict.fromkeys(result))
 
 
-def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> None:
+def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) -> None:
     sought = view.sought(name.key, name.number)
     if not sought.entries:
-        _case(found, view, name)
+        _case(reading, view, name)
         return
     if sought.chosen is None:
         archive, entry = sought.entries[0]
-        found.refused.append(Refused(view.axis, name, entry.text, sought.problem, f"{archive.name}:{entry.line}"))
+        reading.refused.append(Refused(view.axis, name, entry.text, sought.problem, f"{archive.name}:{entry.line}"))
         return
     archive, entry = sought.chosen
     where = f"{archive.name}:{entry.line}"
 
     def refuse(reason: str, weight: str = "doubt") -> None:
-        found.refused.append(Refused(view.axis, name, entry.text, reason, where, weight))
+        reading.refused.append(Refused(view.axis, name, entry.text, reason, where, weight))
 
     said = judged(name.acts, view.value, view.lack)
     if said.state == "case":
-        _of_case(found, view, name, said)
+        _of_case(reading, view, name, said)
         return
     if said.state != "acts":
         refuse(said.reason, "note" if said.state == "inactive" else "doubt")
@@ -222,32 +222,32 @@ def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> N
     if reason or value is None:
         refuse(reason)
         return
-    found.taken.append(Taken(view.axis, name, value, entry, archive))
-    found.doubts += [
+    reading.taken.append(Taken(view.axis, name, value, entry, archive))
+    reading.doubts += [
         f"{view.axis}: {name.number} {name.name} is taken, but {text}: it holds for a part of the range alone"
         for text in said.doubts
     ]
-    others = {comparable(each.text) for _, each in sought.entries if (each.index or 0) != 0}
+    others = {comparable(entry.text) for _, entry in sought.entries if (entry.index or 0) != 0}
     if name.number.startswith("MD") and others - {comparable(entry.text)}:
-        found.notes.append(
+        reading.notes.append(
             f"{view.axis}: {name.number} {name.name} has other values in other elements (parameter sets, encoders); "
             "element 0 is taken"
         )
     elif others - {comparable(entry.text)} and name.number != "p115":
-        found.doubts.append(
+        reading.doubts.append(
             f"{view.axis}: {name.number} {name.name} differs between data sets; that of index 0 is taken"
         )
 
 
-def _case(found: Reading, view: View, name: Name) -> None:
+def _case(reading: Reading, view: View, name: Name) -> None:
     """A parameter that the files do not have may have a value by what switches it off."""
     if name.acts:
         said = judged(name.acts, view.value, view.lack)
         if said.state == "case":
-            _of_case(found, view, name, said)
+            _of_case(reading, view, name, said)
 
 
-def _of_case(found: Reading, view: View, name: Name, said: Judged) -> None:
+def _of_case(reading: Reading, view: View, name: Name, said: Judged) -> None:
     value: Value = {"true": True, "false": False}.get(said.value, said.value)
     if isinstance(value, str) and value != "off":
         value = float(value)
@@ -256,13 +256,13 @@ def _of_case(found: Reading, view: View, name: Name, said: Judged) -> None:
     archive, entry = view.sought(key, element=int(element or 0)).chosen or (None, None)
     if {condition, key} & {*view.assume}:
         archive, entry = None, None
-    found.taken.append(Taken(view.axis, name, value, entry, archive, said.reason))
+    reading.taken.append(Taken(view.axis, name, value, entry, archive, said.reason))
 
 
 def _unit(view: View, name: Name, entry: Entry, checked: Collection[str]) -> str:
     """Why the unit of a value is not sure; "" where it is."""
     if entry.unit and name.unit not in ("", "1"):
-        stated, ours = (_plain_unit(each) for each in (entry.unit, name.unit))
+        stated, ours = (_plain_unit(item) for item in (entry.unit, name.unit))
         if stated != ours:
             return f"the file has it in {entry.unit!r}, the table of names in {name.unit}"
         return ""
@@ -323,24 +323,24 @@ def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple
     return number, ""
 
 
-def _of_machine(found: Reading) -> None:
+def _of_machine(reading: Reading) -> None:
     """Values of the whole machine, which every axis has found: kept once, where they are the same."""
-    machine = [each for each in found.taken if each.parameter.startswith("cycles.")]
-    found.taken = [each for each in found.taken if each not in machine]
+    machine = [entry for entry in reading.taken if entry.parameter.startswith("cycles.")]
+    reading.taken = [entry for entry in reading.taken if entry not in machine]
     refused: dict[str, Refused] = {}
-    for each in found.refused:
-        if each.name.parameter.startswith("cycles."):
+    for item in reading.refused:
+        if item.name.parameter.startswith("cycles."):
             refused.setdefault(
-                each.name.number, Refused("", each.name, each.text, each.reason, each.where, each.weight)
+                item.name.number, Refused("", item.name, item.text, item.reason, item.where, item.weight)
             )
-    found.refused = [each for each in found.refused if not each.name.parameter.startswith("cycles.")]
-    found.refused += refused.values()
-    for parameter in dict.fromkeys(each.parameter for each in machine):
-        own = [each for each in machine if each.parameter == parameter]
-        if len({each.value for each in own}) > 1:
-            values = ", ".join(f"{each.axis} {each.entry.text if each.entry else ''}" for each in own)
-            found.refused.append(
+    reading.refused = [entry for entry in reading.refused if not entry.name.parameter.startswith("cycles.")]
+    reading.refused += refused.values()
+    for parameter in dict.fromkeys(taken.parameter for taken in machine):
+        own = [taken for taken in machine if taken.parameter == parameter]
+        if len({taken.value for taken in own}) > 1:
+            values = ", ".join(f"{taken.axis} {taken.entry.text if taken.entry else ''}" for taken in own)
+            reading.refused.append(
                 Refused("", own[0].name, "", f"it is one for all axes of a machine file; here {values}", own[0].where)
             )
         else:
-            found.taken.append(Taken("", own[0].name, own[0].value, own[0].entry, own[0].archive))
+            reading.taken.append(Taken("", own[0].name, own[0].value, own[0].entry, own[0].archive))

@@ -38,7 +38,7 @@ class View:
             if place not in known:
                 raise InputError(f"no drive object or list {place!r}; the files have {', '.join(known) or 'none'}")
         if not self.known and not self.places:
-            has = list(dict.fromkeys(each for archive in archives for each in axes_of(archive)))
+            has = list(dict.fromkeys(name for archive in archives for name in axes_of(archive)))
             lists = [f"{place}{f' ({name})' if name else ''}" for archive in archives
                      for place, name in archive.places.items()]  # fmt: skip
             raise InputError(
@@ -76,7 +76,7 @@ class View:
     def sought(self, *keys: str, element: int = 0) -> Sought:
         """The one entry of an element, index 0 or none; or why there is none."""
         every = self.entries(*keys)
-        own = [each for each in every if (each[1].index or 0) == element]
+        own = [entry for entry in every if (entry[1].index or 0) == element]
         if not own:
             return Sought(every, None, "" if not every else f"the file has elements of it, but not [{element}]")
         if len({comparable(entry.text) for _, entry in own}) > 1:
@@ -106,10 +106,10 @@ class View:
     def lack(self, name: str) -> str:
         """Why value() has none, for a sentence."""
         key, element, bit = name_parts(name)
-        found = self.sought(key, element=int(element or 0))
-        if found.chosen is None:
-            return found.problem or absent(name)
-        archive, entry = found.chosen
+        result = self.sought(key, element=int(element or 0))
+        if result.chosen is None:
+            return result.problem or absent(name)
+        archive, entry = result.chosen
         where = f"{archive.name}:{entry.line}"
         return f"{key} is {entry.text[:24]!r} in {where}, which cannot be read; --assume {name}={1 if bit else 'VALUE'}"
 
@@ -123,8 +123,8 @@ def name_parts(name: str) -> tuple[str, str, str]:
 
 def whole_place(place: str, known: Sequence[str]) -> str:
     """A drive object by the end of its name, where that is enough: PS000003 of SLAVE3.PS000003."""
-    found = [each for each in known if each == place or each.endswith(f".{place}")]
-    return found[0] if len(found) == 1 else place
+    result = [name for name in known if name == place or name.endswith(f".{place}")]
+    return result[0] if len(result) == 1 else place
 
 
 def _holds_parameters(archive: Archive, place: str) -> bool:
@@ -142,18 +142,18 @@ def axes_of(archive: Archive) -> Iterator[str]:
 
 def _identified(archives: Sequence[Archive], theirs: str) -> frozenset[str]:
     """What the files call the axis: its name, and AX1 or JOINT_0 by the table of names."""
-    found = set()
+    result = set()
     for archive in archives:
         used = {entry.axis for entry in archive.entries if entry.axis}
         by_name = {name.upper(): axis for axis, name in archive.axis_names.items()}
-        for each in (
+        for item in (
             theirs.upper(),
             by_name.get(theirs.upper(), ""),
             archive.axis_names.get(theirs.upper(), "").upper(),
         ):
-            if each in used:
-                found.add(each)
-    return frozenset(found)
+            if item in used:
+                result.add(item)
+    return frozenset(result)
 
 
 def comparable(text: str) -> object:

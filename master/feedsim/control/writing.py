@@ -73,12 +73,12 @@ def changed(
 ) -> Written:
     """Lay values into files; values: axis -> our parameter -> SI value. Other arguments and errors: as of read()."""
     reading = read(archives, axes, places=places, assume=assume, checked=checked)
-    found = Written(reading=reading, notes=list(reading.notes))
+    written = Written(reading=reading, notes=list(reading.notes))
     edits: list[_Edit] = []
-    for each in reading.taken:
-        if each.axis and not each.parameter.startswith("cycles."):
-            view = View(archives, each.axis, axes[each.axis], places.get(each.axis, ()), axes, assume)
-            _compare(found, edits, view, each, values[each.axis])
+    for entry in reading.taken:
+        if entry.axis and not entry.parameter.startswith("cycles."):
+            view = View(archives, entry.axis, axes[entry.axis], places.get(entry.axis, ()), axes, assume)
+            _compare(written, edits, view, entry, values[entry.axis])
     for gone in reading.refused:
         ours = values.get(gone.axis, {}).get(gone.name.parameter)
         if ours is None or gone.name.parameter.startswith("cycles.") or isinstance(ours, str):
@@ -86,21 +86,21 @@ def changed(
         view = View(archives, gone.axis, axes[gone.axis], places.get(gone.axis, ()), axes, assume)
         new, _ = _text(view, gone.name, None, ours)
         if gone.weight == "doubt" and not _equal(gone.text, new):
-            found.changes.append(Change(gone.axis, gone.name, gone.text, new, False, gone.reason, gone.where))
-    _absent(found, archives, axes, values, reading)
-    _bits(found, archives, axes, values, places, assume)
-    _apply(found, edits, archives)
-    if found.contents:
-        _check(found, archives, axes, values, edits, dict(places=places, assume=assume, checked=checked))
-    return found
+            written.changes.append(Change(gone.axis, gone.name, gone.text, new, False, gone.reason, gone.where))
+    _absent(written, archives, axes, values, reading)
+    _bits(written, archives, axes, values, places, assume)
+    _apply(written, edits, archives)
+    if written.contents:
+        _check(written, archives, axes, values, edits, dict(places=places, assume=assume, checked=checked))
+    return written
 
 
-def _compare(found: Written, edits: list[_Edit], view: View, taken: Taken, values: Mapping[str, Value]) -> None:
+def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, values: Mapping[str, Value]) -> None:
     ours = values.get(taken.parameter)
     group = taken.parameter.rpartition(".")[0]
     if ours is None:
         if group.endswith("friction_pulse") and taken.value != "off" and taken.parameter.endswith("amplitude"):
-            found.changes.append(Change(
+            written.changes.append(Change(
                 taken.axis, taken.name, _old(taken), "0", False,
                 "the machine file has no such compensation: switch it off at the control", taken.where,
             ))  # fmt: skip
@@ -108,21 +108,21 @@ def _compare(found: Written, edits: list[_Edit], view: View, taken: Taken, value
     if isinstance(ours, str):
         ours = SYNONYMS.get(ours, ours)
     if _same(taken.value, ours):
-        found.same.append(taken)
+        written.same.append(taken)
         return
     if taken.entry is None or taken.condition:
         new, _ = _text(view, taken.name, None, ours)
         reason = f"it does not act: {_condition(taken)}; change that at the control, and then the value"
-        found.changes.append(Change(taken.axis, taken.name, "", new, False, reason, taken.where))
+        written.changes.append(Change(taken.axis, taken.name, "", new, False, reason, taken.where))
         return
     new, reason = _text(view, taken.name, taken.entry, ours)
-    own = [each for each in view.entries(taken.name.key, taken.name.number) if (each[1].index or 0) == 0]
+    own = [entry for entry in view.entries(taken.name.key, taken.name.number) if (entry[1].index or 0) == 0]
     if not reason and any(entry.checksum for _, entry in own):
         reason = "the line has a checksum; switch it off (MD11230 bit 0), or type the value"
     if not reason and any(archive.container for archive, _ in own):
         reason = "a container with a checksum of its own cannot be written; type the value"
     if reason:
-        found.changes.append(Change(taken.axis, taken.name, _old(taken), new, False, reason, taken.where))
+        written.changes.append(Change(taken.axis, taken.name, _old(taken), new, False, reason, taken.where))
         return
     edits += [_Edit(archive, entry, new) for archive, entry in own]
     also = []
@@ -130,7 +130,7 @@ def _compare(found: Written, edits: list[_Edit], view: View, taken: Taken, value
         if right != taken.name.key:
             continue
         key, _, element = other.removesuffix("]").partition("[")
-        pair = [each for each in view.entries(key) if (each[1].index or 0) == int(element or 0)]
+        pair = [entry for entry in view.entries(key) if (entry[1].index or 0) == int(element or 0)]
         before = view.value(other)
         if pair and isinstance(before, float) and isinstance(taken.value, float):
             raw = scalar(taken.entry.text)
@@ -138,7 +138,7 @@ def _compare(found: Written, edits: list[_Edit], view: View, taken: Taken, value
                 text = new if sign > 0 else new.removeprefix("-") if new.startswith("-") else f"-{new}"
                 edits += [_Edit(archive, entry, text) for archive, entry in pair]
                 also.append(f"{other} is set to {text} with it")
-    found.changes.append(Change(taken.axis, taken.name, _old(taken), new, True, "; ".join(also), taken.where))
+    written.changes.append(Change(taken.axis, taken.name, _old(taken), new, True, "; ".join(also), taken.where))
 
 
 def _condition(taken: Taken) -> str:
@@ -226,12 +226,12 @@ def number(value: float) -> str:
 
 
 def _absent(
-    found: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
+    written: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
     reading: Reading,
 ) -> None:  # fmt: skip
     """Values of the machine file whose parameter the files do not have."""
-    named = {(each.axis, each.name.parameter) for each in reading.taken}
-    named |= {(each.axis, each.name.parameter) for each in reading.refused}
+    named = {(entry.axis, entry.name.parameter) for entry in reading.taken}
+    named |= {(entry.axis, entry.name.parameter) for entry in reading.refused}
     for axis, own in values.items():
         for parameter, name in names_of(reading.control).items():
             ours = own.get(parameter)
@@ -247,17 +247,17 @@ def _absent(
             for other, right, sign in tied(name.acts):
                 if right == name.key:
                     reason += f"; {other} is to be {'-' if sign < 0 else ''}{new} as well"
-            found.changes.append(Change(axis, name, "", new, False, reason))
+            written.changes.append(Change(axis, name, "", new, False, reason))
 
 
 def _bits(
-    found: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
+    result: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
     places: Mapping[str, Sequence[str]], assume: Mapping[str, str],
 ) -> None:  # fmt: skip
     """Bits of the control that switch a filter on, whose values are to be typed: they are to be set with them."""
     seen: set[tuple[str, str]] = set()
     changes: list[Change] = []
-    for change in found.changes:
+    for change in result.changes:
         group = change.name.parameter.rpartition(".")[0]
         bit = _BIT.match(change.name.acts)
         on = bit is not None and values[change.axis].get(f"{group}.type", "off") != "off"
@@ -275,10 +275,10 @@ def _bits(
                 reason = "set it with the values of the filter"
                 changes.append(Change(change.axis, name, old, "1", False, reason, where))
         changes.append(change)
-    found.changes = changes
+    result.changes = changes
 
 
-def _apply(found: Written, edits: Sequence[_Edit], archives: Sequence[Archive]) -> None:
+def _apply(written: Written, edits: Sequence[_Edit], archives: Sequence[Archive]) -> None:
     for archive in archives:
         own: dict[tuple[int, int], str] = {}
         for edit in edits:
@@ -293,24 +293,24 @@ def _apply(found: Written, edits: Sequence[_Edit], archives: Sequence[Archive]) 
         for (start, end), new in sorted(own.items()):
             text += [archive.text[at:start], new]
             at = end
-        found.contents[archive.name] = "".join([*text, archive.text[at:]]).encode(archive.encoding)
+        written.contents[archive.name] = "".join([*text, archive.text[at:]]).encode(archive.encoding)
 
 
 def _check(
-    found: Written, archives: Sequence[Archive], axes: Mapping[str, str],
+    result: Written, archives: Sequence[Archive], axes: Mapping[str, str],
     values: Mapping[str, Mapping[str, Value]], edits: Sequence[_Edit], how: Mapping[str, object],
 ) -> None:  # fmt: skip
     """Read what was made: every value is as it was, but the changed ones, which are as they should be."""
     again = []
     for archive in archives:
-        made = opened(archive.name, found.contents[archive.name]) if archive.name in found.contents else archive
+        made = opened(archive.name, result.contents[archive.name]) if archive.name in result.contents else archive
         changed_ones = {id(edit.entry): edit.text for edit in edits if edit.archive is archive}
         wanted = [changed_ones.get(id(entry), entry.text) for entry in archive.entries]
         if [entry.text for entry in made.entries] != wanted or made.odd_count != archive.odd_count:
             raise InputError(f"{archive.name}: writing the values would change others; nothing was written")
         again.append(made)
-    now = {(each.axis, each.parameter): each.value for each in read(again, axes, **how).taken}  # type: ignore[arg-type]
-    for change in found.changes:
+    now = {(entry.axis, entry.parameter): entry.value for entry in read(again, axes, **how).taken}  # type: ignore[arg-type]
+    for change in result.changes:
         if change.written:
             ours = values[change.axis][change.name.parameter]
             ours = SYNONYMS.get(ours, ours) if isinstance(ours, str) else ours

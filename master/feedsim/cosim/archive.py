@@ -105,12 +105,18 @@ class Archive(Closing):
 
     @property
     def unit_definitions(self) -> dict[str, UnitDefinition]:
-        found = {}
-        for each in self.description.unitDefinitions:
-            if each.baseUnit is not None and float(each.baseUnit.factor):
-                exponents = {key: int(getattr(each.baseUnit, key)) for key in BASE if int(getattr(each.baseUnit, key))}
-                found[each.name] = UnitDefinition(exponents, float(each.baseUnit.factor), float(each.baseUnit.offset))
-        return found
+        result = {}
+        for unit_definition in self.description.unitDefinitions:
+            if unit_definition.baseUnit is not None and float(unit_definition.baseUnit.factor):
+                exponents = {
+                    key: int(getattr(unit_definition.baseUnit, key))
+                    for key in BASE
+                    if int(getattr(unit_definition.baseUnit, key))
+                }
+                result[unit_definition.name] = UnitDefinition(
+                    exponents, float(unit_definition.baseUnit.factor), float(unit_definition.baseUnit.offset)
+                )
+        return result
 
     def slave(self, name: str) -> FMU2Slave:
         """FMPy's wrapper for an instance `name`, around a library that is loaded once.
@@ -145,11 +151,11 @@ class Archive(Closing):
         except Exception as error:
             os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
             folder = f"binaries/{path.parent.name}"
-            told = str(error).replace(f"{self.directory.absolute()}{os.sep}", "")
+            reported = str(error).replace(f"{self.directory.absolute()}{os.sep}", "")
             there = ", ".join(self.platforms)
             raise InputError(
-                f"{self.path}: its binary for this platform, in {folder}, cannot be loaded: {told}; it has binaries "
-                f"for {there}"
+                f"{self.path}: its binary for this platform, in {folder}, cannot be loaded: {reported}; it has "
+                f"binaries for {there}"
             ) from error
 
 
@@ -157,18 +163,18 @@ def _unpack(path: Path, allowance: untrusted.Allowance, file: IO[bytes], content
     """Fill a content from the archive `path`, open as `file`."""
     wanted = ("resources/", *(f"binaries/{folder}/" for folder in folders()))
     with untrusted.readable(f"{path}: not a usable FMI 2.0 archive"), zipfile.ZipFile(file) as package:
-        found = untrusted.entries(package, str(path))
-        if _DESCRIPTION not in found:
+        zip_infos = untrusted.entries(package, str(path))
+        if _DESCRIPTION not in zip_infos:
             raise InputError(f"{path}: not a usable FMI 2.0 archive: it has no {_DESCRIPTION}")
-        needed = [entry for name, entry in found.items() if name == _DESCRIPTION or name.startswith(wanted)]
+        needed = [entry for name, entry in zip_infos.items() if name == _DESCRIPTION or name.startswith(wanted)]
         content.size = sum(entry.file_size for entry in needed)
         allowance.take(content.size, str(path))
         for entry in needed:
             untrusted.copy(package, entry, content.directory / entry.filename)
-    parts = [name.split("/") for name in found if name.startswith("binaries/")]
+    parts = [name.split("/") for name in zip_infos if name.startswith("binaries/")]
     content.platforms = tuple(sorted({part[1] for part in parts if len(part) > 2}))
     content.description = _read_description(path, content.directory)
-    content.variables = {each.name: each for each in content.description.modelVariables}
+    content.variables = {model_variable.name: model_variable for model_variable in content.description.modelVariables}
 
 
 def _read_description(path: Path, directory: Path) -> Any:

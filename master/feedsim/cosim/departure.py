@@ -20,7 +20,7 @@ def first_departure(trace: Trace, program: Program, machine: Machine) -> str:
     along. An axis has left its setpoint where it is off by more than SETPOINT_LEFT_SHARE of its travel; of axes that
     leave in the same row it is the one that is off the furthest, each as a share of its travel.
     """
-    found: list[tuple[float, float, str, float]] = []
+    result: list[tuple[float, float, str, float]] = []
     for name, axis in machine.axes.items():
         if (column := f"{name}.x_a") not in trace.columns:
             continue
@@ -30,8 +30,8 @@ def first_departure(trace: Trace, program: Program, machine: Machine) -> str:
         share = off / (axis.travel[1] - axis.travel[0])
         if (rows := np.flatnonzero(share > SETPOINT_LEFT_SHARE)).size:
             row = int(rows[0])
-            found.append((float(trace.time[row]), -float(share[row]), name, float(off[row])))
-    if not found:
+            result.append((float(trace.time[row]), -float(share[row]), name, float(off[row])))
+    if not result:
         return ""
-    at, _, name, largest = min(found)
+    at, _, name, largest = min(result)
     return f"; axis {name} left its setpoint first: {largest * 1e3:.3g} mm off at {at:.9g} s"

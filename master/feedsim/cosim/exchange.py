@@ -36,7 +36,7 @@ FIELDS = (
     ("int64_t", "what"), ("int64_t", "every"), ("int64_t", "next"), ("int64_t", "stride"), ("int64_t", "rows"),
     ("int64_t", "row"),
 )  # fmt: skip
-BOND = tuple(each.name for each in fields(Bond))
+BOND = tuple(field.name for field in fields(Bond))
 INTERFACE = (
     f"{VERSION}: {' '.join(OPERATION_CODES)}; {' '.join(f'{kind} {name},' for kind, name in FIELDS)}; "
     + " ".join(f"address {name}," for name in BOND)
@@ -68,13 +68,13 @@ def library(folder: Path) -> Native | str:
         loaded = ctypes.CDLL(str(path))
         interface = loaded.exchange_interface
         interface.restype = ctypes.c_char_p
-        found = (interface() or b"").decode(errors="replace")
+        result = (interface() or b"").decode(errors="replace")
     except FileNotFoundError:
         return f"{LIBRARY_NAME}: no such file beside the archives"
     except (OSError, AttributeError) as error:
         return f"{LIBRARY_NAME}: cannot be used: {str(error).replace(str(path), LIBRARY_NAME)}"
-    if found != INTERFACE:
-        return f"{LIBRARY_NAME}: built from other sources (its interface is {found!r}, wanted is {INTERFACE!r})"
+    if result != INTERFACE:
+        return f"{LIBRARY_NAME}: built from other sources (its interface is {result!r}, wanted is {INTERFACE!r})"
     for run in (loaded.exchange_run, loaded.exchange_run_marked):
         run.restype = ctypes.c_int
         run.argtypes = (
@@ -95,10 +95,10 @@ def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[No
     if wanted is False:
         return None, ()
     reasons = []
-    for found in map(library, dict.fromkeys(folders)):
-        if not isinstance(found, str):
-            return found, ()
-        reasons.append(found)
+    for cdll in map(library, dict.fromkeys(folders)):
+        if not isinstance(cdll, str):
+            return cdll, ()
+        reasons.append(cdll)
     why = f"{'; '.join(dict.fromkeys(reasons))}; {mend('the native loop')}"
     if wanted:
         raise InputError(f"{', '.join(map(str, folders))}: no native cycle loop that fits this version: {why}")

@@ -137,7 +137,7 @@ def _measured(
     machine, program, first = _setpoints(machine, axis, offset_speed or 0.0, wait, duration)
     kept = first * ratio + settle * rows
     total = kept + periods * rows
-    library, told = chosen(native, fmus)
+    library, notes = chosen(native, fmus)
     with System(machine, fmus, friction=friction) as system:
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)
         record = _Record(system, periods * rows, When(first=kept))
@@ -165,7 +165,7 @@ def _measured(
             unsettled=unsettled,
             wall_time=wall_time,
             units=system.archives,
-            warnings=(*system.warnings, *_doubts(trace, axis, friction, offset_speed, unsettled), *told),
+            warnings=(*system.warnings, *_doubts(trace, axis, friction, offset_speed, unsettled), *notes),
         )
 
 

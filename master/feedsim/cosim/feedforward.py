@@ -131,7 +131,7 @@ def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[O
 
 
 def _torque_lag(drive: Drive, T_c: float) -> float:
-    filters = sum(_filter_lag(each, T_c) for each in (drive.filter_1, drive.filter_2, drive.filter_3, drive.filter_4))
+    filters = sum(_filter_lag(entry, T_c) for entry in (drive.filter_1, drive.filter_2, drive.filter_3, drive.filter_4))
     if drive.ideal_current_loop:
         return filters + T_c / 2
     if drive.current is None or drive.R is None or drive.current.K_p <= 0:

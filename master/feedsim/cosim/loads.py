@@ -136,16 +136,16 @@ def acting(scenario: Scenario, program: Program) -> tuple[Acting, ...]:
         InputError: lists every file that cannot be read, column that is missing or of another unit, and load that ends
             before the run begins or begins behind its end.
     """
-    found: list[Acting] = []
+    result: list[Acting] = []
     problems: list[str] = []
     for i, load in enumerate(scenario.loads):
         try:
-            found.append(_course(load, scenario.at("loads", i), program))
+            result.append(_course(load, scenario.at("loads", i), program))
         except InputError as error:
             problems += [f"{scenario.at('loads', i)}: {problem}" for problem in error.problems]
     if problems:
         raise InputError.of(f"{scenario.file}: the loads cannot be used", problems)
-    return tuple(found)
+    return tuple(result)
 
 
 def _course(load: LoadCourse, place: str, program: Program) -> Acting:
@@ -231,7 +231,7 @@ class _Account:
         if self._acting.torque is not None and torque is not None:
             now = np.abs(self.values[rows]) >= self._acts
             record, run = self._torques[rows] * turned, (torque[1:] + torque[:-1]) / 2 * turned
-            self._drives += [each[now].sum() for each in (run, record, np.abs(record), work)]
+            self._drives += [values[now].sum() for values in (run, record, np.abs(record), work)]
 
     @property
     def work(self) -> Work:
@@ -249,9 +249,9 @@ class Loads:
 
     def __init__(self, system: System, loads: Sequence[Acting], T_c: float) -> None:
         self._system, self._T_c, self._done = system, T_c, 0
-        self._accounts = [_Account(i, each, system.axes, T_c) for i, each in enumerate(loads)]
-        inputs = tuple(dict.fromkeys(each.load.input for each in loads))
-        self._at = [inputs.index(each.load.input) for each in loads]
+        self._accounts = [_Account(i, value, system.axes, T_c) for i, value in enumerate(loads)]
+        inputs = tuple(dict.fromkeys(entry.load.input for entry in loads))
+        self._at = [inputs.index(entry.load.input) for entry in loads]
         # A constant load of the axis stays.
         M_0 = {f"{axis}.M_0": described.M_0 for axis, described in system.machine.axes.items()}
         self._constant = np.array([M_0.get(name, 0.0) for name in inputs])
@@ -259,7 +259,7 @@ class Loads:
         # What is known when a cycle ends: x_a and n_a of every axis, motor torques, displacements at the tool.
         self._measured = np.zeros((REPORTED_EVERY, system.measured.size))
         self._motors = np.zeros((REPORTED_EVERY, len(system.axes)))
-        tool = dict.fromkeys(f"tool.x_{each.load.direction}" for each in loads if isinstance(each.load, ToolLoad))
+        tool = dict.fromkeys(f"tool.x_{entry.load.direction}" for entry in loads if isinstance(entry.load, ToolLoad))
         self._tool = Log(system.plant, tuple(tool), REPORTED_EVERY)
         self._ended: list[Floats] = []  # the same at the end of the cycles that are counted
         self.before: list[Operation] = []

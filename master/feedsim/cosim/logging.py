@@ -60,8 +60,8 @@ def log(fine: Trace, logging: Logging, ideal: Sequence[str] = (), scratch: Path 
         table.append(np.array([at * cycle, *(column.at(at) for column in logs)]))
         release(*(column.values for column in logs))
     time, *columns = table.columns()
-    found = {f"{axis}.{signal}": column for (axis, signal), column in zip(names, columns, strict=True)}
-    return Trace(time, found, {name: fine.unit(name) for name in found})
+    result = {f"{axis}.{signal}": column for (axis, signal), column in zip(names, columns, strict=True)}
+    return Trace(time, result, {name: fine.unit(name) for name in result})
 
 
 @dataclass(frozen=True, eq=False)

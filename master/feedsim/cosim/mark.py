@@ -54,7 +54,7 @@ class Mark:
 
     def state(self) -> tuple[int, ...]:
         """The numbers: where they stay as they are, a call has not come back."""
-        return tuple(int(each) for each in self.numbers)
+        return tuple(int(number) for number in self.numbers)
 
 
 class Watched:

@@ -230,14 +230,14 @@ class Executor:
         if failed.kind == "do_step":
             t = begin + failed.s
         else:  # where the unit stands: at the end of its last step, if it has taken one in this cycle
-            for each in self._operations[:at]:
-                if each.unit is not failed.unit:
+            for operation in self._operations[:at]:
+                if operation.unit is not failed.unit:
                     continue
-                if each.kind == "do_step":
-                    t = begin + each.s + each.h
-                elif each.kind == "get_state":
+                if operation.kind == "do_step":
+                    t = begin + operation.s + operation.h
+                elif operation.kind == "get_state":
                     kept = t
-                elif each.kind == "set_state":
+                elif operation.kind == "set_state":
                     t = kept
         failed.unit.fail(failed.about, t)
 
@@ -247,7 +247,7 @@ class Interpreter(Executor):
 
     def __init__(self, operations: Sequence[Operation], T_c: float) -> None:
         super().__init__(operations, T_c)
-        self._acts = [_call(each) if each.unit else _arithmetic(each) for each in self._operations]
+        self._acts = [_call(operation) if operation.unit else _arithmetic(operation) for operation in self._operations]
 
     def run(self, begin: int, end: int) -> None:
         noted = None if self.mark is None else self.mark.numbers

@@ -56,11 +56,11 @@ def recorded_columns(scenario: Scenario) -> list[str]:
 
 def columns_of(machine: Machine, loaded: Sequence[str] = (), *, residual: bool = False) -> list[str]:
     """All columns that can be recorded, in the order of a trace. loaded: the plant's variables at which loads act."""
-    found: list[str] = []
+    result: list[str] = []
     for name, axis in machine.axes.items():
         shown = (*DRIVE.shown(axis.drive), *FRICTION_ROLE.shown(axis.friction), *([RESIDUAL] if residual else []))
-        found += (f"{name}.{signal}" for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *shown))
-    return [*found, *_effects(machine), *TOOL_SIGNALS, *loaded]
+        result += (f"{name}.{signal}" for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *shown))
+    return [*result, *_effects(machine), *TOOL_SIGNALS, *loaded]
 
 
 def _effects(machine: Machine) -> list[str]:
@@ -192,21 +192,21 @@ class Recording:
     def _block(self, rows: NDArray[np.int64]) -> Floats:
         """Time and columns of rows that the rings hold, (1 + columns, n)."""
         cycle = rows * self.every
-        found: dict[str, Floats] = {}
+        result: dict[str, Floats] = {}
         for log, names in self._logs:
             columns = log.columns(self._of_rows(log.reals, rows), self._of_rows(log.flags, rows))
-            found |= {names[signal]: values for signal, values in columns.items()}
+            result |= {names[signal]: values for signal, values in columns.items()}
         for name in self.limited:
-            self.limited[name] += int(np.count_nonzero(found[name]))
+            self.limited[name] += int(np.count_nonzero(result[name]))
         position_cycle = cycle // self._ratio
         low, high = int(position_cycle[0]), int(position_cycle[-1]) + 1
-        found |= {name: values[low:high][position_cycle - low] for name, values in self._setpoints.items()}
+        result |= {name: values[low:high][position_cycle - low] for name, values in self._setpoints.items()}
         if self._residual_names:
-            found |= dict(zip(self._residual_names, self._of_rows(self._residual, rows).T, strict=True))
+            result |= dict(zip(self._residual_names, self._of_rows(self._residual, rows).T, strict=True))
         block = np.empty((1 + len(self._columns), len(rows)))
         block[0] = cycle * self._T_c
         for i, name in enumerate(self._columns):
-            block[1 + i] = found[name]
+            block[1 + i] = result[name]
         return block
 
     def _of_rows(self, ring: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:

@@ -154,7 +154,7 @@ def _run(
         drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
         # What is recorded of a cycle is the load that acts in it.
         before = [*drives.operations, *loading.before]
-        before += (operation for each in recordings for operation in each.operations)
+        before += (operation for recording in recordings for operation in recording.operations)
         before += feeders(system, torque_feedforward or {}, total + 1)
         loop = Loop(cycle, before, loading.after, library, (drives, loading, *recordings))
         system.initialise(program, stop=total * cycles.T_c)
@@ -168,9 +168,9 @@ def _run(
         except BaseException:
             recording.collect(loop.done)
             raise
-        for each in recordings:
-            each.record(total)
-            each.collect(total + 1)
+        for entry in recordings:
+            entry.record(total)
+            entry.collect(total + 1)
         loading.count(total)
         wall_time = time.perf_counter() - begun - recording.sinking
         grid = grid_of(system)

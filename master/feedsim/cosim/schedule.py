@@ -70,21 +70,21 @@ class Cycle:
         contacts = [contact.role for contact in self.system.contacts]
         for role in contacts:
             if missing := lacking(role, scheme):
-                serving = [each.name for each in SCHEMES.values() if not lacking(role, each)]
+                serving = [scheme.name for scheme in SCHEMES.values() if not lacking(role, scheme)]
                 problems.append(
                     f"{role}: coupling scheme {scheme.name} does not work with it, which has {missing}; those that do: "
                     f"{', '.join(serving)}"
                 )
             elif scheme.speed_ramp and not (role.takes_slopes and role.gives_slopes):
                 known = {"speed": role.takes_slopes, "torque": role.gives_slopes}
-                held = " nor of its ".join(name for name, there in known.items() if not there)
+                fixed = " nor of its ".join(name for name, there in known.items() if not there)
                 warnings.append(
-                    f"{role}: knows no slope of its {held}: on this axis the exchange holds what has none, as "
+                    f"{role}: knows no slope of its {fixed}: on this axis the exchange holds what has none, as "
                     f"gauss_seidel does, and is of first order; coupling.substeps above {self.substeps} make it finer"
                 )
         steps = [(control.role, self.cycle, "cycles.control") for control in self.system.controllers]
         steps += [(role, self.step, "cycles.control over coupling.substeps") for role in contacts]
-        problems += filter(None, (check_step(*each) for each in steps))
+        problems += filter(None, (check_step(*step) for step in steps))
         if problems:
             raise InputError.of("the units cannot be exchanged so", problems)
         return tuple(warnings)

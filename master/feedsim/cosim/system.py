@@ -131,7 +131,7 @@ class System(Closing):
             if role is DRIVE or self.friction
         ]
         archives: dict[Path, Archive] = {}
-        found: dict[str, RoleUnit] = {}
+        role_units: dict[str, RoleUnit] = {}
         problems: list[str] = []
         for name, axis, role in wanted:
             path = archive_path(machine, axis, role, fmus)
@@ -139,14 +139,14 @@ class System(Closing):
                 if path not in archives:
                     archives[path] = Archive(path)
                     self._open.append(archives[path])
-                found[name] = filled(machine, axis, role, archives[path])
+                role_units[name] = filled(machine, axis, role, archives[path])
             except InputError as error:
                 problems += error.problems
         if problems:
             problems = list(dict.fromkeys(problems))
             raise InputError.of("the units cannot be used", problems)
-        check_instances(found.values())
-        return found
+        check_instances(role_units.values())
+        return role_units
 
     def _instantiate(self, archive: Archive, name: str) -> Unit:
         role = self.roles.get(name)

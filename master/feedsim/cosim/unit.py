@@ -371,7 +371,9 @@ class Port:
         """Find the values now."""
         self._exchange("get_real")
         if self.converts:
-            self.values[:] = [alias.to_signal(each) for alias, each in zip(self.aliases, self.own_values, strict=True)]
+            self.values[:] = [
+                alias.to_signal(value) for alias, value in zip(self.aliases, self.own_values, strict=True)
+            ]
 
     def _exchange(self, operation: str) -> None:
         at, count = self.references.ctypes.data, self.references.size

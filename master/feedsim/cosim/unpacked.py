@@ -150,11 +150,11 @@ class Store:
 
     def _digest(self, file: BufferedReader) -> str:
         """SHA-256 of an open file, computed once as long as the file stays as it is."""
-        found = os.fstat(file.fileno())
-        state = (found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+        result = os.fstat(file.fileno())
+        state = (result.st_dev, result.st_ino, result.st_size, result.st_mtime_ns, result.st_ctime_ns)
         if (known := self._digests.get(state)) is not None:
             return known
-        rested = time.time_ns() - max(found.st_mtime_ns, found.st_ctime_ns) > RESTED  # asked before it is read
+        rested = time.time_ns() - max(result.st_mtime_ns, result.st_ctime_ns) > RESTED  # asked before it is read
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         file.seek(0)
         if rested:
@@ -168,7 +168,7 @@ class Store:
             content.users -= 1
             if content not in self._contents.values():  # of a process that this one was forked off from
                 return
-            idle = [key for key, each in self._contents.items() if not each.users]
+            idle = [key for key, content in self._contents.items() if not content.users]
             large = [key for key in idle if self._contents[key].size > KEPT_SIZE]
             for key in {*large, *idle[: max(0, len(idle) - MAX_UNUSED_CONTENTS)]}:
                 self._contents.pop(key).remove()
@@ -176,7 +176,7 @@ class Store:
     def clear(self) -> None:
         """Let go of everything that no archive uses."""
         with self._lock:
-            for key in [key for key, each in self._contents.items() if not each.users]:
+            for key in [key for key, content in self._contents.items() if not content.users]:
                 self._contents.pop(key).remove()
 
     def forget(self) -> None:

@@ -59,13 +59,13 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
     """
     if (count := len(package.infolist())) > MOST_ENTRIES:
         raise InputError(f"{where}: cannot be trusted: it has {count} entries; allowed: up to {MOST_ENTRIES}")
-    found = [entry for entry in package.infolist() if not entry.is_dir()]
+    zip_infos = [entry for entry in package.infolist() if not entry.is_dir()]
     names: dict[str, str] = {}  # as a disk compares them -> as the first of the entries has it
-    for entry in found:
+    for entry in zip_infos:
         names.setdefault(_folded(entry.filename), entry.filename)
     faults: list[str] = []
     seen: set[str] = set()
-    for entry in found:
+    for entry in zip_infos:
         name = entry.filename
         if fault := _fault(entry, name in seen, names):
             faults.append(f"{where}: the entry {shortened(name)!r} {fault}")
@@ -74,7 +74,7 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
         more = len(faults) - 20
         faults = [*faults[:20], f"{where}: {more} more like these"] if more > 0 else faults
         raise InputError.of(f"{where}: cannot be trusted", faults)
-    return {entry.filename: entry for entry in found}
+    return {entry.filename: entry for entry in zip_infos}
 
 
 def _fault(entry: zipfile.ZipInfo, twice: bool, names: dict[str, str]) -> str | None:
@@ -100,7 +100,7 @@ def _fault(entry: zipfile.ZipInfo, twice: bool, names: dict[str, str]) -> str | 
     if names[folded] != name:
         return f"differs from {shortened(names[folded])!r} only in case or accents, which some disks do not tell apart"
     parts = folded.split("/")
-    above = next((names[each] for i in range(1, len(parts)) if (each := "/".join(parts[:i])) in names), None)
+    above = next((names[text] for i in range(1, len(parts)) if (text := "/".join(parts[:i])) in names), None)
     return f"is in the folder {shortened(above)!r}, which is a file too" if above else None
 
 

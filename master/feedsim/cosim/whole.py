@@ -85,8 +85,8 @@ def _part(archive: Archive, axis: str, role: Role) -> RoleUnit:
     """Signals of a role on an axis: outputs and what comes from outside are the axis's, the rest is the part's."""
     aliases = {}
     for name, signal in role.signals.items():
-        found = next(each for each in (f"{axis}.{name}", f"{axis}.{role.name}.{name}") if each in archive.variables)
-        aliases[name] = Alias(found, "1" if signal.unit == BOOLEAN else signal.unit)
+        text = next(entry for entry in (f"{axis}.{name}", f"{axis}.{role.name}.{name}") if entry in archive.variables)
+        aliases[name] = Alias(text, "1" if signal.unit == BOOLEAN else signal.unit)
     return RoleUnit(role, axis, archive, aliases, {})
 
 

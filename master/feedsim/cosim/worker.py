@@ -148,7 +148,11 @@ class _Worker:
         code, where = self._process.poll(), self._where(operations)
         self.end()
         if code is not None and code < 0:
-            name = signal.Signals(-code).name if -code in {int(each) for each in signal.Signals} else f"signal {-code}"
+            name = (
+                signal.Signals(-code).name
+                if -code in {int(signals) for signals in signal.Signals}
+                else f"signal {-code}"
+            )
             how = f"was ended by {name} ({signal.strsignal(-code) or 'unknown'})"
         else:
             how = f"ended the process by itself, with exit status {code}"

@@ -242,8 +242,8 @@ def correlation(covariance: Array) -> Array:
     """(P, P) correlation of a covariance; 0 beside what has no finite variance."""
     spread = np.sqrt(np.diag(covariance))
     usable = np.isfinite(spread) & (spread > 0)
-    found = np.eye(len(spread))
+    values = np.eye(len(spread))
     kept = np.ix_(usable, usable)
-    found[kept] = covariance[kept] / np.outer(spread[usable], spread[usable])
-    np.fill_diagonal(found, 1.0)
-    return found
+    values[kept] = covariance[kept] / np.outer(spread[usable], spread[usable])
+    np.fill_diagonal(values, 1.0)
+    return values

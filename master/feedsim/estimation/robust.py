@@ -94,7 +94,7 @@ def rounding(paths: Sequence[Array], off: Sequence[Array], noise: float) -> NDAr
         own = math.sqrt(max(noise**2 - step**2 / 12, 0.0)) / step
         for n in range(1, HARMONICS + 1):
             amplitude = step / (math.pi * n) * math.exp(-2 * (math.pi * n * own) ** 2) / math.sqrt(2)
-            column = [np.zeros(len(each), dtype=np.complex128) for each in paths]
+            column = [np.zeros(len(path), dtype=np.complex128) for path in paths]
             column[k] = amplitude * np.exp(2j * math.pi * n * turns)
             columns.append(np.concatenate(column))
     samples = sum(len(path) for path in paths)

@@ -33,11 +33,11 @@ def options(text: str, folder: Path) -> list[tuple[str, Source]]:
 
 def spread(texts: Iterable[str]) -> list[str]:
     """KEY=VALUE each: entries in place of the files that `options` takes. InputError as there."""
-    found = []
+    result = []
     for text in texts:
         many = [] if "=" in text else options(text, Path())
-        found += [f"{key}={as_text(value.data)}" for key, value in many] or [text]
-    return found
+        result += [f"{key}={as_text(value.data)}" for key, value in many] or [text]
+    return result
 
 
 def entries(source: Source, group: str) -> Iterator[tuple[str, Source]]:
@@ -113,8 +113,8 @@ def _having(source: Source, model: Any, place: Place, rest: list[str], where: st
     if not rest or rest[0] == "*":
         return [*entries]
     known = [shape.keys(shape.expected(model, source.data, (*place, i))) for i in entries]
-    found = [i for i in entries if known[i] is None or rest[0] in known[i]]  # type: ignore[operator]
-    if entries and not found:
+    indexes = [i for i in entries if known[i] is None or rest[0] in known[i]]  # type: ignore[operator]
+    if entries and not indexes:
         words = [*dict.fromkeys(word for keys in known for word in keys or ())]
         raise InputError(f"{where}unknown key {rest[0]!r} in all entries of {here}{did_you_mean(rest[0], words)}")
-    return found
+    return indexes

@@ -42,12 +42,12 @@ def checked(
     """
     faults: list[str] = []
     fetch(source, model, (), faults)
-    found = check(source, model, faults)
-    if found is not None:
-        faults += [describe(source, place, message) for place, message in contradictions(found)]
-    if faults or found is None:
+    result = check(source, model, faults)
+    if result is not None:
+        faults += [describe(source, place, message) for place, message in contradictions(result)]
+    if faults or result is None:
         raise InputError.of(str(path), in_order(faults))
-    return found
+    return result
 
 
 def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:

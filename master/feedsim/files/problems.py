@@ -124,8 +124,8 @@ def quantity_of(annotation: Any) -> Quantity | None:
     if isinstance(annotation, Quantity):
         return annotation
     for part in get_args(annotation) if get_origin(annotation) not in (dict, tuple) else ():
-        if found := quantity_of(part):
-            return found
+        if quantity := quantity_of(part):
+            return quantity
     return None
 
 

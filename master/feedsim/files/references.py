@@ -34,7 +34,7 @@ def referred(folder: Path, name: str) -> Path:
     if not _possible(name):
         raise InputError(f"{brief(name)} is no file name")
     path = folder / name
-    root = next((each for each in reversed(_CLOSED) if _inside(_absolute(folder), each)), None)
+    root = next((name for name in reversed(_CLOSED) if _inside(_absolute(folder), name)), None)
     if root is not None and not _inside(_absolute(path), root):
         raise InputError(f"{brief(name)} leads out of the archive; what is written in one names files in it alone")
     return path

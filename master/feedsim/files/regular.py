@@ -28,9 +28,9 @@ def opened(path: Path, *, pipes: bool = False) -> Iterator[BufferedReader]:
     try:
         number = os.open(path, _OPENING)
         with os.fdopen(number, "rb") as file:
-            found = os.fstat(number)
-            if not (stat.S_ISREG(found.st_mode) or (pipes and stat.S_ISFIFO(found.st_mode))):
-                what = next(name for is_one, name in _OTHERS if is_one(found.st_mode))
+            result = os.fstat(number)
+            if not (stat.S_ISREG(result.st_mode) or (pipes and stat.S_ISFIFO(result.st_mode))):
+                what = next(name for is_one, name in _OTHERS if is_one(result.st_mode))
                 raise InputError(f"{path} is {what}, not a file")
             if hasattr(os, "O_NONBLOCK"):
                 os.set_blocking(number, True)

@@ -66,16 +66,16 @@ def without_clipped(
     proven = [
         heap for both, torque in zip(heaps, needed, strict=True) for heap in both if _beyond(heap, torque, margin)
     ]
-    found, said = [], []
+    result, said = [], []
     for record, both, torque in zip(records, heaps, needed, strict=True):
         # What one record shows of a limit holds for all that end at it.
         kept = [heap for heap in both if any(heap.like(other) for other in proven)]
         if not kept:
-            found.append(record)
+            result.append(record)
             continue
-        found.append(replace(record, clipped=np.any([heap.rows for heap in kept], axis=0)))
-        said.append(_words(found[-1], kept, torque, left_out))
-    return tuple(found), tuple(said)
+        result.append(replace(record, clipped=np.any([heap.rows for heap in kept], axis=0)))
+        said.append(_words(result[-1], kept, torque, left_out))
+    return tuple(result), tuple(said)
 
 
 def _smooth(record: Record) -> Array:

@@ -47,7 +47,7 @@ def hides(drifts: float, sigma_2: float) -> tuple[str, ...]:
 
 def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
     """The first and the last plateau of each direction and speed that came back after another speed."""
-    found = []
+    result = []
     for k, first in enumerate(plateaus):
         like = [
             m
@@ -56,8 +56,8 @@ def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
         ]
         between = (abs(abs(other.speed) - abs(first.speed)) for other in plateaus[k : like[-1]])
         if like[0] == k and any(away > SAME_SPEED * abs(first.speed) for away in between):
-            found.append((k, like[-1]))
-    return found
+            result.append((k, like[-1]))
+    return result
 
 
 def repeated(

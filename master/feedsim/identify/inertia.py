@@ -124,7 +124,7 @@ def _stretches(record: Record, length: float, slow: float) -> list[_Stretch]:
     moving[1:] &= np.sign(speed[1:]) == np.sign(speed[:-1])
     if record.clipped is not None:
         moving &= ~record.clipped
-    found = []
+    stretches = []
     for begin, end in runs(moving):
         if end - begin < size:
             continue
@@ -138,8 +138,8 @@ def _stretches(record: Record, length: float, slow: float) -> list[_Stretch]:
             np.full(count, side),
             np.ones(count),
         ]
-        found.append(_Stretch(np.column_stack(columns), _apply(kernel, torque[part], step), noise))
-    return found
+        stretches.append(_Stretch(np.column_stack(columns), _apply(kernel, torque[part], step), noise))
+    return stretches
 
 
 def _apply(weights: Array, signal: Array, step: int) -> Array:
@@ -162,12 +162,12 @@ def smooth_speed(record: Record) -> Array:
 
 def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     """Ordinary least squares with a covariance for correlated residuals."""
-    names, held, said = list(RIGID_AXIS_NAMES), {}, []
+    names, fixed, said = list(RIGID_AXIS_NAMES), {}, []
     columns = np.vstack([stretch.columns for stretch in stretches])
     torque = np.concatenate([stretch.torque for stretch in stretches])
     if np.ptp(columns[:, 2]) == 0:
         names.remove("M_0")
-        held["M_0"] = "motion in one direction only does not separate it from friction"
+        fixed["M_0"] = "motion in one direction only does not separate it from friction"
         said.append("motion in one direction only: the constant load is taken for friction")
     chosen = [RIGID_AXIS_NAMES.index(name) for name in names]
     scale = np.linalg.norm(columns[:, chosen], axis=0)
@@ -187,8 +187,8 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     sigma = np.sqrt(np.diag(covariance))
     estimates = {}
     for name in RIGID_AXIS_NAMES:
-        if name in held:
-            estimates[name] = estimate(name, 0.0, status="undetermined", reason=held[name])
+        if name in fixed:
+            estimates[name] = estimate(name, 0.0, status="undetermined", reason=fixed[name])
             continue
         k = names.index(name)
         estimates[name] = estimate(name, float(values[k]), float(sigma[k]))
@@ -222,21 +222,21 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     )
 
 
-def contradiction(found: Inertia, estimates: Mapping[str, Estimate]) -> str:
+def contradiction(result: Inertia, estimates: Mapping[str, Estimate]) -> str:
     """Where an axis with these parameters needs quite another torque than the rigid axis, or has another inertia.
 
     The simple friction of the rigid axis is no more than a straight line through a curve, but it is a linear least
     square: it cannot go astray. Empty where both agree as well as line and curve do.
     """
-    line, values = found.estimates, {name: each.value for name, each in estimates.items()}
+    line, values = result.estimates, {name: entry.value for name, entry in estimates.items()}
     if not line["F_C"].value > 0:
         return ""
-    for n in map(float, found.speeds):
+    for n in map(float, result.speeds):
         side = np.sign(n)
         friction = line["F_C"].value + line["sigma_2"].value * abs(n)
         straight = line["M_0"].value + side * friction
-        row = np.array([{"J": 0.0, "sigma_2": n, "F_C": side, "M_0": 1.0}[name] for name in found.correlation.names])
-        margin = CONTRADICTS * friction + SIGNIFICANT_SIGMAS * float(np.sqrt(row @ found.covariance @ row))
+        row = np.array([{"J": 0.0, "sigma_2": n, "F_C": side, "M_0": 1.0}[name] for name in result.correlation.names])
+        margin = CONTRADICTS * friction + SIGNIFICANT_SIGMAS * float(np.sqrt(row @ result.covariance @ row))
         curved = float(torque(values, np.array([n]))[0])
         if abs(curved - straight) > margin:
             return f"{curved:.3g} N.m at {n:.3g} rad/s, where {SIMPLE} needs {straight:.3g} N.m"

@@ -51,10 +51,10 @@ def check_time(path: Path, records: Sequence[Record]) -> None:
 
 def check_slide(path: Path, records: Sequence[Record], pitch: float | None) -> None:
     """Raises InputError: nothing could move a slide like that. pitch: [m]; None: not known, nothing is checked."""
-    motions = [found for record in records if (found := _motion(record)) is not None]
+    motions = [motion for record in records if (motion := _motion(record)) is not None]
     if pitch is None or not motions:
         return
-    speed, acceleration = (pitch / (2 * pi) * _largest([each[k] for each in motions]) for k in (0, 1))
+    speed, acceleration = (pitch / (2 * pi) * _largest([motion[k] for motion in motions]) for k in (0, 1))
     for what, value, limit, unit in (
         ("moves at", speed, MAX_SLIDE_SPEED, "m/s"),
         ("accelerates with", acceleration, MAX_SLIDE_ACCELERATION, "m/s2"),
@@ -106,24 +106,24 @@ def check_inertia(given: Estimate, rigid: Estimate) -> None:
 
 def _slide(estimates: Mapping[str, Estimate], I_P: float) -> Iterator[tuple[str, float, str]]:
     """Name of PLAUSIBLE, value at the slide in its unit, and words, of all that is known well."""
-    known = {name: each for name, each in estimates.items() if _known(each)}
-    told = {name: f"{name} comes out as {each.value:.4g} {each.unit}:" for name, each in known.items()}
+    known = {name: estimate for name, estimate in estimates.items() if _known(estimate)}
+    reported = {name: f"{name} comes out as {estimate.value:.4g} {estimate.unit}:" for name, estimate in known.items()}
     if "F_C" in known:
-        yield "friction", known["F_C"].value / I_P, told["F_C"]
+        yield "friction", known["F_C"].value / I_P, reported["F_C"]
     level = known.get("F_C") or known.get("F_S")
     if "sigma_0" in known and level is not None:
         yield (
             "deflection",
             level.value / known["sigma_0"].value * I_P,
-            f"{told['sigma_0']} the bristles would give way after",
+            f"{reported['sigma_0']} the bristles would give way after",
         )
     if "v_s" in known:
-        yield "v_s", known["v_s"].value * I_P, told["v_s"]
+        yield "v_s", known["v_s"].value * I_P, reported["v_s"]
     if "J" in known:
         J = known["J"].value
-        yield "mass", J / I_P**2, told["J"]
+        yield "mass", J / I_P**2, reported["J"]
         if "F_C" in known:
-            yield "braking", known["F_C"].value / J * I_P, f"{told['J']} friction alone would brake with"
+            yield "braking", known["F_C"].value / J * I_P, f"{reported['J']} friction alone would brake with"
 
 
 def _known(estimate: Estimate) -> bool:

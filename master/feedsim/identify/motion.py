@@ -144,18 +144,18 @@ def motion(record: Record, source: Source | None = None, *, smoother: float = 1.
         raise InputError(f"{record.name}: the record has no {source}")
     interval = record.interval
     time = record.time[0] + interval * np.arange(len(record))
-    found: dict[Source, tuple[PPoly, float]] = {}
+    result: dict[Source, tuple[PPoly, float]] = {}
     if record.speed is not None and source != "angle":
-        found["speed"] = CubicSpline(time, quiet(record.speed, interval, 1, smoother)), noise_of(record.speed)
+        result["speed"] = CubicSpline(time, quiet(record.speed, interval, 1, smoother)), noise_of(record.speed)
     if record.angle is not None and source != "speed":
         # sqrt(3)/interval: what the derivative of a cubic spline at its knots makes of white noise, within some per
         # cent (sum over its weights 3 (sqrt(3) - 2)^k / interval).
         noise = noise_of(record.angle) * sqrt(3) / interval
         path = quiet(record.angle - record.angle[0], interval, 2, smoother)
-        found["angle"] = CubicSpline(time, path).derivative(), noise
+        result["angle"] = CubicSpline(time, path).derivative(), noise
     # 3: the motor's own speed is preferred unless the scale is clearly quieter.
-    best = min(found, key=lambda name: (found[name][1] * (1 if name == "speed" else 3), name))
-    speed, noise = found[best]
+    best = min(result, key=lambda name: (result[name][1] * (1 if name == "speed" else 3), name))
+    speed, noise = result[best]
     return Motion(time, interval, speed, best, noise, max(1, ceil(interval / LAW_STEP - 1e-9)))
 
 
@@ -200,10 +200,10 @@ def parts(record: Record, motion: Motion) -> tuple[Part, ...]:
     speed = motion.coarse()
     moving = _moving(record, motion, speed)
     angle = np.asarray(motion.speed.antiderivative()(motion.time), dtype=np.float64)
-    found = [
+    result = [
         _part(motion, speed, angle, first, last) for first, last in runs(moving) if last - first >= MIN_STRETCH_ROWS
     ]
-    return tuple(found)
+    return tuple(result)
 
 
 def _moving(record: Record, motion: Motion, speed: Array) -> NDArray[np.bool_]:
@@ -256,7 +256,7 @@ def _sine(interval: float, speed: Array, reversals: int) -> tuple[float, float] 
     frequency = float(least_squares(rest, [start], x_scale=start, xtol=1e-8).x[0])
     shape = columns(frequency)
     weights = np.linalg.lstsq(shape, middle, rcond=None)[0]
-    left = middle - shape @ weights
-    if np.mean(left**2) > SINE_SHARE * np.mean(middle**2):
+    remaining = middle - shape @ weights
+    if np.mean(remaining**2) > SINE_SHARE * np.mean(middle**2):
         return None
     return float(np.hypot(weights[0], weights[1])) / (2 * pi * frequency), frequency

@@ -73,11 +73,11 @@ def balanced(
     missing = [name for name in (*law.names, "M_0", "J") if name not in estimates]
     if missing:
         raise InputError(f"open loop: no value of {', '.join(missing)}")
-    values = {name: each.value for name, each in estimates.items()}
+    values = {name: estimate.value for name, estimate in estimates.items()}
     values.setdefault("delay", 0.0)
 
     def refused(reason: str, **seen: Any) -> Balance:
-        return Balance(estimates, False, reason, tuple(each.record.name for each in axes), **seen)
+        return Balance(estimates, False, reason, tuple(axis.record.name for axis in axes), **seen)
 
     axes: list[OpenLoop] = []
     free = [name for name in ("M_0", "F_C") if name not in hold and estimates[name].status == "estimated"]
@@ -102,15 +102,15 @@ def balanced(
     drifting = [axis.change for axis in axes] if "M_0" in free else []
     values |= dict.fromkeys((axis.change for axis in axes), 0.0)
 
-    def moved(found: Mapping[str, float]) -> dict[str, float]:
-        new = values | dict(found)
+    def moved(result: Mapping[str, float]) -> dict[str, float]:
+        new = values | dict(result)
         if "F_S" not in hold:
             # max: where both are one, their sums with a difference need not be.
             new["F_S"] = max(new["F_S"] + (new["F_C"] - values["F_C"]), new["F_C"])
         return new
 
-    def residuals(found: Mapping[str, float]) -> Array:
-        return np.concatenate([axis.residual(moved(found)) for axis in axes])
+    def residuals(values: Mapping[str, float]) -> Array:
+        return np.concatenate([axis.residual(moved(values)) for axis in axes])
 
     if any(substeps(values, axis.record.interval) > MOST_STEPS for axis in axes):
         return refused("sigma_0 or sigma_1 is so large that the axis cannot be moved by the recorded torque")
@@ -124,17 +124,17 @@ def balanced(
         if drifting:
             values |= _Solver(residuals, values).best(drifting, tolerance=1e-4).mapping()
         start = [axis.residual(values) for axis in axes]
-        found = _Solver(residuals, values, "F_S" in hold).solve([*free, *drifting])
-        loads = _load_rates(residuals, axes, values, moved(found), [*free, *drifting]) if drifting else {}
+        results = _Solver(residuals, values, "F_S" in hold).solve([*free, *drifting])
+        loads = _load_rates(residuals, axes, values, moved(results), [*free, *drifting]) if drifting else {}
         if drifting and not any(map(_determined, loads.values())):
             # What a record does not determine predicts nothing: the load is constant then.
             values |= dict.fromkeys(drifting, 0.0)
             start = [axis.residual(values) for axis in axes]
-            found = _Solver(residuals, values, "F_S" in hold).solve(free)
+            results = _Solver(residuals, values, "F_S" in hold).solve(free)
             loads = {name: replace(rate, status="undetermined", reason=NO_DRIFT) for name, rate in loads.items()}
     except (SimulationError, InputError) as error:
         return refused(f"no least squares in open loop: {error}")
-    new = moved(found)
+    new = moved(results)
     end = [axis.residual(new) for axis in axes]
     position = _rms(np.concatenate(start)), _rms(np.concatenate(end))
     torque = _torque_rms(axes, values), _torque_rms(axes, new)
@@ -167,9 +167,9 @@ def _load_rates(
     at a time. By as much as the torque's residual says another rate it is wider: two criteria disagree by that.
     """
     step = 1e-4 * new["F_C"]
-    found = {name: new[name] for name in free}
-    undisturbed = residuals(found)
-    slopes = np.column_stack([(residuals({**found, n: found[n] + step}) - undisturbed) / step for n in free])
+    values = {name: new[name] for name in free}
+    undisturbed = residuals(values)
+    slopes = np.column_stack([(residuals({**values, n: values[n] + step}) - undisturbed) / step for n in free])
     rng = np.random.default_rng(0)
     disturbed = [np.concatenate([axis.disturbed(new, rng) for axis in axes]) for _ in range(DRAWS)]
     moved = np.linalg.lstsq(slopes, np.column_stack(disturbed) - undisturbed[:, None], rcond=None)[0]
@@ -225,15 +225,15 @@ class _Solver:
         self,
         names: Sequence[str],
         started: Mapping[str, float] | None = None,
-        held: Mapping[str, float] | None = None,
+        kept: Mapping[str, float] | None = None,
         *,
         tolerance: float,
     ) -> Fit:
         """Over `names`, from `started` (default: the values); `held` replaces values that are not free."""
-        values, fixed = self._values, held or {}
+        values, fixed = self._values, kept or {}
         begin = started or values
         return fit(
-            lambda found: self._residuals({**fixed, **found}),
+            lambda values: self._residuals({**fixed, **values}),
             [Parameter(n, begin[n], *_room(n, values, self._below), scale=values["F_C"]) for n in names],
             normalised=False,
             difference=1e-4,  # small against what a change is worth, large against rounding over the record
@@ -248,7 +248,7 @@ class _Solver:
         begin = {name: values[name] for name in free}
         load = [name for name in free if name != "F_C"]
         if "F_C" in free:
-            found: list[tuple[float, dict[str, float]]] = []
+            result: list[tuple[float, dict[str, float]]] = []
             low, high = _room("F_C", values, self._below)
             for side in (1, -1):
                 now = dict(begin)
@@ -256,8 +256,8 @@ class _Solver:
                     now["F_C"] = min(max((1 + side * k * ROW_STEP) * values["F_C"], low), high)
                     if load:
                         now |= self.best(load, now, {"F_C": now["F_C"]}, tolerance=1e-4).mapping()
-                    found.append((_rms(self._residuals(now)), dict(now)))
-            begin = min(found, key=lambda each: each[0])[1]
+                    result.append((_rms(self._residuals(now)), dict(now)))
+            begin = min(result, key=lambda entry: entry[0])[1]
         return self.best(free, begin, tolerance=1e-8).mapping()
 
 
@@ -280,7 +280,7 @@ def _doubt(
 ) -> str:
     """Why a result is not taken; empty where it is."""
     friction, load = new["F_C"] / old["F_C"] - 1, (new["M_0"] - old["M_0"]) / old["F_C"]
-    if not all(isfinite(each) for each in (*position, *torque)):
+    if not all(isfinite(value) for value in (*position, *torque)):
         return "the position in open loop is no number"
     if not position[1] < (1 - LEAST_GAIN) * position[0]:
         return f"the position in open loop does not improve ({position[0]:.4g} rad to {position[1]:.4g} rad rms)"

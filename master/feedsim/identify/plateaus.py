@@ -53,8 +53,8 @@ def plateaus(record: Record, J: float) -> tuple[Plateau, ...]:
         for first, last in _candidates(motion):
             if not lowest <= abs(float(np.median(motion.blocks[first:last]))) < highest:
                 continue
-            if (found := _plateau(record, motion, first, last, J)) is not None:
-                taken.append(found)
+            if (result := _plateau(record, motion, first, last, J)) is not None:
+                taken.append(result)
         highest = lowest
         if lowest <= SLOWEST * float(np.max(np.abs(motion.blocks))):
             break
@@ -209,14 +209,14 @@ def _bend(motion: _Motion, begin: int, end: int) -> float:
     """
     rows, order = end - begin, 2 if motion.direct else 3
     place = np.linspace(-1.0, 1.0, rows)
-    found = legendre.legfit(place, motion.signal[begin:end], order)
-    left = float(np.std(motion.signal[begin:end] - legendre.legval(place, found)))
+    values = legendre.legfit(place, motion.signal[begin:end], order)
+    remaining = float(np.std(motion.signal[begin:end] - legendre.legval(place, values)))
     # Coefficients of Legendre polynomials on many even points are independent, of variance (2 k + 1) / rows.
-    sigmas = left * np.sqrt((2 * np.arange(order + 1) + 1) / rows)
+    sigmas = remaining * np.sqrt((2 * np.arange(order + 1) + 1) / rows)
     if motion.direct:
-        ranges, shape, scale = np.array([0.0, 2.0, 1.5]), found, 1.0
+        ranges, shape, scale = np.array([0.0, 2.0, 1.5]), values, 1.0
     else:  # ranges of the derivatives of P_2 and P_3
-        ranges, shape = np.array([0.0, 0.0, 6.0, 7.5]), legendre.legder(found)
+        ranges, shape = np.array([0.0, 0.0, 6.0, 7.5]), legendre.legder(values)
         scale = 2 / ((rows - 1) * motion.interval)
     noise = PLATEAU_SIGMAS * float(np.linalg.norm(ranges * sigmas))
     return scale * (float(np.ptp(legendre.legval(place, shape))) - noise)

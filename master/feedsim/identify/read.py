@@ -251,17 +251,17 @@ def _unread_load(
                 continue
             values = recording.read([*used, name])[name] * load.scale
             torque = _motor_side({"load": load}, {"load": values}, drive)["load"]
-            left = [_residual(records, [side * torque[rows] for rows in pieces]) for side in (0.0, 1.0, -1.0)]
+            remaining = [_residual(records, [side * torque[rows] for rows in pieces]) for side in (0.0, 1.0, -1.0)]
         except InputError:
             continue  # no signal of this trace, no force, or nothing moves that would determine
-        best = min(left[1:])
-        if best > SMALLER * left[0]:
+        best = min(remaining[1:])
+        if best > SMALLER * remaining[0]:
             continue
-        given = (f", unit: {unit}" if unit else "") + ("" if best == left[1] else ", sign: -1")
+        given = (f", unit: {unit}" if unit else "") + ("" if best == remaining[1] else ", sign: -1")
         yield (
             f"{recording.header}: {name!r} may be a known load, and is not read. With it a rigid axis with simple "
-            f"friction leaves {best:.3g} in place of {left[0]:.3g} N.m of the torque (rms); mapping: load: {{column: "
-            f"{name}{given}}}"
+            f"friction leaves {best:.3g} in place of {remaining[0]:.3g} N.m of the torque (rms); mapping: load: "
+            f"{{column: {name}{given}}}"
         )
 
 
@@ -331,9 +331,9 @@ def distinct(files: Sequence[Path]) -> tuple[str, ...]:
 
 def named_apart(recorded: Sequence[Recorded]) -> tuple[Record, ...]:
     """The records of all files, under names that separate the files."""
-    names = distinct([each.provenance.file for each in recorded])
+    names = distinct([entry.provenance.file for entry in recorded])
     return tuple(
-        replace(record, name=name + record.name.removeprefix(each.provenance.file.name))
-        for each, name in zip(recorded, names, strict=True)
-        for record in each.records
+        replace(record, name=name + record.name.removeprefix(value.provenance.file.name))
+        for value, name in zip(recorded, names, strict=True)
+        for record in value.records
     )

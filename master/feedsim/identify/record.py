@@ -96,8 +96,8 @@ class Record:
 
     def between(self, first: int, last: int) -> Record:
         """Rows first <= i < last."""
-        told = {role: values for role in ("time", *RECORD_SIGNALS) if (values := getattr(self, role)) is not None}
-        return replace(self, **{role: values[first:last] for role, values in told.items()})
+        reported = {role: values for role in ("time", *RECORD_SIGNALS) if (values := getattr(self, role)) is not None}
+        return replace(self, **{role: values[first:last] for role, values in reported.items()})
 
 
 # A step of more than that many usual ones is a gap, where rows are missing; the least gap has 2.
@@ -143,15 +143,15 @@ def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ..
     if len(breaks) > max(MOST_GAPS, SHARE_OF_GAPS * len(steps)):
         raise _uneven(time, breaks[0] + 1, usual, float(time[-1] - time[0]) / len(steps), row)
     edges = [0, *(i + 1 for i in breaks), len(time)]
-    found, dropped = [], []
+    pieces, dropped = [], []
     for first, last in pairwise(edges):
         if breaks and last - first < MIN_ROWS_BETWEEN_GAPS:
             dropped.append(last - first)
             continue
-        found.append(_even(time, first, last, row))
-    if not found:
+        pieces.append(_even(time, first, last, row))
+    if not pieces:
         raise InputError(f"{row(0)}: no {MIN_ROWS_BETWEEN_GAPS} rows follow one another without a gap")
-    return tuple(found), tuple(_gaps(time, breaks, usual, dropped, row))
+    return tuple(pieces), tuple(_gaps(time, breaks, usual, dropped, row))
 
 
 def _even(time: Array, first: int, last: int, row: Callable[[int], str]) -> Piece:

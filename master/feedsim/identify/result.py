@@ -233,10 +233,10 @@ class Identification:
     prior: bool = True
 
     def __repr__(self) -> str:
-        found = [
-            f"{name} {each.value:.4g} {each.unit}".strip()
-            for name, each in self.estimates.items()
-            if each.status == "estimated"
+        result = [
+            f"{name} {estimate.value:.4g} {estimate.unit}".strip()
+            for name, estimate in self.estimates.items()
+            if estimate.status == "estimated"
         ]
-        told = f"; {len(self.warnings)} warnings" if self.warnings else ""
-        return f"Identification of {self.axis}: {', '.join(found) or 'nothing estimated'}{told}"
+        reported = f"; {len(self.warnings)} warnings" if self.warnings else ""
+        return f"Identification of {self.axis}: {', '.join(result) or 'nothing estimated'}{reported}"

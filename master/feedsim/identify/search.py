@@ -74,11 +74,11 @@ class Search:
 
     def best(self, starts: Sequence[Mapping[str, float]], states: Array, free: Sequence[str]) -> Solution:
         """Where the best of the starts arrives, the likeliest of which come first."""
-        found: list[Solution] = []
+        solutions: list[Solution] = []
         for first in range(0, min(len(starts), 2 * FOLLOWED), FOLLOWED):
             followed = starts[first : first + FOLLOWED]
-            found += [self.solve(start, states, free, tolerance=START_TOLERANCE, limit=12) for start in followed]
-            best = min(found, key=lambda one: one.fit.cost)
+            solutions += [self.solve(start, states, free, tolerance=START_TOLERANCE, limit=12) for start in followed]
+            best = min(solutions, key=lambda one: one.fit.cost)
             if 2 * best.fit.cost <= EXPLAINED * len(best.fit.residuals):
                 break
         return best
@@ -114,7 +114,7 @@ class Search:
         def residuals(moved: Mapping[str, float]) -> Array:
             return np.concatenate(self.residuals(*full(moved)))
 
-        found = fit(
+        result = fit(
             residuals,
             parameters,
             prior=Prior.joined([self.prior, loose]),
@@ -122,8 +122,8 @@ class Search:
             tolerance=tolerance,
             limit=limit,
         )
-        point, shares = full(found.mapping())
-        return Solution(point, shares, found)
+        point, shares = full(result.mapping())
+        return Solution(point, shares, result)
 
 
 def spread(residual: Array) -> float:
@@ -168,15 +168,15 @@ def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown
     matrix = np.column_stack([shapes[name] for name in names])[fast]
     scale = np.linalg.norm(matrix, axis=0)
     weights = np.linalg.lstsq(matrix / scale, (torque - known)[fast], rcond=None)[0] / scale
-    found = dict(zip(names, map(float, weights), strict=True))
-    if "J" in found and found["J"] <= 0:
-        found["J"] = 1e-3 * float(np.std(torque) / max(np.std(acceleration), 1e-300))
-    if "sigma_2" in found:
-        found["sigma_2"] = max(found["sigma_2"], 0.0)
-    if "F_C" in found and not found["F_C"] > 0:
-        inertia = found.get("J", values["J"]) * acceleration
-        found["F_C"] = float(np.quantile(np.abs(torque - inertia - found.get("M_0", values["M_0"])), 0.95))
-    return found
+    result = dict(zip(names, map(float, weights), strict=True))
+    if "J" in result and result["J"] <= 0:
+        result["J"] = 1e-3 * float(np.std(torque) / max(np.std(acceleration), 1e-300))
+    if "sigma_2" in result:
+        result["sigma_2"] = max(result["sigma_2"], 0.0)
+    if "F_C" in result and not result["F_C"] > 0:
+        inertia = result.get("J", values["J"]) * acceleration
+        result["F_C"] = float(np.quantile(np.abs(torque - inertia - result.get("M_0", values["M_0"])), 0.95))
+    return result
 
 
 def stiffnesses(models: Sequence[RecordTorque], values: Mapping[str, float]) -> Array:
@@ -220,7 +220,7 @@ def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Coll
     elif {"spread", "skew"} <= set(free):
         shapes = [(spread, skew) for spread in SPREADS for skew in SKEWS]
     levels = stiffnesses(models, values) if "sigma_0" in free else np.array([values["sigma_0"]])
-    found: list[tuple[float, dict[str, float]]] = []
+    result: list[tuple[float, dict[str, float]]] = []
     for shape in shapes:
         best: tuple[float, dict[str, float]] | None = None
         for sigma_0 in levels:
@@ -233,9 +233,9 @@ def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Coll
             if best is None or cost < best[0]:
                 best = cost, trial
         assert best is not None
-        found.append(best)
-    found.sort(key=lambda pair: pair[0])
-    return [trial for _, trial in found]
+        result.append(best)
+    result.sort(key=lambda pair: pair[0])
+    return [trial for _, trial in result]
 
 
 def _damped(models: Sequence[RecordTorque], trial: dict[str, float], free: bool) -> float:

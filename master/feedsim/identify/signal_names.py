@@ -108,13 +108,13 @@ def alias_of(name: str, axis: str = "", axes: Iterable[str] = ()) -> Alias | Non
 
     axis: of the trace, "" where it is not known; axes: all of the machine.
     """
-    if found := _BY_KEY.get(_key(_tokens(name))):
-        return found
+    if alias := _BY_KEY.get(_key(_tokens(name))):
+        return alias
     own = axis.casefold()
-    others = {*_AXIS_LETTERS, *(each.casefold() for each in axes)} - {own}
+    others = {*_AXIS_LETTERS, *(axis.casefold() for axis in axes)} - {own}
     for tokens in _without_axis(name, own, others):
-        if found := _BY_KEY.get(_key(tokens)):
-            return found
+        if alias := _BY_KEY.get(_key(tokens)):
+            return alias
     return None
 
 

@@ -106,8 +106,8 @@ def _time(recording: Recording, mapping: Columns) -> Signal | None:
         # What has no unit is s, as everywhere in traces; but a counter is nothing before its factor.
         unit = clock.unit or (None if clock.factor or recording.units.get(clock.column) else "s")
         return Signal(column=clock.column, unit=unit, factor=clock.factor)
-    found = _named_time(recording, mapping.axis or "")
-    return Signal(column=found, unit=clock.unit or (None if recording.units[found] else "s"))
+    named_time = _named_time(recording, mapping.axis or "")
+    return Signal(column=named_time, unit=clock.unit or (None if recording.units[named_time] else "s"))
 
 
 def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: bool) -> Chosen:
@@ -131,8 +131,8 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
         names = _aliases(recording, axis, axes)
     driving = [role for role in DRIVING if role in names]
     for role in driving[1:]:
-        left = names.pop(role)
-        notes.append(Note(f"{recording.path}: {left!r} is not used; the {driving[0]} {names[driving[0]]!r} is"))
+        remaining = names.pop(role)
+        notes.append(Note(f"{recording.path}: {remaining!r} is not used; the {driving[0]} {names[driving[0]]!r} is"))
     missing = [] if driving or not driven else ["torque or current"]
     missing += [] if "position" in names or "speed" in names else ["position or speed"]
     if missing:
@@ -167,62 +167,64 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
 
 def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
     """The signals of an axis of a capture, and what was found of it. InputError: which axis is meant is not clear."""
-    there = ", ".join(f"{each.name} (|{each.number})" for each in recording.axes)
-    meant = [each for each in recording.axes if each.called(axis)] if axis else list(recording.axes)
+    there = ", ".join(f"{axis.name} (|{axis.number})" for axis in recording.axes)
+    meant = (
+        [capture_axis for capture_axis in recording.axes if capture_axis.called(axis)] if axis else list(recording.axes)
+    )
     if len(meant) != 1:
         problem = f"nothing of axis {axis!r}" if axis and not meant else "which axis is meant?"
         raise InputError(f"{recording.header}: {problem}; there is {there}")
-    found = meant[0]
-    where = f"{recording.path}: axis {found.name} (|{found.number})"
-    doubts = [f"{where}: {doubt}" for doubt in found.doubts]
-    if found.pitch is None:
-        return recording.of_axis(found), [
+    result = meant[0]
+    where = f"{recording.path}: axis {result.name} (|{result.number})"
+    doubts = [f"{where}: {doubt}" for doubt in result.doubts]
+    if result.pitch is None:
+        return recording.of_axis(result), [
             *doubts,
             f"{where}: POWER does not give the pitch, nor whether TORQUE and CURRENT count in the position's "
-            f"direction: they are taken to. {found.why[:1].upper()}{found.why[1:]}",
+            f"direction: they are taken to. {result.why[:1].upper()}{result.why[1:]}",
         ]
-    if found.rotary:
+    if result.rotary:
         raise InputError(f"{where}: turns by 360 deg with its motor; rotary axes are not identified here")
-    against = "against" if found.sign < 0 else "in"
-    return recording.of_axis(found), [
+    against = "against" if result.sign < 0 else "in"
+    return recording.of_axis(result), [
         *doubts,
         Note(
-            f"{where}: by POWER = TORQUE times the motor's speed the pitch is {found.pitch:.6g} mm, and TORQUE and "
-            f"CURRENT count {against} the position's direction; positions are taken as {found.length}, as the file has "
-            "no units"
+            f"{where}: by POWER = TORQUE times the motor's speed the pitch is {result.pitch:.6g} mm, and TORQUE and "
+            f"CURRENT count {against} the position's direction; positions are taken as {result.length}, as the file "
+            "has no units"
         ),
     ]
 
 
 def _aliases(recording: Recording, axis: str, axes: tuple[str, ...]) -> dict[str, str]:
     """Role -> column, by the names of drive traces."""
-    found: dict[str, list[str]] = {}
+    result: dict[str, list[str]] = {}
     for name in recording.names:
         if (alias := alias_of(name, axis, axes)) and alias.role != "time":
-            found.setdefault(alias.role, []).append(name)
+            result.setdefault(alias.role, []).append(name)
     faults = [
         f"{recording.header}: {len(names)} columns may be the {role}: {', '.join(names)}; say which in a mapping "
         f"file: {_line(role, recording, names[0])}"
-        for role, names in found.items()
+        for role, names in result.items()
         if len(names) > 1
     ]
     if faults:
         raise InputError.of(str(recording.path), faults)
-    return {role: names[0] for role, names in found.items()}
+    return {role: names[0] for role, names in result.items()}
 
 
 def _named_time(recording: Recording, axis: str) -> str:
     for usual in ("time", "t", "Zeit"):
         if usual in recording.names:
             return usual
-    found = [name for name in recording.names if (alias := alias_of(name, axis)) and alias.role == "time"]
-    if len(found) > 1:
+    result = [name for name in recording.names if (alias := alias_of(name, axis)) and alias.role == "time"]
+    if len(result) > 1:
         raise InputError(
-            f"{recording.header}: {len(found)} columns may be the time: {', '.join(found)}; say which in a mapping "
-            f"file: {_line('time', recording, found[0])}"
+            f"{recording.header}: {len(result)} columns may be the time: {', '.join(result)}; say which in a mapping "
+            f"file: {_line('time', recording, result[0])}"
         )
-    if found:
-        return found[0]
+    if result:
+        return result[0]
     first = recording.names[0]
     if known_unit(recording.units[first]) and units.unit(recording.units[first] or "1").dimension == "time":
         return first
@@ -260,6 +262,8 @@ def column(recording: Recording, role: str, signal: Signal) -> Channel:
 
 def _line(role: str, recording: Recording, column: str = "...") -> str:
     """The line of a mapping file that names a column."""
-    told = column in recording.units and known_unit(recording.units[column]) and recording.units[column]
+    reported = column in recording.units and known_unit(recording.units[column]) and recording.units[column]
     name = column if re.fullmatch(r"[\w.]+", column) else f'"{column}"'
-    return f"{role}: {{column: {name}}}" if told else f"{role}: {{column: {name}, unit: {_EXAMPLE.get(role, 'N.m')}}}"
+    return (
+        f"{role}: {{column: {name}}}" if reported else f"{role}: {{column: {name}, unit: {_EXAMPLE.get(role, 'N.m')}}}"
+    )

@@ -78,14 +78,14 @@ def stationary(
     for name in (*asked, *free):
         if name not in CONSTANT_SPEED:
             raise InputError(f"{name} is no parameter of stationary friction: {', '.join(CONSTANT_SPEED)}")
-    held = {name: value for name, value in {**DEFAULT_SHAPES, **asked}.items() if name not in free}
-    check_held(held)
+    fixed = {name: value for name, value in {**DEFAULT_SHAPES, **asked}.items() if name not in free}
+    check_held(fixed)
     points = Points.of(plateaus)
-    problem = _Problem(points, held, seed)
-    found, reasons, extra = problem.solve()
-    usual = [name for name in DEFAULT_SHAPES if name in held and name not in asked]
-    better = _better(problem, found, reasons, usual) if extra > 0 else ""
-    return _conclude(tuple(plateaus), points, problem, found, reasons, extra, better, I_P)
+    problem = _Problem(points, fixed, seed)
+    result, reasons, extra = problem.solve()
+    usual = [name for name in DEFAULT_SHAPES if name in fixed and name not in asked]
+    better = _better(problem, result, reasons, usual) if extra > 0 else ""
+    return _conclude(tuple(plateaus), points, problem, result, reasons, extra, better, I_P)
 
 
 class _Problem:
@@ -101,36 +101,36 @@ class _Problem:
         reasons = identifiability.unseparated(self.points) | identifiability.too_few(self.points, free)
         reasons = {name: reason for name, reason in reasons.items() if name in free}
         while True:
-            left = [name for name in free if name not in reasons]
-            if not left:
+            remaining = [name for name in free if name not in reasons]
+            if not remaining:
                 raise InputError("every parameter of stationary friction is held: nothing is left to estimate")
-            found, extra = self.weighted(left, reasons)
-            more = self.needless(found, reasons, extra)
-            more = more or identifiability.unanswered(self.points, found, self.inner(found.mapping(), reasons))
-            more = {name: reason for name, reason in more.items() if name in left}
-            if not more or len(more) == len(left):
-                return found, reasons, extra
+            result, extra = self.weighted(remaining, reasons)
+            more = self.needless(result, reasons, extra)
+            more = more or identifiability.unanswered(self.points, result, self.inner(result.mapping(), reasons))
+            more = {name: reason for name, reason in more.items() if name in remaining}
+            if not more or len(more) == len(remaining):
+                return result, reasons, extra
             reasons |= more
             for name in ("v_s", "beta"):
                 if name in more:
-                    self.usual[name] = found[name]
+                    self.usual[name] = result[name]
 
-    def needless(self, found: Fit, reasons: Mapping[str, str], extra: float) -> dict[str, str]:
+    def needless(self, result: Fit, reasons: Mapping[str, str], extra: float) -> dict[str, str]:
         """Rise, v_s and beta where the plateaus are met as well without a Stribeck effect, name -> reason.
 
         A fit makes one of noise alone: with none, the drop of chi^2 is that of as many random numbers.
         """
-        parts = [name for name in (EXCESS, "v_s", "beta") if name in found.names]
-        if not {EXCESS, "v_s"} <= set(parts) or found.sigma["v_s"] <= identifiability.V_S_WARNED * found["v_s"]:
+        parts = [name for name in (EXCESS, "v_s", "beta") if name in result.names]
+        if not {EXCESS, "v_s"} <= set(parts) or result.sigma["v_s"] <= identifiability.V_S_WARNED * result["v_s"]:
             return {}
         reason = (
             f"the torque at the speeds from {self.points.speeds[0]:.3g} rad/s on is met as well without a Stribeck "
             "effect: no plateau lies within its range"
         )
         without = {**reasons} | dict.fromkeys(parts, reason)
-        left = [name for name in found.names if name not in parts]
-        bare = self.fit(left, without, extra, 1, found)
-        if 2 * (bare.cost - found.cost) > chi2.ppf(STRIBECK_PROBABILITY, len(parts)):
+        remaining = [name for name in result.names if name not in parts]
+        bare = self.fit(remaining, without, extra, 1, result)
+        if 2 * (bare.cost - result.cost) > chi2.ppf(STRIBECK_PROBABILITY, len(parts)):
             return {}
         return dict.fromkeys(parts, reason)
 
@@ -144,25 +144,25 @@ class _Problem:
         values["F_S"] = values["F_C"] + values[EXCESS]
         return values
 
-    def weighted(self, left: Sequence[str], reasons: Mapping[str, str]) -> tuple[Fit, float]:
+    def weighted(self, remaining: Sequence[str], reasons: Mapping[str, str]) -> tuple[Fit, float]:
         """Fit with the plateaus' own noise; where that does not explain the scatter, with a share of torque added."""
-        found = self.fit(left, reasons, 0.0, STARTS)
-        freedom = len(self.points.speed) - len(left)
-        if freedom < 1 or 2 * found.cost <= chi2.ppf(DOUBTFUL, freedom):
-            return found, 0.0
+        result = self.fit(remaining, reasons, 0.0, STARTS)
+        freedom = len(self.points.speed) - len(remaining)
+        if freedom < 1 or 2 * result.cost <= chi2.ppf(DOUBTFUL, freedom):
+            return result, 0.0
         low, high = 0.0, 1.0
         for _ in range(12):
             # In equal ratios once a lower end is there: shares of 1e-4 and of 0.1 both occur.
             middle = high / 10 if low == 0 else float(np.sqrt(low * high))
-            found = self.fit(left, reasons, middle, 1, found)
-            if 2 * found.cost > freedom:
+            result = self.fit(remaining, reasons, middle, 1, result)
+            if 2 * result.cost > freedom:
                 low = middle
             else:
                 high = middle
-        return self.fit(left, reasons, high, STARTS, found), high
+        return self.fit(remaining, reasons, high, STARTS, result), high
 
     def fit(
-        self, left: Sequence[str], reasons: Mapping[str, str], extra: float, starts: int, near: Fit | None = None
+        self, remaining: Sequence[str], reasons: Mapping[str, str], extra: float, starts: int, near: Fit | None = None
     ) -> Fit:
         """One weighted fit."""
         points = self.points
@@ -172,44 +172,44 @@ class _Problem:
         def residuals(moved: Mapping[str, float]) -> Array:
             return np.asarray((points.torque - torque(self.inner(moved, reasons), points.speed)) * weight)
 
-        return fit(residuals, [self.parameter(name, begin[name]) for name in left], starts=starts, seed=self.seed)
+        return fit(residuals, [self.parameter(name, begin[name]) for name in remaining], starts=starts, seed=self.seed)
 
-    def marginal(self, found: Fit, reasons: Mapping[str, str], extra: float) -> tuple[Array, Array]:
+    def marginal(self, result: Fit, reasons: Mapping[str, str], extra: float) -> tuple[Array, Array]:
         """Covariance (P, P) of what was found, and its part by warming, which changes viscous friction.
 
         What is held because the plateaus do not determine it is not known: it adds what the rest would move by if it
         had another usual value, as far as the plateaus allow that one, and what it moves by if it has the value that
         suits them best. So does the course of viscous friction over time.
         """
-        without, moved = self._hidden(found, reasons, extra, 0.0)
-        within, warmed = self._hidden(found, reasons, extra, drift.WARMS)
+        without, moved = self._hidden(result, reasons, extra, 0.0)
+        within, warmed = self._hidden(result, reasons, extra, drift.WARMS)
         known = np.isfinite(within) & np.isfinite(without)
         part = np.where(known, within - np.where(known, without, 0.0), 0.0) + np.outer(warmed - moved, warmed - moved)
         # With nothing hidden what was found is the best there is, at a bound too.
         best = not any(name in PRIOR_DEVIATIONS for name in reasons)
         return without + (0.0 if best else np.outer(moved, moved)) + part, part
 
-    def _hidden(self, found: Fit, reasons: Mapping[str, str], extra: float, warms: float) -> tuple[Array, Array]:
+    def _hidden(self, result: Fit, reasons: Mapping[str, str], extra: float, warms: float) -> tuple[Array, Array]:
         """Covariance with what is hidden as nuisances, and how far what was found is from the best with them."""
-        points, values = self.points, self.inner(found.mapping(), reasons)
+        points, values = self.points, self.inner(result.mapping(), reasons)
         if "v_s" in reasons:
             values["v_s"] = float(points.speeds[0]) / UNSEEN_SPEED_RATIO
         names = [name for name in reasons if name in PRIOR_DEVIATIONS]
         weight = 1.0 / np.hypot(points.sigma, extra * np.abs(points.torque))
-        columns = [found.jacobian]
+        columns = [result.jacobian]
         for name in names:
             size = hidden(name, float(np.mean(points.friction()[0])), float(points.speeds[-1]))
             ends = ({**values, name: values[name] + side * size} for side in (0.5, -0.5))
             up, down = (torque({**end, "F_S": end["F_C"] + end[EXCESS]}, points.speed) for end in ends)
             columns.append(((down - up) * weight)[:, None])
-        count = len(found.names)
+        count = len(result.names)
         # In units of what may be: a row of unit variance for each that is hidden.
         usual = np.eye(len(names), count + len(names), count)
         lost = warms * values["sigma_2"] * points.speed * weight
         noise = np.eye(len(lost)) + drift.warming(points.age) * np.outer(lost, lost)
         root = np.linalg.cholesky(noise)
         whole = np.vstack([solve_triangular(root, np.hstack(columns), lower=True), usual])
-        away = np.concatenate([solve_triangular(root, found.residuals, lower=True), np.zeros(len(names))])
+        away = np.concatenate([solve_triangular(root, result.residuals, lower=True), np.zeros(len(names))])
         scale = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
         covariance, _ = inverse(whole / scale)
         covariance = covariance / np.outer(scale, scale)
@@ -249,17 +249,17 @@ def _guess(points: Points) -> dict[str, float]:
     }
 
 
-def _better(problem: _Problem, found: Fit, reasons: Mapping[str, str], usual: Sequence[str]) -> str:
+def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: Sequence[str]) -> str:
     """What estimating one of the values held by default would gain, for the warning of scatter; "": nothing clear.
 
     It counts where the plateaus are met to their noise then, or the sum of squares more than halves, and the drop is
     none that one more parameter brings in noise (F test: the noise's size is in doubt here).
     """
-    count, moved = len(problem.points.speed), list(found.names)
+    count, moved = len(problem.points.speed), list(result.names)
     freedom = count - len(moved) - 1
     if freedom < 1:
         return ""
-    before = 2 * problem.fit(moved, reasons, 0.0, STARTS, found).cost
+    before = 2 * problem.fit(moved, reasons, 0.0, STARTS, result).cost
     gains: list[tuple[float, str]] = []
     for name in usual:
         if SHAPED[name] not in moved:
@@ -267,7 +267,7 @@ def _better(problem: _Problem, found: Fit, reasons: Mapping[str, str], usual: Se
         given = {key: value for key, value in problem.given.items() if key != name}
         trial = _Problem(problem.points, given, problem.seed)
         free = [key for key in MOVED_ORDER if key in (*moved, name)]
-        freed = trial.fit(free, reasons, 0.0, STARTS, found)
+        freed = trial.fit(free, reasons, 0.0, STARTS, result)
         after = 2 * freed.cost
         fits = after <= chi2.ppf(DOUBTFUL, freedom)
         clear = before - after > f.ppf(STRIBECK_PROBABILITY, 1, freedom) * after / freedom
@@ -286,29 +286,29 @@ def _conclude(
     plateaus: tuple[Plateau, ...],
     points: Points,
     problem: _Problem,
-    found: Fit,
+    result: Fit,
     reasons: Mapping[str, str],
     extra: float,
     better: str,
     I_P: float | None,
 ) -> Stationary:
     """Everything that is reported."""
-    values = problem.inner(found.mapping(), reasons)
-    names = tuple(map(outer, found.names))
-    turn = inner_to_outer(found.names, names)
-    whole, warmed = problem.marginal(found, reasons, extra)
+    values = problem.inner(result.mapping(), reasons)
+    names = tuple(map(outer, result.names))
+    turn = inner_to_outer(result.names, names)
+    whole, warmed = problem.marginal(result, reasons, extra)
     drifted, drifts = drift.repeated(plateaus, values, names)
     covariance, warmed = turn @ whole @ turn.T + np.diag(drifted), turn @ warmed @ turn.T
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
-    told = {outer(name): reason for name, reason in reasons.items()}
+    reported = {outer(name): reason for name, reason in reasons.items()}
     estimates = {}
     for name in CONSTANT_SPEED:
-        status: Status = "estimated" if name in names else "undetermined" if name in told else "held"
-        reason = told.get(name, "" if status == "estimated" else "held at a given or usual value")
+        status: Status = "estimated" if name in names else "undetermined" if name in reported else "held"
+        reason = reported.get(name, "" if status == "estimated" else "held at a given or usual value")
         estimates[name] = estimate(name, values[name], float(sigma.get(name, nan)), status, reason)
-    said = identifiability.warnings(points, found, correlation(covariance - warmed), names, I_P)
-    said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in told.items()]
+    said = identifiability.warnings(points, result, correlation(covariance - warmed), names, I_P)
+    said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in reported.items()]
     said += drifts
     if "sigma_2" in sigma:
         at = names.index("sigma_2")
@@ -329,7 +329,7 @@ def _conclude(
         warmed,
         speeds,
         curve(values, speeds),
-        _band(problem, found, reasons, speeds),
+        _band(problem, result, reasons, speeds),
         (float(points.speeds[0]), float(points.speeds[-1])),
         float(np.sqrt(np.mean(away**2))),
         float(np.max(np.abs(away) / curve(values, points.speed))),
@@ -337,19 +337,19 @@ def _conclude(
     )
 
 
-def _band(problem: _Problem, found: Fit, reasons: Mapping[str, str], speeds: Array) -> Array:
+def _band(problem: _Problem, result: Fit, reasons: Mapping[str, str], speeds: Array) -> Array:
     """(K,) standard deviation of the curve, linearised."""
     rows = []
-    for k, name in enumerate(found.names):
-        parameter = problem.parameter(name, float(found.values[k]))
+    for k, name in enumerate(result.names):
+        parameter = problem.parameter(name, float(result.values[k]))
         # Up to the bound and beyond: the curve is smooth there, and only its slope is asked for.
-        step = 1e-5 * (float(found.values[k]) if parameter.log else parameter.step)
-        ahead, behind = found.mapping(), found.mapping()
+        step = 1e-5 * (float(result.values[k]) if parameter.log else parameter.step)
+        ahead, behind = result.mapping(), result.mapping()
         ahead[name] += step
         behind[name] -= step
         values = (problem.inner(side, reasons) for side in (ahead, behind))
         first, second = (curve(side, speeds) for side in values)
         rows.append((first - second) / (2 * step))
     slopes = np.column_stack(rows)
-    finite = np.where(np.isfinite(found.covariance), found.covariance, 0.0)
+    finite = np.where(np.isfinite(result.covariance), result.covariance, 0.0)
     return np.asarray(np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", slopes, finite, slopes), 0.0)))

@@ -57,8 +57,8 @@ class Points:
         means, sigmas = [], []
         for k in range(len(self.speeds)):
             sides = [(nearest == k) & (np.sign(self.speed) == side) for side in (1.0, -1.0)]
-            found = [np.mean(np.abs(self.torque[side])) for side in sides if np.any(side)]
-            means.append(float(np.mean(found)))
+            result = [np.mean(np.abs(self.torque[side])) for side in sides if np.any(side)]
+            means.append(float(np.mean(result)))
             sigmas.append(float(np.sqrt(np.mean(self.sigma[nearest == k] ** 2) / np.sum(nearest == k))))
         return np.array(means), np.array(sigmas)
 
@@ -76,23 +76,23 @@ def falls(points: Points) -> bool:
 def too_few(points: Points, free: Sequence[str]) -> dict[str, str]:
     """Curve parameters among `free` that so few speeds do not determine, name -> reason: more than there are speeds."""
     count = len(points.speeds)
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     ranks = ["F_C", EXCESS, "sigma_2", "F_log", "v_s", "v_log", "beta"]
     if not falls(points) and count < 6:
         reason = f"the torque does not fall with speed at any of {count} speed(s): no Stribeck effect shows"
-        found |= {name: reason for name in (EXCESS, "v_s", "beta") if name in free}
-    wanted = [name for name in ranks if name in free and name not in found]
+        result |= {name: reason for name in (EXCESS, "v_s", "beta") if name in free}
+    wanted = [name for name in ranks if name in free and name not in result]
     few = f"{count} speed(s) do not determine {len(wanted)} parameters of the curve"
-    found |= {name: few for name in wanted[count:]}
+    result |= {name: few for name in wanted[count:]}
     wanted = wanted[:count]
     load = [name for name in ("M_0", "asymmetry") if name in free and points.both]
     if "asymmetry" in load and (count < 2 or len(wanted) + len(load) > len(points.speed)):
         load.remove("asymmetry")
-        found["asymmetry"] = (
+        result["asymmetry"] = (
             f"{len(points.speed)} plateau(s) at {count} speed(s) do not separate it from the constant load M_0"
         )
     room = max(len(points.speed) - len(load), 1)
-    return found | {name: f"{len(points.speed)} plateaus do not determine more" for name in wanted[room:]}
+    return result | {name: f"{len(points.speed)} plateaus do not determine more" for name in wanted[room:]}
 
 
 def unseparated(points: Points) -> dict[str, str]:
@@ -102,22 +102,22 @@ def unseparated(points: Points) -> dict[str, str]:
     return {name: "plateaus in one direction only do not separate it from friction" for name in ("M_0", "asymmetry")}
 
 
-def unanswered(points: Points, found: Fit, values: dict[str, float]) -> dict[str, str]:
+def unanswered(points: Points, fit: Fit, values: dict[str, float]) -> dict[str, str]:
     """Free parameters that the fit shows to be untold: they are held then, name -> reason."""
-    told: dict[str, str] = {}
-    free = set(found.names)
+    reported: dict[str, str] = {}
+    free = set(fit.names)
     if "v_s" in free and points.speeds[0] > 3 * values["v_s"]:
         reason = (
             f"no plateau lies within the Stribeck range: the lowest speed is {points.speeds[0]:.3g} rad/s, "
             f"v_s is about {values['v_s']:.2g} rad/s or less"
         )
-        told |= {name: reason for name in ("v_s", EXCESS, "beta") if name in free}
+        reported |= {name: reason for name in ("v_s", EXCESS, "beta") if name in free}
     if "v_s" in free and values[EXCESS] <= 0:
-        told |= {name: "no Stribeck effect: F_S is F_C" for name in ("v_s", "beta") if name in free}
-    if told:
-        return told
+        reported |= {name: "no Stribeck effect: F_S is F_C" for name in ("v_s", "beta") if name in free}
+    if reported:
+        return reported
     reach = level(values, points.speeds)
-    if "F_log" in free and found.sigma["F_log"] > float(np.mean(reach)):
+    if "F_log" in free and fit.sigma["F_log"] > float(np.mean(reach)):
         return {
             "F_log": f"speeds from {points.speeds[0]:.3g} to {points.speeds[-1]:.3g} rad/s do not separate it from "
             "sigma_2"
@@ -128,15 +128,15 @@ def unanswered(points: Points, found: Fit, values: dict[str, float]) -> dict[str
                 "asymmetry": f"the level of friction varies by {100 * np.ptp(reach) / np.mean(reach):.1f} % over the "
                 "speeds only: that does not separate it from the constant load M_0"
             }
-        if found.sigma["asymmetry"] > 0.1:
+        if fit.sigma["asymmetry"] > 0.1:
             return {
-                "asymmetry": f"it would be known to {found.sigma['asymmetry']:.2g} only: the level of friction varies "
+                "asymmetry": f"it would be known to {fit.sigma['asymmetry']:.2g} only: the level of friction varies "
                 "too little over the speeds to separate it from the constant load M_0"
             }
-    return {name: "the torque at these speeds does not depend on it" for name in found.silent}
+    return {name: "the torque at these speeds does not depend on it" for name in fit.silent}
 
 
-def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_P: float | None) -> list[str]:
+def warnings(points: Points, fit: Fit, matrix: Array, names: Sequence[str], I_P: float | None) -> list[str]:
     """About plateaus and the fit that stands. matrix: correlation of `names` (the parameters as they are reported)."""
     said: list[str] = []
     slowest = float(points.speeds[0])
@@ -155,20 +155,20 @@ def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_
             "plateaus in one direction only: the constant load M_0 and an asymmetry are taken for friction; drive "
             "both directions"
         )
-    sigma = found.sigma
-    if "v_s" in sigma and sigma["v_s"] > V_S_WARNED * found["v_s"]:
+    sigma = fit.sigma
+    if "v_s" in sigma and sigma["v_s"] > V_S_WARNED * fit["v_s"]:
         said.append(
-            f"v_s is known to {100 * sigma['v_s'] / found['v_s']:.0f} % only: add plateaus about "
-            f"{_speed(found['v_s'], I_P)}, or make them longer"
+            f"v_s is known to {100 * sigma['v_s'] / fit['v_s']:.0f} % only: add plateaus about "
+            f"{_speed(fit['v_s'], I_P)}, or make them longer"
         )
-    if "F_log" in sigma and sigma["F_log"] > max(0.3 * found["F_log"], 0.02 * float(np.max(np.abs(points.torque)))):
+    if "F_log" in sigma and sigma["F_log"] > max(0.3 * fit["F_log"], 0.02 * float(np.max(np.abs(points.torque)))):
         said.append(
-            f"F_log ({found['F_log']:.3g} -+ {sigma['F_log']:.2g} N.m) is hardly separated from sigma_2 and F_C: add "
+            f"F_log ({fit['F_log']:.3g} -+ {sigma['F_log']:.2g} N.m) is hardly separated from sigma_2 and F_C: add "
             "speeds from well below to well above v_log; the curve itself may be good"
         )
-    for name in found.at_bound:
+    for name in fit.at_bound:
         shown = "F_S - F_C" if name == EXCESS else name
-        said.append(f"{shown} sits at its bound {found[name]:.4g}: the model's shape does not fit, or it is not there")
+        said.append(f"{shown} sits at its bound {fit[name]:.4g}: the model's shape does not fit, or it is not there")
     for row, first in enumerate(names):
         for column in range(row):
             pair = {first, names[column]}

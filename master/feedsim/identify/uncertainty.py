@@ -44,7 +44,7 @@ class Uncertainty:
 
 
 def uncertainty(
-    search: Search, found: Solution, left_open: Collection[Mapping[str, float]], drift: Prior | None = None
+    search: Search, solution: Solution, left_open: Collection[Mapping[str, float]], drift: Prior | None = None
 ) -> Uncertainty:
     """Stretches that contradict each other or stage 1; errors of the recorded motion; what may have drifted in stage 1;
     what the rest would be with a parameter free that the records leave open, which is held here; and what rows
@@ -53,21 +53,21 @@ def uncertainty(
     left_open: per such parameter, inner name -> variance with it free. drift: the part of stage 1's covariance that is
     not in the search's prior.
     """
-    fit = found.fit
+    fit = solution.fit
     factor = disagreement(search.models, fit)
-    motion = motion_covariance(search.models, fit, found.values, found.states, search.weights)
+    motion = motion_covariance(search.models, fit, solution.values, solution.states, search.weights)
     covariance = np.where(np.isfinite(fit.covariance), fit.covariance * np.outer(factor, factor), fit.covariance)
     covariance = covariance + motion + drift_covariance(search.prior, fit, drift)
     if "J" in fit.names:
-        covariance[fit.names.index("J"), fit.names.index("J")] += (MODEL_ACCURACY * found.values["J"]) ** 2
+        covariance[fit.names.index("J"), fit.names.index("J")] += (MODEL_ACCURACY * solution.values["J"]) ** 2
     variance = np.diag(covariance)
-    wanted = (*left_open, _least(search.models, found.values))
-    most = [max(float(v), *(each.get(n, 0.0) for each in wanted)) for n, v in zip(fit.names, variance, strict=True)]
+    wanted = (*left_open, _least(search.models, solution.values))
+    most = [max(float(v), *(values.get(n, 0.0) for values in wanted)) for n, v in zip(fit.names, variance, strict=True)]
     usable = np.isfinite(variance) & (variance > 0)
     wider = np.sqrt(np.where(usable, most, 1.0) / np.where(usable, variance, 1.0))
     covariance = np.where(np.isfinite(covariance), covariance * np.outer(wider, wider), covariance)
-    by_name = [dict(zip(fit.names, map(float, each), strict=True)) for each in (np.sqrt(np.diag(motion)), factor)]
-    return Uncertainty(replace(found, fit=replace(fit, covariance=covariance)), fit.sigma, *by_name)
+    by_name = [dict(zip(fit.names, map(float, values), strict=True)) for values in (np.sqrt(np.diag(motion)), factor)]
+    return Uncertainty(replace(solution, fit=replace(fit, covariance=covariance)), fit.sigma, *by_name)
 
 
 def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
@@ -103,8 +103,8 @@ def limits(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorqu
 
 def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
     """A warning where the recorded motion, not the torque, limits what is determined."""
-    told = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
-    rough = [name for name in told if np.hypot(1, honest.motion[name] / honest.torque[name]) > MOTION_NOISE_RATIO]
+    reported = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
+    rough = [name for name in reported if np.hypot(1, honest.motion[name] / honest.torque[name]) > MOTION_NOISE_RATIO]
     if not rough:
         return ()
     sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})
@@ -150,7 +150,11 @@ def motion_covariance(
         z, c = (float(share) for share in states[k])
         before = model.residual(values, z, c)
         others = [model.disturbed(np.random.default_rng([k, draw])) for draw in range(DRAWS)]
-        moved = [each.residual(values, z, c) for each in (*others, model.smoother(SMOOTHER)) if each is not None]
+        moved = [
+            record_torque.residual(values, z, c)
+            for record_torque in (*others, model.smoother(SMOOTHER))
+            if record_torque is not None
+        ]
         changes = (np.stack(moved) - before) / weight[model.stretch]
         shifts = np.where(known, changes @ reach[:, rows].T, 0.0)
         total += shifts[:-1].T @ shifts[:-1] / DRAWS

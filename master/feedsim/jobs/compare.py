@@ -75,8 +75,8 @@ class CompareResult(Result):
     @property
     def worst(self) -> Variable | None:
         """The compared variable of all pairs that is nearest to its limit, or farthest beyond it."""
-        found = [pair.worst for pair in self.comparisons if pair.worst is not None]
-        return max(found, key=lambda variable: (variable.ratio, variable.deviation), default=None)
+        variables = [pair.worst for pair in self.comparisons if pair.worst is not None]
+        return max(variables, key=lambda variable: (variable.ratio, variable.deviation), default=None)
 
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
@@ -230,20 +230,20 @@ def compare(
         amount(max_shift, "s") if shift == "estimate" else None,
     )
     Tolerances.parse(texts)  # a typing error is reported before anything is read
-    paths = [Path(each) for each in files if isinstance(each, str | Path)]
+    paths = [Path(file) for file in files if isinstance(file, str | Path)]
     outputs = {name: None if file is None else Path(file) for name, file in
                (("html", report), ("xml", junit), ("json", json))}  # fmt: skip
     with replacing(force or forced()):
         if len(paths) < len(files):
-            found, durations = asked.in_memory(files)
+            comparisons, durations = asked.in_memory(files)
             page.check_writable(outputs, paths)
         else:
             pairs = pairs_of(paths)
             own = [asked.tolerances, asked.ours.mapping, asked.theirs.mapping]
             page.check_writable(outputs, [*(path for pair in pairs for path in pair), *filter(None, own)])
-            found, durations = asked.of_files(pairs)
-        result = CompareResult(found, paths, asked.tolerances, durations)
-        page.write(found, **outputs, durations=durations)
+            comparisons, durations = asked.of_files(pairs)
+        result = CompareResult(comparisons, paths, asked.tolerances, durations)
+        page.write(comparisons, **outputs, durations=durations)
     return result
 
 
@@ -270,35 +270,38 @@ class _Asked:
 
     def of_files(self, pairs: Sequence[tuple[Path, Path]]) -> tuple[list[Comparison], list[float]]:
         """Comparisons of pairs of files, and how long they took [s]."""
-        found, durations = [], []
+        comparisons, durations = [], []
         for result, reference in pairs:
             begin = perf_counter()
             try:
                 comparison = self._pair(result, reference)
             except InputError as error:
                 comparison = unusable(result, reference, "; ".join(str(error).splitlines()))
-            found.append(comparison)
+            comparisons.append(comparison)
             durations.append(perf_counter() - begin)
-        if problem := _matched_nowhere(found, self.tol):
-            found = [unusable(each.result, each.reference, problem) if each.variables else each for each in found]
-        return found, durations
+        if problem := _matched_nowhere(comparisons, self.tol):
+            comparisons = [
+                unusable(comparison.result, comparison.reference, problem) if comparison.variables else comparison
+                for comparison in comparisons
+            ]
+        return comparisons, durations
 
     def in_memory(self, given: Sequence[Any]) -> tuple[list[Comparison], list[float]]:
         """The same of traces and runs, and of CSV files beside them."""
         if len(given) % 2:
             raise InputError(f"{len(given)} results given; result and reference are needed in turn")
-        found, durations = [], []
+        comparisons, durations = [], []
         for result, reference in zip(given[::2], given[1::2], strict=True):
             begin = perf_counter()
             ours, theirs = _series(result, self.ours), _series(reference, self.theirs)
-            names = tuple(str(each) if isinstance(each, str | Path) else what
-                          for each, what in ((result, "result"), (reference, "reference")))  # fmt: skip
+            names = tuple(str(value) if isinstance(value, str | Path) else what
+                          for value, what in ((result, "result"), (reference, "reference")))  # fmt: skip
             limits = tolerances_of(Path("reference"), self.tolerances, self.tol)
             choice, notes = self._shifted(ours, theirs, limits)
             comparison = compared(ours, theirs, limits, choice, names=(names[0], names[1]))
-            found.append(replace(comparison, notes=(*notes, *comparison.notes)))
+            comparisons.append(replace(comparison, notes=(*notes, *comparison.notes)))
             durations.append(perf_counter() - begin)
-        return found, durations
+        return comparisons, durations
 
     def _pair(self, result: Path, reference: Path) -> Comparison:
         limits = tolerances_of(reference, self.tolerances, self.tol)
@@ -306,10 +309,10 @@ class _Asked:
         theirs = self._read(reference, self.theirs)
         choice, notes = self._shifted(ours, theirs, limits)
         between = bounds_of(reference) if self.theirs.mapping is None else None
-        found = compare_series(ours, theirs, limits, choice, between=between, names=(str(result), str(reference)))
+        comparison = compare_series(ours, theirs, limits, choice, between=between, names=(str(result), str(reference)))
         if result.exists() and result.samefile(reference):
             notes.append("result and reference are the same file")
-        return replace(found, notes=(*notes, *found.notes))
+        return replace(comparison, notes=(*notes, *comparison.notes))
 
     def _shifted(self, ours: Series, theirs: Series, limits: Tolerances) -> tuple[Options, list[str]]:
         """The choice with the shift that is estimated, and a note on it."""
@@ -342,20 +345,20 @@ def _pairs(option: str, given: Pairs, form: str) -> list[tuple[str, str]]:
     """(name, text) of a mapping, or of texts NAME=TEXT. Raises InputError: no such form."""
     if isinstance(given, Mapping):
         return [*given.items()]
-    found = []
+    result = []
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
             raise InputError(f"{spelt(option)} {text}: {form} is needed")
-        found.append((name, value))
-    return found
+        result.append((name, value))
+    return result
 
 
 def _units(option: str, given: Pairs) -> dict[str, str]:
-    found = dict(_pairs(option, given, "PATTERN=UNIT"))
-    for unit in found.values():
+    pairs = dict(_pairs(option, given, "PATTERN=UNIT"))
+    for unit in pairs.values():
         units.unit(unit)
-    return found
+    return pairs
 
 
 def _instant(value: Value | None) -> float | None:
@@ -372,10 +375,10 @@ def _share(value: Value) -> float:
 
 def _matched_nowhere(comparisons: Sequence[Comparison], texts: Sequence[str]) -> str:
     """That a pattern of --tol matches in no reference, where it is so."""
-    compared = [each for each in comparisons if each.variables]
+    compared = [comparison for comparison in comparisons if comparison.variables]
     for pattern, _ in Tolerances.parse(texts).rules:
-        if compared and all(pattern in each.unused for each in compared):
-            names = dict.fromkeys(variable.name for each in compared for variable in each.variables)
+        if compared and all(pattern in comparison.unused for comparison in compared):
+            names = dict.fromkeys(variable.name for comparison in compared for variable in comparison.variables)
             return f"{spelt('tol')} given for {no_match(pattern, tuple(names))}"
     return ""
 

@@ -84,7 +84,7 @@ class FrfResult(Result, Mapping[str, Complexes]):
     @property
     def inputs(self) -> Sequence[Path]:
         """Files of the machine, and of the curves laid over."""
-        return [*(file for _, file in self.subject.files), *(each.file for each in self.responses.overlays)]
+        return [*(file for _, file in self.subject.files), *(overlay.file for overlay in self.responses.overlays)]
 
     @property
     def figures(self) -> Mapping[str, Figure]:
@@ -205,29 +205,29 @@ def frf(
     wanted = linear.names(chosen, tool=tool)
     overlays, warnings = _overlays(overlay, wanted)
     warnings += doubts
-    inputs = [*(file for _, file in loaded.files), *(each.file for each in overlays)]
+    inputs = [*(file for _, file in loaded.files), *(overlay.file for overlay in overlays)]
     with kept(out, page.check_writable, watch, inputs, texts, force=force):
         watch.progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
-        found = linear.evaluate(system, chosen)
+        linear_result = linear.evaluate(system, chosen)
         closed = responses.closed_form(system, wanted, frequency)
         warnings += responses.zero_notes(closed)
         watch.progress("closed form", 1, 1)
         if not doubts and (doubt := table_mismatch(machine)) is not None:
             warnings.append(doubt)
         judged = control_findings(machine, judge(machine, modes))
-        if found.unstable_poles and not any(severity(each) == "wrong" for each in judged):
-            judged.append(UNSTABLE.format(found.unstable_poles))
+        if linear_result.unstable_poles and not any(severity(name) == "wrong" for name in judged):
+            judged.append(UNSTABLE.format(linear_result.unstable_poles))
         warnings += judged
         full = _full_model(machine, watch, warnings) if full_model else None
         campaign = None
-        if measure and not found.unstable_poles:
+        if measure and not linear_result.unstable_poles:
             announce(watch, machine, archives)
             coupling = loaded.scenario.coupling if loaded.scenario is not None else Coupling()
             campaign = run_campaign(
                 machine, chosen, plan, fmus=archives, progress=watch.progress, call_limit=coupling.call_limit
             )
-        numbers = linear.figures(found)
+        numbers = linear.figures(linear_result)
         if not tool:
             numbers = {name: figure for name, figure in numbers.items() if not name.startswith("tool.")}
         if full is not None:
@@ -242,7 +242,7 @@ def frf(
             modes=modes,
             axes=chosen,
             band=plan.band,
-            result=found,
+            result=linear_result,
             closed=closed,
             campaign=campaign,
             overlays=tuple(overlays),
@@ -264,13 +264,13 @@ def _full_model(machine: Machine, watch: Watch, warnings: list[str]) -> Truncati
     if machine.structure is None:
         return None
     watch.progress("full model", 0, 1)
-    found = None
+    result = None
     try:
-        found = truncation.truncation(load_structure(machine.structure), machine.pose)
+        result = truncation.truncation(load_structure(machine.structure), machine.pose)
     except FeedsimError as error:
         warnings.append(f"no comparison with the full model: {error}")
     watch.progress("full model", 1, 1)
-    return found
+    return result
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
@@ -306,7 +306,7 @@ def _overlays(texts: Sequence[str], known: Sequence[str]) -> tuple[list[Overlay]
     overlays: list[Overlay] = []
     warnings: list[str] = []
     for text in texts:
-        found, doubts = read_overlays(text, known)
-        overlays += found
+        result, doubts = read_overlays(text, known)
+        overlays += result
         warnings += doubts
     return overlays, warnings

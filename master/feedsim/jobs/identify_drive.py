@@ -142,7 +142,7 @@ def identify_drive(
         if asked.machine is not None:
             announce(watch, asked.machine, archives)
         head = page.head(path, asked.window, date.today().isoformat())
-        found = identify_drives(
+        drives_found = identify_drives(
             asked.read,
             records,
             asked.machine,
@@ -155,8 +155,8 @@ def identify_drive(
             count,
             asked.recording.control,
         )
-        sources = [each.provenance for each in asked.read.values()]
-        done = DriveReport(found, sources, asked.subject, title, asked.settings, asked.marks)
+        sources = [recorded.provenance for recorded in asked.read.values()]
+        done = DriveReport(drives_found, sources, asked.subject, title, asked.settings, asked.marks)
         result = DriveResult(done, asked.inputs)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)

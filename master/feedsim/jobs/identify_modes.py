@@ -166,8 +166,8 @@ def identify_modes(
         if band is not None:
             measured = measured.between(*_band(band))
         watch.progress("fit", 1, 2)
-        found = identified(measured, checked_modes(subject.machine), chosen, count)
-        result = ModesResult(page.ModesReport(found, path, subject, given))
+        axis_modes = identified(measured, checked_modes(subject.machine), chosen, count)
+        result = ModesResult(page.ModesReport(axis_modes, path, subject, given))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

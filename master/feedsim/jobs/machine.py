@@ -65,14 +65,14 @@ class MachineResult(Result):
     @property
     def figures(self) -> Mapping[str, Figure]:
         """ "total_mass", "lowest_mode", "X.J_tot", "X.coupling_limit", ...; what is not known is not there."""
-        found = {"total_mass": Figure(self.info.total_mass, "kg", "mass of everything")}
+        result = {"total_mass": Figure(self.info.total_mass, "kg", "mass of everything")}
         elastic = self.info.modes.frequency[self.info.modes.frequency > 0].tolist()
         if elastic:
-            found["lowest_mode"] = Figure(elastic[0], "Hz", "frequency of the first mode that is not rigid")
+            result["lowest_mode"] = Figure(elastic[0], "Hz", "frequency of the first mode that is not rigid")
         for axis in self.info.axes:
             for key, (unit, meaning) in shown.MEANINGS.items():
-                found[f"{axis.name}.{key}"] = Figure(getattr(axis, key), unit, meaning)
-        return Named((name, figure) for name, figure in found.items() if math.isfinite(figure.value))
+                result[f"{axis.name}.{key}"] = Figure(getattr(axis, key), unit, meaning)
+        return Named((name, figure) for name, figure in result.items() if math.isfinite(figure.value))
 
     @property
     def findings(self) -> Sequence[str]:
@@ -315,7 +315,7 @@ def machine_show(
 
     with kept(out, check, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at or {}, cutoff, static_correction, step, watch)
-        chosen = list(dict.fromkeys(_mode(each, info.modes) for each in mode))
+        chosen = list(dict.fromkeys(_mode(entry, info.modes) for entry in mode))
         result = MachineResult(info, described, chosen, factor, animate)
         if out is not None:
             result.save(out, force=force)

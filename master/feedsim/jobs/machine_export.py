@@ -120,7 +120,7 @@ def machine_export(
     >>> result.written.contents["mill.tea"]
     b'N32200 $MA_POSCTRL_GAIN[0,AX1]=4 ; gain\\n'
     """
-    paths = [Path(each) for each in ([like] if isinstance(like, str | Path) else like)]
+    paths = [Path(entry) for entry in ([like] if isinstance(like, str | Path) else like)]
     base = Path(machine)
     names = [path.name for path in paths]
     if twice := next((name for name in names if names.count(name) > 1), ""):
@@ -153,12 +153,12 @@ def machine_export(
 
 def values_of(machine: Machine, control: str, axis: str) -> dict[str, Value]:
     """Our parameter -> SI value of an axis, of all that the control has a name for."""
-    found: dict[str, Value] = {}
+    result: dict[str, Value] = {}
     for parameter in names_of(control):
         value = reduce(_inside, parameter.split("."), machine.axes[axis])
         if isinstance(value, bool | int | float | str):
-            found[parameter] = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
-    return found
+            result[parameter] = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    return result
 
 
 def _inside(value: Any, step: str) -> Any:

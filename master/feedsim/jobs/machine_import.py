@@ -132,7 +132,7 @@ def machine_import(
     >>> [(each.parameter, each.value) for each in result.made.values]
     [('drive.K_v', 83.33333333333334), ('max_acceleration', 2.5)]
     """
-    paths = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
+    paths = [Path(entry) for entry in ([files] if isinstance(files, str | Path) else files)]
     base = None if machine is None else Path(machine)
     if base is not None and not base.exists():
         raise InputError(f"{spelt('machine')}: {no_such_file(base)}")
@@ -169,26 +169,26 @@ def pairs(name: str, given: Pairs) -> dict[str, str]:
     if isinstance(given, Mapping):
         return {str(key): str(value) for key, value in given.items()}
     texts = () if given is None else listed(given)
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
             raise InputError(f"{spelt(name)} {text}: NAME=VALUE is needed")
-        if key in found:
+        if key in result:
             raise InputError(f"{spelt(name)} {text}: {key} is given twice")
-        found[key] = value
-    return found
+        result[key] = value
+    return result
 
 
 def assumed(given: Pairs) -> Mapping[str, str]:
     """Parameter -> text of --assume. InputError: no value of a control."""
-    found = pairs("assume", given)
-    for key, text in found.items():
+    result = pairs("assume", given)
+    for key, text in result.items():
         try:
             scalar(text)
         except ValueError:
             raise InputError(f"{spelt('assume')} {key}={text}: a number, TRUE, FALSE or 'H..' is needed") from None
-    return found
+    return result
 
 
 def axes_of(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> dict[str, str]:
@@ -205,15 +205,15 @@ def axes_of(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> 
         names = {axis: name for archive in archives for axis, name in archive.axis_names.items()}
         shown = ", ".join(f"{axis} ({names[axis]})" if axis in names else axis for axis in [*has][:40])
         raise InputError(f"{spelt('axes')}: which axes? The files have {shown or 'lists without an axis: name one, X'}")
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for text in texts:
         axis, equals, theirs = (part.strip() for part in text.partition("="))
         if not axis or (equals and not theirs):
             raise InputError(f"{spelt('axes')} {text}: AXIS or AXIS=NAME IN THE CONTROL is needed, such as X=X1")
-        if axis in found:
+        if axis in result:
             raise InputError(f"{spelt('axes')} {text}: {axis} is named twice")
-        found[axis] = theirs or axis
-    return found
+        result[axis] = theirs or axis
+    return result
 
 
 def inputs_of(paths: Sequence[Path], machine: Path | None) -> list[Path]:

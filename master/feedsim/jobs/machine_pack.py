@@ -73,7 +73,7 @@ def machine_pack(
     own = None if base is None else Path(base)
     # The archive that the machine file names as its plant, and one that is packed in place, are made anew here.
     made = [path for path in (loaded.plant, own) if path is not None]
-    files = [file for _, file in described.files if not any(same(file, each) for each in made)]
+    files = [file for _, file in described.files if not any(same(file, path) for path in made)]
     read = [Path(machine), loaded.modes, *files]
     with KIND.checked(out, read, force=force) as path:
         announce_archive(watch, own, "the packed plant's trial")

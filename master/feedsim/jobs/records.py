@@ -87,7 +87,7 @@ class Asked:
     @cached_property
     def records(self) -> dict[str, AxisRecord]:
         """Axis -> the stretch of its record that holds the window."""
-        return {axis: windowed(axis, each, self.window) for axis, each in self.read.items()}
+        return {axis: windowed(axis, recorded, self.window) for axis, recorded in self.read.items()}
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[str, ...]:
@@ -96,11 +96,11 @@ def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[st
         if machine is None:
             raise InputError(f"{option}: which axes of the record are meant? For example {option} X,Y")
         return tuple(machine.axes)
-    found = listed(axes)
+    result = listed(axes)
     text = axes if isinstance(axes, str) else ",".join(axes)
-    for axis in found if machine is not None else ():
+    for axis in result if machine is not None else ():
         if machine is not None and axis not in machine.axes:
             raise InputError(f"{option} {text}: {no_axis(axis, machine.axes)}")
-    if not found or len({*found}) < len(found):
+    if not result or len({*result}) < len(result):
         raise InputError(f"{option} {text}: names of axes are needed, each once, such as X,Y")
-    return found
+    return result

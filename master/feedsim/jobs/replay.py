@@ -145,10 +145,10 @@ def replay(
         beside = driven(own, records, asked.read, archives) if open_loop else replayed(own, records, archives)
         comparisons = list(beside.values())
         watch.progress("report", 2, 3)
-        sources = [each.provenance for each in asked.read.values()]
-        found = [finding for each in comparisons for finding in each.findings]
+        sources = [recorded.provenance for recorded in asked.read.values()]
+        results = [finding for comparison in comparisons for finding in comparison.findings]
         settings = {**asked.settings, **({"open_loop": "yes"} if open_loop else {})}
-        findings = dict.fromkeys([*found, *(text for source in sources for text in source.warnings)])
+        findings = dict.fromkeys([*results, *(text for source in sources for text in source.warnings)])
         done = Replayed(
             comparisons, asked.subject, sources, asked.marks, settings, [*findings], _proposals(own, asked.axes)
         )

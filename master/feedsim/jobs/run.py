@@ -63,7 +63,7 @@ class RunResult(JudgedRun, Result):
     @classmethod
     def of(cls, run: JudgedRun, page: str = "", uncertainty: Uncertainty | None = None) -> RunResult:
         """A run, as it is."""
-        judged_run = {each.name: getattr(run, each.name) for each in fields(JudgedRun)}
+        judged_run = {field.name: getattr(run, field.name) for field in fields(JudgedRun)}
         return cls(**judged_run, page=page, uncertainty=uncertainty)
 
     @cached_property
@@ -167,7 +167,7 @@ class RunResult(JudgedRun, Result):
 
     def __repr__(self) -> str:
         figures = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
-        wrong = [each for each in self.findings if severity(each) != "note"]
+        wrong = [finding for finding in self.findings if severity(finding) != "note"]
         warned = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
         return "; ".join(
             [
@@ -185,8 +185,8 @@ class RunResult(JudgedRun, Result):
             f"<td style='text-align:left'>{escape(typeset(figure.meaning))}</td></tr>"
             for name, figure in self._leading().items()
         )
-        said = "".join(f"<li>{escape(typeset(each))}</li>" for each in ranked(self.findings))
-        answer = "".join(f"<p>{escape(typeset(each))}</p>" for each in self.answers)
+        said = "".join(f"<li>{escape(typeset(name))}</li>" for name in ranked(self.findings))
+        answer = "".join(f"<p>{escape(typeset(answer))}</p>" for answer in self.answers)
         plot = self.plot()
         alt = escape(f"{plot.title}. {plot.caption}", quote=True)
         picture = f"<img alt='{alt}' style='max-width:100%' src='data:image/png;base64,{_text(plot.png)}'>"

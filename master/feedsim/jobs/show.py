@@ -48,9 +48,9 @@ class Overlay(Result):
         self.names = tuple(results)
         # The report reads results from where they are written; those of a prompt are written for as long as this lives.
         self._folder = TemporaryFolder()
-        paths = [_at(each, self._folder.path / str(k)) for k, each in enumerate(results.values())]
-        found = zip(self.names, read_sources(paths), strict=True)
-        self._sources = aligned([replace(source, name=name) for name, source in found])
+        paths = [_at(value, self._folder.path / str(k)) for k, value in enumerate(results.values())]
+        result = zip(self.names, read_sources(paths), strict=True)
+        self._sources = aligned([replace(source, name=name) for name, source in result])
 
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
@@ -137,16 +137,20 @@ def show(
     ('66.6666667 1/s', '83.3333333 1/s')
     """
     given: dict[str, Shown] = {}
-    files = list(dict.fromkeys(str(each) for each in results if not isinstance(each, RunResult)))
-    names = dict(zip(files, named_apart([Path(each) for each in files]), strict=True))
-    for each in results:
-        plain = each.scenario.name if isinstance(each, RunResult) else _called(str(each), names[str(each)])
+    files = list(dict.fromkeys(str(result) for result in results if not isinstance(result, RunResult)))
+    names = dict(zip(files, named_apart([Path(file) for file in files]), strict=True))
+    for run_result in results:
+        plain = (
+            run_result.scenario.name
+            if isinstance(run_result, RunResult)
+            else _called(str(run_result), names[str(run_result)])
+        )
         same = sum(re.fullmatch(rf"{re.escape(plain)}( \(\d+\))?", name) is not None for name in given)
-        given[f"{plain} ({same + 1})" if same else plain] = each
-    for name, each in named.items():
+        given[f"{plain} ({same + 1})" if same else plain] = run_result
+    for name, run_result in named.items():
         if name in given:
             raise InputError(f"two results are called {name!r}; give one of them another name")
-        given[name] = each
+        given[name] = run_result
     over = Overlay(given)
     if out is not None:
         with kept(out, page.check_writable, watch, over.inputs, force=force):
@@ -159,15 +163,15 @@ def _called(text: str, name: str) -> str:
     return name if chosen is None else chosen.name
 
 
-def _at(each: Shown, folder: Path) -> Path:
+def _at(entry: Shown, folder: Path) -> Path:
     """Where a result stands; one of the prompt, and a run of a study, is written there."""
-    if not isinstance(each, RunResult):
-        chosen = case(str(each))
+    if not isinstance(entry, RunResult):
+        chosen = case(str(entry))
         if chosen is None:
-            return Path(each)
+            return Path(entry)
         scenario, fmus = scenario_of(chosen)
-        each = RunResult.of(judged(cosim.run(scenario, fmus=fmus)))
-    each.save(folder)
+        entry = RunResult.of(judged(cosim.run(scenario, fmus=fmus)))
+    entry.save(folder)
     return folder
 
 

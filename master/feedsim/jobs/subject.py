@@ -69,5 +69,5 @@ def opened(given: File | Scenario, changes: Changes = None, fmus: File | None = 
         raise InputError(f"{spelt('fmus')} {fmus}: {file} has its own archives; leave the option out")
     from feedsim import ssp  # not for runs of scenario files
 
-    with ssp.opened(file, texts) as found:
-        yield Opened(found.scenario, found.program, found.fmus, texts, found.told, found.named)
+    with ssp.opened(file, texts) as result:
+        yield Opened(result.scenario, result.program, result.fmus, texts, result.told, result.named)

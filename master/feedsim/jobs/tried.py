@@ -42,7 +42,7 @@ def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: W
     run: the first one, which was written to `directory`. Raises as :func:`feedsim.cosim.run`, and OutputError.
     """
     proposals = tuple(of_run(run, run.causes, searched=True))
-    settings = tuple(each.setting for each in proposals if each.setting)
+    settings = tuple(proposal.setting for proposal in proposals if proposal.setting)
     if not settings:
         return Tried(proposals, (), ("nothing to try: no proposal has a value",))
     scenario = run.scenario

@@ -28,7 +28,7 @@ class Validation:
     findings: Sequence[str] = ()
 
     def __repr__(self) -> str:
-        wrong = [each for each in self.findings if severity(each) != "note"]
+        wrong = [finding for finding in self.findings if severity(finding) != "note"]
         warned = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
         return "; ".join([*self.answers, *warned])
 
@@ -60,7 +60,9 @@ def validate(scenario: File | Scenario, *, set: Changes = None, fmus: File | Non
     name = plan.name if isinstance(scenario, Scenario) else scenario
     motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
     apart = (
-        " as far as no other maker's program has a say" if any(": not checked: " in each for each in warnings) else ""
+        " as far as no other maker's program has a say"
+        if any(": not checked: " in warning for warning in warnings)
+        else ""
     )
     return Validation([f"{name}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"], warnings)
 

@@ -42,7 +42,7 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
     A loop is wrong where it is unstable in a state that the motion brings about: axes that do not move rest. Without a
     program every axis moves.
     """
-    found: list[str] = []
+    result: list[str] = []
     for axis, kind in dict.fromkeys((loop.axis, loop.kind) for loop in loops):
         states = [loop for loop in loops if (loop.axis, loop.kind) == (axis, kind)]
         unstable, thin = [loop for loop in states if loop.unstable], [loop for loop in states if loop.thin]
@@ -58,7 +58,7 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
                 f"gain {_decibels(loop.gain_margin):.1f} dB, phase {loop.phase_margin:.0f} deg {STATE[loop.state]}"
                 for loop in thin
             )
-            found.append(f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better} {usual}")
+            result.append(f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better} {usual}")
             continue
         where = "; ".join(map(_where, states))
         text = (
@@ -66,14 +66,14 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
             "instability, whatever coupling.substeps are"
         )
         met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
-        found.append(Wrong(text) if met else text)
+        result.append(Wrong(text) if met else text)
     if unknown := [name for name, axis in machine.axes.items() if isinstance(axis.drive, ForeignUnit)]:
         others = "; the other axes are judged with its motor free" if loops else ""
-        found.append(
+        result.append(
             f"axis {', '.join(unknown)}: whether the loops are stable is not judged, the drive is another maker's"
             + others
         )
-    return found
+    return result
 
 
 def _moves(program: Program | None, axis: str) -> bool:

@@ -58,7 +58,7 @@ def judged(run: Run, *, keep: bool = True) -> JudgedRun:
         *loads.contradicted(run),
         *run.executor_notes,
     )
-    return JudgedRun(**{each.name: getattr(run, each.name) for each in fields(Run)}, pose=pose, warnings=warnings)
+    return JudgedRun(**{field.name: getattr(run, field.name) for field in fields(Run)}, pose=pose, warnings=warnings)
 
 
 def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[str, ...]:

@@ -123,9 +123,9 @@ class LinearDrive:
         """The current setpoint filters in series [1]."""
         d = self.drive
         result = np.ones_like(s)
-        for each in (d.filter_1, d.filter_2, d.filter_3, d.filter_4):
-            if each.type != "off":
-                result = result * _filter(s, each, self.cycles.T_c)
+        for entry in (d.filter_1, d.filter_2, d.filter_3, d.filter_4):
+            if entry.type != "off":
+                result = result * _filter(s, entry, self.cycles.T_c)
         return result
 
     # --- current loop and motor --------------------------------------------------------------------------------------

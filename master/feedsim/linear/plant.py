@@ -216,11 +216,11 @@ def _first_order(pole: Complexes, T: float, hold: Hold) -> Callable[[Complexes],
 
     def h(z: Complexes) -> Complexes:
         # rounded as T (phi_1 - phi_2 + phi_2 z)/(z - exp(x)), with no array in between that is thrown away
-        found = np.asarray(phi_2 * z)
-        found += rest
-        found *= T
-        found /= z - exp_x
-        return found
+        values = np.asarray(phi_2 * z)
+        values += rest
+        values *= T
+        values /= z - exp_x
+        return values
 
     return h
 

@@ -56,14 +56,14 @@ class Kept:
         if len(s) < KEPT_FROM:
             return compute(s)
         key = (of, s.tobytes())
-        found = self._found.pop(key, None)
-        if found is None:
-            found = compute(s)
-            found.flags.writeable = False
-        self._found[key] = found  # the last one used stands last
+        values = self._found.pop(key, None)
+        if values is None:
+            values = compute(s)
+            values.flags.writeable = False
+        self._found[key] = values  # the last one used stands last
         if len(self._found) > self._most:
             del self._found[next(iter(self._found))]
-        return found
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,19 +241,19 @@ class LinearSystem:
         result[:, :mechanical] = ports[:, :, :axes] @ torques
         result[:, :mechanical, 3 * axes :] += ports[:, :, axes:]
         result[:, mechanical : mechanical + axes] = torques
-        each = np.arange(axes)
-        result[:, mechanical + axes + each, each] = 1.0
+        values = np.arange(axes)
+        result[:, mechanical + axes + values, values] = 1.0
         return result
 
     def _torques(self, s: Complexes, ports: Complexes) -> Complexes:
         """(F, A, 3 A + 3): motor torques with every position loop open, to what speed_level() answers to."""
-        axes, each = len(self.axes), np.arange(len(self.axes))
+        axes, values = len(self.axes), np.arange(len(self.axes))
         E, loop = self._loop(s, ports)
         S = np.stack([drive.from_setpoint(s) for drive in self.drives], axis=1)
         given = np.zeros((len(s), axes, 3 * axes + len(TOOL_DIRECTIONS)), dtype=np.complex128)
-        given[:, each, each] = E * S
-        given[:, each, axes + each] = E
-        given[:, each, 2 * axes + each] = ~self._controlled
+        given[:, values, values] = E * S
+        given[:, values, axes + values] = E
+        given[:, values, 2 * axes + values] = ~self._controlled
         given[:, :, 3 * axes :] = -loop[:, :, axes:]
         return np.asarray(np.linalg.solve(np.eye(axes) + loop[:, :, :axes], given))
 
@@ -294,8 +294,8 @@ class LinearSystem:
         axes = len(self.axes)
         if not any(drive.drive.indirect for drive in self.drives):
             return rows[:, axes : 2 * axes]
-        each = [drive.measured_position(s, rows[:, i], rows[:, axes + i]) for i, drive in enumerate(self.drives)]
-        return np.stack(each, axis=1)
+        entry = [drive.measured_position(s, rows[:, i], rows[:, axes + i]) for i, drive in enumerate(self.drives)]
+        return np.stack(entry, axis=1)
 
     def _ramps(self, s: Complexes) -> Complexes:
         """(F, A): the ramps of the axes' setpoints, of which there are two kinds."""
@@ -311,8 +311,8 @@ class LinearSystem:
         axes, T_c = len(self.axes), self.machine.cycles.T_c
         ports = self.plant.ports(s, T_c, "linear")
         if self._ideal.any():
-            held = self.plant.ports(s, T_c, "held")
-            ports[:, :, :axes][:, :, self._ideal] = held[:, :, :axes][:, :, self._ideal]
+            fixed = self.plant.ports(s, T_c, "held")
+            ports[:, :, :axes][:, :, self._ideal] = fixed[:, :, :axes][:, :, self._ideal]
         if tool_force != "linear":
             ports[:, :, axes:] = self.plant.ports(s, T_c, tool_force)[:, :, axes:]
         return ports
@@ -355,8 +355,8 @@ class LinearSystem:
         highest = 0.5 / cycles.T_c
         wrong = f[~((f > 0) & (f <= highest * (1 + ASIDE)))]
         if f.ndim != 1 or wrong.size:
-            found = f"{wrong[0]:.6g} Hz" if f.ndim == 1 else f"an array of shape {f.shape}"
-            raise InputError(f"linear system: frequency {found}; allowed are values above 0 up to {highest:.6g} Hz")
+            text = f"{wrong[0]:.6g} Hz" if f.ndim == 1 else f"an array of shape {f.shape}"
+            raise InputError(f"linear system: frequency {text}; allowed are values above 0 up to {highest:.6g} Hz")
         turns = f * cycles.T_pos
         meets = np.abs(turns - np.round(turns)) < ASIDE * np.round(turns)
         return np.asarray(2j * np.pi * np.where(meets, f * (1 - ASIDE), f))
@@ -364,4 +364,4 @@ class LinearSystem:
 
 def unit_of(output: str, name: str) -> str:
     """Unit of the response of `output` to `name`, such as "(rad/s)/(N.m)"; "1" where both have the same."""
-    return quotient_unit(*(PORT_UNITS[each.partition(".")[2]] for each in (output, name)))
+    return quotient_unit(*(PORT_UNITS[entry.partition(".")[2]] for entry in (output, name)))

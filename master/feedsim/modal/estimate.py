@@ -62,14 +62,14 @@ def estimated(
     length = len(inputs[0])
     if length < 64:
         raise InputError(f"{length} samples; a frequency response needs 64 at least")
-    if not any(np.ptp(each) > 0 for each in inputs):
+    if not any(np.ptp(values) > 0 for values in inputs):
         raise InputError("the input does not vary: nothing is excited")
     if period is not None and not 16 <= period <= length:
         raise InputError(f"a period of {period} samples; allowed: 16 to the {length} samples of the record")
-    found = period if period is not None else period_of(inputs[0])
-    if found is None:
+    count = period if period is not None else period_of(inputs[0])
+    if count is None:
         return _by_segments(inputs, outputs, interval)
-    return _by_periods(inputs, outputs, interval, found)
+    return _by_periods(inputs, outputs, interval, count)
 
 
 def period_of(values: Array) -> int | None:
@@ -125,10 +125,10 @@ def _by_periods(
         cross = np.mean(lines * np.conj(U), axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
             G = cross / power
-            left = np.sum(np.abs(lines - G * U) ** 2, axis=0) / max(count * (count - 1), 1)
+            remaining = np.sum(np.abs(lines - G * U) ** 2, axis=0) / max(count * (count - 1), 1)
             values[name] = G[excited]
             relative[name] = (
-                (np.sqrt(left / 2) / (size * np.abs(G)))[excited] if count > 1 else np.zeros(len(G))[excited]
+                (np.sqrt(remaining / 2) / (size * np.abs(G)))[excited] if count > 1 else np.zeros(len(G))[excited]
             )
     runs = f"{count} periods of {period} samples" if count > 1 else f"one period of {period} samples"
     return Estimated(frequency[excited], values, relative, f"mean and scatter over {runs}")
@@ -143,7 +143,7 @@ def _by_segments(inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]]
 
     def mean(one: Sequence[Array], other: Sequence[Array]) -> tuple[Array, Complexes]:
         both = [signal.csd(a, b, **options) for a, b in zip(one, other, strict=True)]
-        return both[0][0][1:], np.mean([each[1][1:] for each in both], axis=0)
+        return both[0][0][1:], np.mean([entry[1][1:] for entry in both], axis=0)
 
     frequency, power = mean(inputs, inputs)
     segments = max(total // size * 2 - 1, 1)
@@ -159,7 +159,7 @@ def _by_segments(inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]]
     kept[-1] = False  # half the sampling rate has no phase
     return Estimated(
         frequency[kept],
-        {name: each[kept] for name, each in values.items()},
-        {name: each[kept] for name, each in relative.items()},
+        {name: value[kept] for name, value in values.items()},
+        {name: value[kept] for name, value in relative.items()},
         f"cross spectrum over spectrum (Welch), {segments} segments of {size} samples, coherence above {COHERENT:g}",
     )

@@ -64,14 +64,14 @@ def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: i
     """Fit the responses of an axis. modes: how many; None: by cross-validation. InputError: what `fitted` refuses."""
     fit = fitted(measured.frequency, measured.values, measured.relative, modes)
     frequency = measured.frequency
-    left = {}
+    remaining = {}
     for name, values in measured.values.items():
         ratio = fit.response(name, frequency) / values
-        left[name] = (
+        remaining[name] = (
             float(np.quantile(np.abs(20 * np.log10(np.abs(ratio))), HELD)),
             float(np.quantile(np.abs(np.degrees(np.angle(ratio))), HELD)),
         )
-    decibel, degrees = left[MOTOR]
+    decibel, degrees = remaining[MOTOR]
     if decibel > MAX_DEVIATIONS[0] or degrees > MAX_DEVIATIONS[1]:
         raise InputError(
             f"axis {axis}: a rigid body with up to {MOST_MODES} modes and a delay meets 90 % of the lines within "
@@ -89,7 +89,7 @@ def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: i
     warnings, notes = _said(measured, machine_modes, axis, fit)
     return AxisModes(
         axis, measured, fit, responses_of(machine_modes, axis, measured), _table(machine_modes, axis, fit),
-        left, dips, peaks, tuple(warnings), tuple(notes),
+        remaining, dips, peaks, tuple(warnings), tuple(notes),
     )  # fmt: skip
 
 
@@ -101,12 +101,12 @@ def responses_of(modes: Modes, axis: str, measured: Measured) -> dict[str, Compl
     n = modes.ports[f"n_{axis}"]
     at = {MOTOR: n, SCALE: modes.ports[f"x_{axis}"]}
     # A sensor of another place is compared with the motor.
-    found = {name: np.asarray(shape @ (n * at.get(name, n)), dtype=np.complex128) for name in measured.values}
+    result = {name: np.asarray(shape @ (n * at.get(name, n)), dtype=np.complex128) for name in measured.values}
     # Where the scale turns, it is compared as an angle.
     lead = _lead(modes, axis)
-    if SCALE in found and not measured.linear[SCALE]:
-        found[SCALE] = found[SCALE] / lead
-    return found
+    if SCALE in result and not measured.linear[SCALE]:
+        result[SCALE] = result[SCALE] / lead
+    return result
 
 
 def _lead(modes: Modes, axis: str) -> float:

@@ -70,8 +70,8 @@ class Measured:
         kept = (self.frequency >= low) & (self.frequency <= high)
         return Measured(
             self.frequency[kept],
-            {name: each[kept] for name, each in self.values.items()},
-            {name: each[kept] for name, each in self.relative.items()},
+            {name: value[kept] for name, value in self.values.items()},
+            {name: values[kept] for name, values in self.relative.items()},
             self.input_unit, self.linear, self.method, self.notes,
         )  # fmt: skip
 
@@ -106,18 +106,18 @@ def from_signals(
         orders[name], linear[name] = OUTPUTS[own], own.startswith("m")
     h = interval if interval is not None else _interval(recording, time)
     read = recording.read([*input_.names, *(n for channel in outputs.values() for n in channel.names)])
-    found = estimated(
+    result = estimated(
         [read[name] for name in input_.names],
         {name: [read[n] for n in channel.names] for name, channel in outputs.items()},
         h,
         period=period,
     )
-    s = 2j * pi * found.frequency
+    s = 2j * pi * result.frequency
     values: dict[str, Complexes] = {
-        name: np.asarray(each * s ** orders[name] * factors[name] / factor, dtype=np.complex128)
-        for name, each in found.values.items()
+        name: np.asarray(value * s ** orders[name] * factors[name] / factor, dtype=np.complex128)
+        for name, value in result.values.items()
     }
-    return Measured(found.frequency, values, found.relative, unit, linear, found.method, recording.notes)
+    return Measured(result.frequency, values, result.relative, unit, linear, result.method, recording.notes)
 
 
 def from_responses(path: Path, outputs: Mapping[str, Channel], input_unit: str = "") -> Measured:
@@ -158,8 +158,8 @@ def from_responses(path: Path, outputs: Mapping[str, Channel], input_unit: str =
         raise InputError(f"{path}: one response is over a torque, another over a current")
     return Measured(
         np.asarray(response.frequency)[kept],
-        {name: each[kept] for name, each in values.items()},
-        {name: each[kept] for name, each in relative.items()},
+        {name: value[kept] for name, value in values.items()},
+        {name: values[kept] for name, values in relative.items()},
         inputs.pop(), linear, "as in the file, its coherence as scatter",
     )  # fmt: skip
 
@@ -168,9 +168,9 @@ def _factor(
     path: Path, what: str, channel: Channel, allowed: Sequence[str], known: Mapping[str, str]
 ) -> tuple[float, str]:
     unit = channel.unit or known.get(channel.names[0], "")
-    for each in allowed if unit else ():
+    for name in allowed if unit else ():
         try:
-            return float(units.factor(unit, each)), each
+            return float(units.factor(unit, name)), name
         except InputError:
             continue
     unit_words = f"is in {unit}" if unit else "has no unit in the file"

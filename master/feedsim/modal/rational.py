@@ -119,19 +119,19 @@ class _Shape:
         for one, d in zip(w, D, strict=True):
             below = s**2 + 2 * d * one * s + one**2
             shapes += [-(s**2) * (2 * d * one * s + 2 * one**2) / below**2, -(s**2) * 2 * d * one * s / below**2]
-        found = np.zeros((self.outputs, len(s), len(x)), dtype=np.complex128)
+        values = np.zeros((self.outputs, len(s), len(x)), dtype=np.complex128)
         for k in range(self.outputs):
             own = self.of_output(x, k)
             G = basis @ own[1:]
             G = np.where(np.abs(G) > 1e-300, G, 1e-300)
             first = 1 + 2 * self.modes + k * (2 + self.modes)
-            found[k, :, 0] = own[1] * shapes[0] / G
+            values[k, :, 0] = own[1] * shapes[0] / G
             for m in range(self.modes):
-                found[k, :, 1 + 2 * m] = own[2 + m] * shapes[1 + 2 * m] / G
-                found[k, :, 2 + 2 * m] = own[2 + m] * shapes[2 + 2 * m] / G
-            found[k, :, first] = -s
-            found[k, :, first + 1 : first + 2 + self.modes] = basis / G[:, None]
-        return found
+                values[k, :, 1 + 2 * m] = own[2 + m] * shapes[1 + 2 * m] / G
+                values[k, :, 2 + 2 * m] = own[2 + m] * shapes[2 + 2 * m] / G
+            values[k, :, first] = -s
+            values[k, :, first + 1 : first + 2 + self.modes] = basis / G[:, None]
+        return values
 
     def of_output(self, x: Array, k: int) -> Array:
         first = 1 + 2 * self.modes + k * (2 + self.modes)
@@ -140,13 +140,13 @@ class _Shape:
     def without_residues(self, poles: Array, delays: Array, s: Complexes, G: Complexes, weight: Array) -> Array:
         """Parameters with the residues by linear least squares of the relative error."""
         basis = self.basis(poles, s)
-        found = [poles]
+        result = [poles]
         for k in range(self.outputs):
             A = basis * (np.exp(-s * delays[k]) * weight[k] / np.abs(G[k]))[:, None]
             y = G[k] * weight[k] / np.abs(G[k])
             x = np.linalg.lstsq(np.vstack([A.real, A.imag]), np.concatenate([y.real, y.imag]), rcond=None)[0]
-            found += [delays[k : k + 1], x]
-        return np.concatenate(found)
+            result += [delays[k : k + 1], x]
+        return np.concatenate(result)
 
 
 def fitted(
@@ -172,14 +172,14 @@ def fitted(
     chain = _chain(problem, every, MOST_MODES if modes is None else modes)
     predicted: dict[int, float] = {}
     if modes is None:
-        left = np.zeros((len(chain), FOLDS))
+        remaining = np.zeros((len(chain), FOLDS))
         for fold in range(FOLDS):
             out = every[fold::FOLDS]
             seen = np.setdiff1d(every, out)
             for count, begin in enumerate(chain):
                 x = problem.solved(_Shape(len(names), count), begin, seen)
-                left[count, fold] = np.mean(problem.residual(_Shape(len(names), count), x, out) ** 2)
-        predicted = {count: float(np.sqrt(np.mean(row))) for count, row in enumerate(left)}
+                remaining[count, fold] = np.mean(problem.residual(_Shape(len(names), count), x, out) ** 2)
+        predicted = {count: float(np.sqrt(np.mean(row))) for count, row in enumerate(remaining)}
         count = 0
         for more in range(1, len(chain)):
             gained = predicted[more] < (1 - BETTER) ** (more - count) * predicted[count]
@@ -217,11 +217,11 @@ class _Lines:
         for k in range(shape.outputs):
             scale[1 + 2 * shape.modes + k * (2 + shape.modes)] = 1e-3
         inside = np.clip(begin, low + 1e-9, high - 1e-9)
-        found = least_squares(
+        result = least_squares(
             lambda x: self.residual(shape, x, lines), inside, lambda x: self.jacobian(shape, x, lines),
             bounds=(low, high), x_scale=scale, xtol=1e-10, ftol=tolerance, max_nfev=60,
         )  # fmt: skip
-        return np.asarray(found.x)
+        return np.asarray(result.x)
 
     def bounds(self, shape: _Shape) -> tuple[Array, Array]:
         first, last = float(np.abs(self.s[0])), float(np.abs(self.s[-1]))
@@ -240,10 +240,10 @@ def _chain(problem: _Lines, lines: Lines, most: int) -> list[Array]:
     s, G, weight = problem.s[lines], problem.G[:, lines], problem.weight[:, lines]
     shape = _Shape(outputs, 0)
     begin = shape.without_residues(np.array([np.log(0.3 * first)]), np.zeros(outputs), s, G, weight)
-    found = [problem.solved(shape, begin, lines)]
+    result = [problem.solved(shape, begin, lines)]
     grid = np.geomspace(1.1 * first, 0.95 * float(np.abs(problem.s[-1])), TRIAL_FREQUENCIES)
     for count in range(1, most + 1):
-        before, last = shape, found[-1]
+        before, last = shape, result[-1]
         shape = _Shape(outputs, count)
         delays = np.array([before.of_output(last, k)[0] for k in range(outputs)])
         tried = []
@@ -253,11 +253,11 @@ def _chain(problem: _Lines, lines: Lines, most: int) -> list[Array]:
                 x = shape.without_residues(poles, delays, s, G, weight)
                 off = (shape.model(x, s) - G) / np.abs(G) * weight
                 tried.append((float(np.sum(np.abs(off) ** 2)), x))
-        tried.sort(key=lambda each: each[0])
+        tried.sort(key=lambda entry: entry[0])
         ends = [problem.solved(shape, x, lines) for _, x in (tried[0], tried[len(TRIED_DAMPING) * 4])]
         costs = [float(np.sum(problem.residual(shape, x, lines) ** 2)) for x in ends]
-        found.append(ends[int(np.argmin(costs))])
-    return found
+        result.append(ends[int(np.argmin(costs))])
+    return result
 
 
 def _physical(shape: _Shape, x: Array) -> bool:
@@ -291,9 +291,9 @@ def _of(names: tuple[str, ...], problem: _Lines, x: Array, count: int, predicted
     own_sigma = {name: shape.of_output(sigma, c) for c, name in enumerate(names)}
     return Fitted(
         names,
-        {name: float(each[1]) for name, each in own.items()},
-        {name: float(each[1]) for name, each in own_sigma.items()},
-        {name: float(each[0]) for name, each in own.items()},
+        {name: float(values[1]) for name, values in own.items()},
+        {name: float(values[1]) for name, values in own_sigma.items()},
+        {name: float(values[0]) for name, values in own.items()},
         float(np.exp(x[0])),
         tuple(sorted(modes, key=lambda mode: mode.frequency)),
         x,

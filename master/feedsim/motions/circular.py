@@ -145,9 +145,9 @@ class Circle(PlaneMotion):
     def description(self) -> str:
         turns = f"{self.turns} turn{'s'[: self.turns != 1]}"
         way = "counterclockwise, then clockwise" if self.direction == "both" else self.direction
-        each = " each" if self.direction == "both" else ""
+        text = " each" if self.direction == "both" else ""
         plane = f"{self.plane[0]}-{self.plane[1]}"
-        return f"circle in {plane}, {way}, R {self.radius * 1e3:.6g} mm, {turns}{each}, {self.at_feed}"
+        return f"circle in {plane}, {way}, R {self.radius * 1e3:.6g} mm, {turns}{text}, {self.at_feed}"
 
     def path(self, position: Mapping[str, float]) -> CircularPath:
         """Path of the circle; its start lies at its start angle."""
@@ -231,11 +231,11 @@ class CircularPath:
             np.arange(first, min(first + INSTANTS, on_grid), dtype=np.float64) * step
             for first in range(0, on_grid, INSTANTS)
         )
-        found = dict.fromkeys(self.axes, Peaks(math.inf, -math.inf, 0.0, 0.0))
+        result = dict.fromkeys(self.axes, Peaks(math.inf, -math.inf, 0.0, 0.0))
         for t in chain([special], stretches):
             for axis, now in self._peaks_at(profile, t).items():
-                found[axis] = found[axis].with_(now)
-        return found
+                result[axis] = result[axis].with_(now)
+        return result
 
     def _peaks_at(self, profile: Profile, t: Array) -> dict[str, Peaks]:
         """The same at the instants ``t`` [s] alone."""
@@ -243,12 +243,12 @@ class CircularPath:
         phi = self.angle(s)
         tangent = (-self.sense * np.sin(phi), self.sense * np.cos(phi))
         inward = (-np.cos(phi), -np.sin(phi))
-        found = {}
+        peaks = {}
         for axis, x, along, towards in zip(self.axes, self.position(s).values(), tangent, inward, strict=True):
             acceleration = a * along + v**2 / self.radius * towards
             largest = float(np.abs(v * along).max()), float(np.abs(acceleration).max())
-            found[axis] = Peaks(float(x.min()), float(x.max()), *largest)
-        return found
+            peaks[axis] = Peaks(float(x.min()), float(x.max()), *largest)
+        return peaks
 
     def _crossings(self, profile: Profile) -> Array:
         """Instants [s] at which the path crosses a half axis of its circle."""

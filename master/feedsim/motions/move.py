@@ -78,12 +78,12 @@ class Line:
         return {axis: self.origin[axis] + share * s for axis, share in self.direction.items()}
 
     def peaks(self, profile: Profile, step: float) -> dict[str, Peaks]:
-        found = {}
+        result = {}
         for axis, share in self.direction.items():
             ends = (self.origin[axis], self.origin[axis] + share * self.length)
             speed, acceleration = abs(share) * profile.peak_speed, abs(share) * profile.peak_acceleration
-            found[axis] = Peaks(min(ends), max(ends), speed, acceleration)
-        return found
+            result[axis] = Peaks(min(ends), max(ends), speed, acceleration)
+        return result
 
     def geometry(self, profile: Profile, start: float) -> Straight:
         return Straight(self.length, steady(profile, start))

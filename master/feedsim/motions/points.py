@@ -36,11 +36,11 @@ class Joined:
 
     def __getitem__(self, rows: slice) -> Array:
         wanted = range(len(self))[rows]
-        found = []
+        result = []
         i, first = int(np.searchsorted(self._ends, wanted.start, side="right")), wanted.start
         while first < wanted.stop:
             begin, end = int(self._ends[i]) - len(self._pieces[i]), int(self._ends[i])
             last = min(end, wanted.stop)
-            found.append(self._pieces[i][first - begin : last - begin])
+            result.append(self._pieces[i][first - begin : last - begin])
             i, first = i + 1, last
-        return np.concatenate(found) if found else np.zeros(0)
+        return np.concatenate(result) if result else np.zeros(0)

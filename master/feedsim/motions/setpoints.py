@@ -114,8 +114,8 @@ class MeasuredSetpoints(MotionKind):
             covered, v[ahead] = into[axis].at(time[ahead] + into[axis].duration)
             x[ahead] = covered - into[axis].distance
             # A run-out is a run-in backwards in time.
-            left, v[behind] = out[axis].at(out[axis].duration - (time[behind] - length))
-            x[behind] += out[axis].distance - left
+            remaining, v[behind] = out[axis].at(out[axis].duration - (time[behind] - length))
+            x[behind] += out[axis].distance - remaining
             setpoints[axis] = (origin + x, v)
         begin = start.time + before * cycle
         return Course(

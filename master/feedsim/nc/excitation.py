@@ -224,13 +224,13 @@ def _decimations(stages: int) -> list[int]:
     Holden-Day 1967): q is the smallest of its class here. At most MOST_DECIMATIONS.
     """
     length = 2**stages - 1
-    found: list[int] = []
+    indexes: list[int] = []
     for q in range(1, length, 2):
         if math.gcd(q, length) == 1 and q == min((q << i) % length for i in range(stages)):
-            found.append(q)
-            if len(found) == MOST_DECIMATIONS:
+            indexes.append(q)
+            if len(indexes) == MOST_DECIMATIONS:
                 break
-    return found
+    return indexes
 
 
 def _compressed(count: int, lines: Integers, random: np.random.Generator) -> Floats:

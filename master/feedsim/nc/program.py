@@ -42,7 +42,7 @@ class _Stretch:
     first: int
     points: dict[str, list[Points]]
 
-    def sampled(self, axis: str, held: float, ratio: int, T_ipo: float) -> Sampled:
+    def sampled(self, axis: str, fixed: float, ratio: int, T_ipo: float) -> Sampled:
         """An axis on the spline through its points; ``ratio`` position cycles per ``T_ipo`` [s]."""
         # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
         spline = LongSpline(Joined(self.points[axis]))
@@ -53,7 +53,7 @@ class _Stretch:
 
         return at
 
-    def end(self, axis: str, held: float) -> float:
+    def end(self, axis: str, fixed: float) -> float:
         """Where it leaves an axis [m]."""
         return float(self.points[axis][-1][-1:][0])
 
@@ -65,9 +65,9 @@ class _Inset:
     first: int
     setpoints: Mapping[str, tuple[Array, Array]]
 
-    def sampled(self, axis: str, held: float, ratio: int, T_ipo: float) -> Sampled:
+    def sampled(self, axis: str, fixed: float, ratio: int, T_ipo: float) -> Sampled:
         """An axis as recorded, or where it is ``held`` [m]; at rest behind the recording."""
-        x_s, v_s = self.setpoints.get(axis, (np.array([held]), np.zeros(1)))
+        x_s, v_s = self.setpoints.get(axis, (np.array([fixed]), np.zeros(1)))
 
         def at(instants: NDArray[np.int64]) -> tuple[Array, Array]:
             row = np.minimum(instants, len(x_s) - 1)
@@ -75,9 +75,9 @@ class _Inset:
 
         return at
 
-    def end(self, axis: str, held: float) -> float:
+    def end(self, axis: str, fixed: float) -> float:
         """Where it leaves an axis [m]."""
-        return float(self.setpoints[axis][0][-1]) if axis in self.setpoints else held
+        return float(self.setpoints[axis][0][-1]) if axis in self.setpoints else fixed
 
 
 @dataclass
@@ -109,22 +109,22 @@ def plan(scenario: Scenario, *, scratch: Path | None = None) -> Program:
     state = _Plan({axis: float(machine.pose[axis]) for axis in machine.axes})
     state.pieces.append(_stretch(state))
     for index, motion in enumerate(scenario.motions):
-        found: list[str] = []
+        result: list[str] = []
         try:
             if state.lost.isdisjoint(motion.needs):
-                found = _append(state, scenario, index, motion)
+                result = _append(state, scenario, index, motion)
             else:
                 _leave_out(state, motion)
         except InputError as error:
-            found = list(error.problems)
+            result = list(error.problems)
             _leave_out(state, motion)
         cycles = state.instant * _ratio(machine)
         if cycles > MAX_POSITION_CYCLES:
-            found.append(
+            result.append(
                 f"the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its end, which is {cycles:.3g} "
                 f"position cycles; allowed: {MAX_POSITION_CYCLES:.3g}"
             )
-        state.problems += [f"{scenario.at('motions', index)} ({motion.kind}): {problem}" for problem in found]
+        state.problems += [f"{scenario.at('motions', index)} ({motion.kind}): {problem}" for problem in result]
         if cycles > MAX_POSITION_CYCLES:
             break
     if state.problems:
@@ -211,12 +211,12 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
     total = state.instant * ratio + 1
     table = Table(1 + 2 * len(axes), total, scratch)
     starts = [piece.first * ratio for piece in state.pieces]
-    held = dict(machine.pose)
+    fixed = dict(machine.pose)
     for piece, first, last in zip(state.pieces, starts, [*starts[1:], total], strict=True):
         sampled = {}
         for axis in axes:
-            sampled[axis] = piece.sampled(axis, held[axis], ratio, cycles.T_ipo)
-            held[axis] = piece.end(axis, held[axis])
+            sampled[axis] = piece.sampled(axis, fixed[axis], ratio, cycles.T_ipo)
+            fixed[axis] = piece.end(axis, fixed[axis])
         for begin in range(first, last, SPLINE_POINTS * ratio):
             instants = np.arange(begin, min(begin + SPLINE_POINTS * ratio, last))
             block = np.empty((1 + 2 * len(axes), len(instants)))
@@ -239,26 +239,26 @@ def violations(name: str, axis: Axis, start: float, peaks: Peaks) -> list[str]:
 
     Where it stands at ``start`` [m] is not its own fault: the motion before it was blamed for that.
     """
-    found = []
+    result = []
     least, most = axis.travel
     outside = [
         x for x in (peaks.low, peaks.high) if x != start and not least - LIMIT_ROUNDING <= x <= most + LIMIT_ROUNDING
     ]
     if outside:
         reached = " and ".join(f"{x * 1e3:.7g}" for x in dict.fromkeys(outside))
-        found.append(f"axis {name} reaches {reached} mm; allowed travel {least * 1e3:.7g} to {most * 1e3:.7g} mm")
+        result.append(f"axis {name} reaches {reached} mm; allowed travel {least * 1e3:.7g} to {most * 1e3:.7g} mm")
     if peaks.speed > axis.max_speed * (1 + LIMIT_ROUNDING):
-        found.append(
+        result.append(
             f"axis {name} reaches a speed of {peaks.speed * 60:.5g} m/min; "
             f"allowed at most {axis.max_speed * 60:.5g} m/min"
         )
     if peaks.acceleration > axis.max_acceleration * (1 + LIMIT_ROUNDING):
-        found.append(
+        result.append(
             f"axis {name} reaches an acceleration of {peaks.acceleration:.5g} m/s^2; "
             f"allowed at most {axis.max_acceleration:.5g} m/s^2"
         )
     origin = f" ({axis.limits_from})" if axis.limits_from else ""
-    return [f"{each}{origin}" for each in found]
+    return [f"{name}{origin}" for name in result]
 
 
 def recording_violations(name: str, axis: Axis, start: float, x_s: Array, v_s: Array, cycle: float) -> list[str]:

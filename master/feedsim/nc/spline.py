@@ -83,12 +83,12 @@ def _slopes(right: list[float]) -> list[float]:
         pivots.append(pivot)
         reduced.append(value)
     slope = 0.0
-    found = [slope]
+    values = [slope]
     for value, pivot in zip(reduced[:0:-1], pivots[:0:-1], strict=True):
         slope = (value - slope) / pivot
-        found.append(slope)
-    found.append(0.0)
-    return found[::-1]
+        values.append(slope)
+    values.append(0.0)
+    return values[::-1]
 
 
 class LongSpline:

@@ -145,7 +145,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
     """What the page needs to say what it warns of: modes, and what its knobs have nothing to do with."""
     machine, coupling = scenario.machine, scenario.coupling
     modes, here = checked_modes(machine), plant_modes(machine)[0]
-    omega, damping, peak = (each.tolist() for each in locked_modes(machine, modes))
+    omega, damping, peak = (locked_mode.tolist() for locked_mode in locked_modes(machine, modes))
     said = {
         *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
         *reach.sentences(machine, program, resources),
@@ -161,7 +161,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
     return {
         "friction": friction, "reach": reach.described(machine, program, resources), "modes": tables,
         "warnings": [str(warning) for warning in ahead],
-        "locked": [list(each) for each in zip(omega, damping, peak, strict=True) if MOST_K_V * each[2] > SHOWS],
+        "locked": [list(entry) for entry in zip(omega, damping, peak, strict=True) if MOST_K_V * entry[2] > SHOWS],
         "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "substeps": coupling.substeps},
     }  # fmt: skip
 
@@ -201,14 +201,14 @@ def rows(scenario: Scenario, program: Program) -> np.ndarray[Any, np.dtype[np.fl
 
 def segments(program: Program) -> list[dict[str, Any]]:
     """The motions as the page's planner describes them."""
-    found: list[dict[str, Any]] = []
+    result: list[dict[str, Any]] = []
     for segment in program.segments:
         geometry = segment.geometry
         circles: list[Mapping[str, Any]] = []
         if isinstance(geometry, Circular) and segment.kind == "circle":
-            circles = [_circle(each) for each in (geometry, geometry.back) if each is not None]
+            circles = [_circle(circular) for circular in (geometry, geometry.back) if circular is not None]
         steady = geometry.steady if isinstance(geometry, Straight) else None
-        found.append(
+        result.append(
             {
                 "kind": segment.kind,
                 "index": segment.index,
@@ -221,7 +221,7 @@ def segments(program: Program) -> list[dict[str, Any]]:
                 "circles": circles,
             }
         )
-    return found
+    return result
 
 
 def _circle(circle: Circular) -> dict[str, Any]:

@@ -66,15 +66,15 @@ def page(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
 
 def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
     """The text of the page; arguments and errors as for :func:`page`."""
-    held = content(run.scenario, run.program, wanted, fmus)
+    fixed = content(run.scenario, run.program, wanted, fmus)
     scenario, machine = run.scenario, run.scenario.machine
     shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
     moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
     figures = evaluate(run)
     planes = [list(task.turn.axes) for task in shown_tasks if isinstance(task, CircleTask)]
-    data = held.data | {
+    data = fixed.data | {
         "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
-        "signs": held.data["machine"]["signs"], "written": _written(figures),
+        "signs": fixed.data["machine"]["signs"], "written": _written(figures),
     }  # fmt: skip
     # The axis whose loop is shown at first stands last: that of the circle's ordinate, or the one that moves.
     order = [axis for axis in machine.axes if axis not in moved] + moved
@@ -82,15 +82,15 @@ def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
     parts = {
         "policy": _policy(script), "title": escape(scenario.name), "style": styles(),
         "machine": escape(f"{machine.name}: axes {', '.join(machine.axes)}; {cycle}"),
-        "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, held)),
-        "knobs": "\n".join(_groups(held.data["knobs"])), "pictures": "\n".join(_pictures(run, shown_tasks)),
+        "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, fixed)),
+        "knobs": "\n".join(_groups(fixed.data["knobs"])), "pictures": "\n".join(_pictures(run, shown_tasks)),
         "axes": "".join(f"<option{' selected' * (axis == order[-1])}>{escape(axis)}</option>" for axis in order),
         "keys": "".join(_keys(shown_tasks, figures)),
-        "figures": _table(figures), "footer": _footer(held), "worker": packed(worker().encode()), "script": script,
+        "figures": _table(figures), "footer": _footer(fixed), "worker": packed(worker().encode()), "script": script,
         "charts": _json({"charts": {}, "arrays": [], "palette": {n: c for n, c, _ in PALETTE} | {"ground": "#ffffff"}}),
         "data": _json(data | {"axes": order}),
     }  # fmt: skip
-    return re.sub(r"\{(\w+)\}", lambda found: parts[found[1]], text("page.html"))
+    return re.sub(r"\{(\w+)\}", lambda match: parts[match[1]], text("page.html"))
 
 
 def _policy(script: str) -> str:
@@ -108,17 +108,17 @@ def _json(data: Mapping[str, Any]) -> str:
     return written.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _notes(run: JudgedRun, held: Content) -> Iterable[str]:
+def _notes(run: JudgedRun, fixed: Content) -> Iterable[str]:
     yield from filter(None, [run.scenario.machine.note, run.scenario.note])
-    if held.left_out:
-        yield "Not in this page: " + "; ".join(held.left_out) + "."
+    if fixed.left_out:
+        yield "Not in this page: " + "; ".join(fixed.left_out) + "."
     if run.warnings:
         yield "As written, a run warns: " + "; ".join(run.warnings) + "."
 
 
 def _groups(knobs: Sequence[Mapping[str, Any]]) -> Iterable[str]:
     numbered = list(enumerate(knobs))
-    for group, members in groupby(numbered, key=lambda each: each[1]["group"]):
+    for group, members in groupby(numbered, key=lambda entry: entry[1]["group"]):
         rows = "\n".join(_row(k, knob) for k, knob in members)
         yield f"<fieldset><legend>{escape(group)}</legend>\n{rows}\n</fieldset>"
 
@@ -217,7 +217,9 @@ def _keys(shown_tasks: Sequence[CircleTask | PositioningTask], figures: Mapping[
 
 def _written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str]]:
     """Figures of the scenario as written, for the page's comparisons."""
-    return {name: (each.value if math.isfinite(each.value) else None, each.unit) for name, each in figures.items()}
+    return {
+        name: (figure.value if math.isfinite(figure.value) else None, figure.unit) for name, figure in figures.items()
+    }
 
 
 def _table(figures: Mapping[str, Figure]) -> str:
@@ -235,8 +237,8 @@ def _aside(name: str) -> str:
     return ' class="more"' if more else ""
 
 
-def _footer(held: Content) -> str:
+def _footer(fixed: Content) -> str:
     return (
-        f"feedsim; the unit machine {escape(str(held.data['guid']))}, WebAssembly module SHA-256 "
-        f"<code>{held.sha256}</code>. It computes here, and nothing leaves this page."
+        f"feedsim; the unit machine {escape(str(fixed.data['guid']))}, WebAssembly module SHA-256 "
+        f"<code>{fixed.sha256}</code>. It computes here, and nothing leaves this page."
     )

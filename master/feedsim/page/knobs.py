@@ -123,11 +123,11 @@ def _is_on(knob: Knob) -> bool:
 
 
 def _of_axes(machine: Machine) -> list[Knob]:
-    found = []
+    knobs = []
     for axis, described in machine.axes.items():
         group = f"axis {axis}"
         given = controller_parameters(machine, axis)
-        drive: dict[str, Any] = {**given, **{name: each for name, each in _effects().items() if name not in given}}
+        drive: dict[str, Any] = {**given, **{name: effect for name, effect in _effects().items() if name not in given}}
         friction = machine.shipped_friction(axis, "machine.fmu").parameters()
         structure = _at_slide(described)
         for part, values, unit in (("drive", drive, "controller"), ("friction", friction, "friction"),
@@ -138,26 +138,26 @@ def _of_axes(machine: Machine) -> list[Knob]:
                 key, own = f"machine.axes.{axis}.{whole}", ((f"{axis}.{whole}", 1.0),)
                 sets = _friction_sets(described, axis, name) if part == "friction" else own
                 if name in SWITCHES:
-                    found.append(Knob(key, group, name, table[name].short, SWITCHED[bool(value)], sets=sets,
+                    knobs.append(Knob(key, group, name, table[name].short, SWITCHED[bool(value)], sets=sets,
                                       choices=SWITCHED, without=SWITCHED[0]))  # fmt: skip
                 elif name in table and table[name].kind == "REAL" and name not in FIXED:
-                    found.append(_number(key, group, name, float(value), table[name], sets))
+                    knobs.append(_number(key, group, name, float(value), table[name], sets))
         if machine.shipped_drive(axis, "machine.fmu").indirect:
             key, reach = f"machine.axes.{axis}.play", REACH * (described.play or TRIED["m", "um"])
-            found.append(Knob(key, group, "play", "play between motor and slide", described.play, "m", "um", 1e6, 0.0,
+            knobs.append(Knob(key, group, "play", "play between motor and slide", described.play, "m", "um", 1e6, 0.0,
                               reach, 0.0, 1.0, ((f"{axis}.play", 1.0),)))  # fmt: skip
-    return found
+    return knobs
 
 
 def _at_slide(axis: Axis) -> dict[str, Any]:
     """Hysteresis and friction of its own at the guide; the latter not where it is a share of the axis's friction."""
     table = variables.parameters("plant/axis")
-    found = {name: row.start for name, row in table.items() if name.partition(".")[0] in ("hysteresis", "guide")}
+    result = {name: row.start for name, row in table.items() if name.partition(".")[0] in ("hysteresis", "guide")}
     wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
-    found |= {f"hysteresis.{name}": value for name, value in wound.items()}
+    result |= {f"hysteresis.{name}": value for name, value in wound.items()}
     if axis.guide is not None and axis.guide.share is not None:
-        return {name: value for name, value in found.items() if not name.startswith("guide.")}
-    return found | {f"guide.{name}": value for name, value in axis.friction_at_guide.items()}
+        return {name: value for name, value in result.items() if not name.startswith("guide.")}
+    return result | {f"guide.{name}": value for name, value in axis.friction_at_guide.items()}
 
 
 def _friction_sets(described: Axis, axis: str, name: str) -> tuple[tuple[str, float], ...]:
@@ -168,8 +168,8 @@ def _friction_sets(described: Axis, axis: str, name: str) -> tuple[tuple[str, fl
     shared = described.guide is not None and described.guide.share
     if not shared or value == 0:
         return ((f"{axis}.friction.{name}", 1.0),)
-    found = [(f"{axis}.friction.{name}", float(at_motor[name]) / value)]
-    return (*found, (f"{axis}.guide.{name}", float(at_guide[name]) / value)) if name in at_guide else tuple(found)
+    result = [(f"{axis}.friction.{name}", float(at_motor[name]) / value)]
+    return (*result, (f"{axis}.guide.{name}", float(at_guide[name]) / value)) if name in at_guide else tuple(result)
 
 
 def _effects() -> dict[str, Any]:
@@ -207,23 +207,23 @@ def _ends(value: float, table: Variable) -> tuple[float, float]:
 
 
 def _of_motions(scenario: Scenario) -> list[Knob]:
-    found = []
+    knobs = []
     for i, motion in enumerate(scenario.motions):
         group = f"motion {i}: {motion.kind}"
         if isinstance(motion, Move | Circle):
-            found.append(
+            knobs.append(
                 _length(i, group, ("feed",), "feed", "programmed speed along the path", motion.feed, "m/s", "mm/min")
             )
         if isinstance(motion, Circle):
-            found.append(_length(i, group, ("radius",), "radius", "radius", motion.radius, "m", "mm"))
-            found.append(
+            knobs.append(_length(i, group, ("radius",), "radius", "radius", motion.radius, "m", "mm"))
+            knobs.append(
                 Knob(f"motions.{i}.direction", group, "direction", "sense of the turns", motion.direction,
                      motion=(i, "direction"), choices=("counterclockwise", "clockwise", "both"))
             )  # fmt: skip
         if isinstance(motion, Move):
             for axis, by in motion.by.items():
-                found.append(_length(i, group, ("by", axis), f"by {axis}", f"distance of {axis}", by, "m", "mm"))
-    return found
+                knobs.append(_length(i, group, ("by", axis), f"by {axis}", f"distance of {axis}", by, "m", "mm"))
+    return knobs
 
 
 def _length(

@@ -46,8 +46,8 @@ def _section(content: bytes) -> dict[str, str]:
         if kind == 0:
             length, begin = _length(content, at)
             if content[begin : begin + length] == SECTION:
-                found: dict[str, str] = json.loads(content[begin + length : at + size])
-                return found
+                result: dict[str, str] = json.loads(content[begin + length : at + size])
+                return result
         at += size
     return {}
 

@@ -28,13 +28,13 @@ NEGLIGIBLE_CHANGE = 0.5
 
 def reached(machine: Machine, program: Program) -> dict[str, tuple[float, float]]:
     """Positions between which an axis may move while sliders turn [m]: the program's, farther by a slider's reach."""
-    found = {}
+    result = {}
     for axis in program.x_s:
         low, high = program.reached(axis)
         pose, travel = machine.pose[axis], machine.axes[axis].travel
         ends = pose - REACH * max(pose - low, 0.0), pose + REACH * max(high - pose, 0.0)
-        found[axis] = max(ends[0], travel[0]), min(ends[1], travel[1])
-    return found
+        result[axis] = max(ends[0], travel[0]), min(ends[1], travel[1])
+    return result
 
 
 def described(machine: Machine, program: Program, resources: Path) -> dict[str, Any]:
@@ -51,8 +51,8 @@ def sentences(machine: Machine, program: Program, resources: Path) -> list[str]:
     """What a run says of the positions that the program reaches: the page says it in place of it."""
     grid = {axis.axis: axis for axis in _grid(machine, resources)}
     ranges = {axis: program.reached(axis) for axis in program.x_s}
-    left = [each for axis in grid if axis in ranges for each in left_grid(grid[axis], ranges[axis], machine)]
-    return [*left, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
+    remaining = [name for axis in grid if axis in ranges for name in left_grid(grid[axis], ranges[axis], machine)]
+    return [*remaining, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
 
 
 def _grid(machine: Machine, resources: Path) -> tuple[GridAxis, ...]:

@@ -87,7 +87,7 @@ def read_axes(
 ) -> dict[str, Recorded]:
     """The record of each axis. InputError: as read_records; no position setpoint, or no position."""
     recording = file if isinstance(file, Recording) else read_recording(file)
-    found: dict[str, Recorded] = {}
+    result: dict[str, Recorded] = {}
     for axis in axes:
         read = read_records(recording, mapping, axis, machine, driven=False)
         missing = [
@@ -101,8 +101,8 @@ def read_axes(
                 f"{recording.path}, axis {axis}: no {' and no '.join(missing)} is read ({columns}); a replay needs "
                 "both; name them in a mapping file: setpoint: {column: ..., unit: mm}"
             )
-        found[axis] = read
-    return found
+        result[axis] = read
+    return result
 
 
 def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> AxisRecord:
@@ -124,12 +124,12 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
         begin, end = window
         slack = 0.5 * read.records[0].interval
         holding = [
-            each
-            for each in read.records
-            if each.time[0] <= begin + slack and each.time[-1] >= (begin if isinf(end) else end) - slack
+            record
+            for record in read.records
+            if record.time[0] <= begin + slack and record.time[-1] >= (begin if isinf(end) else end) - slack
         ]
         if not holding:
-            stretches = ", ".join(f"{each.time[0]:.6g} to {each.time[-1]:.6g} s" for each in read.records)
+            stretches = ", ".join(f"{record.time[0]:.6g} to {record.time[-1]:.6g} s" for record in read.records)
             raise InputError(
                 f"{read.provenance.file}: no stretch without a gap holds the window {begin:.6g} to {end:.6g} s; there "
                 f"is {stretches}"
@@ -157,7 +157,7 @@ def _begins_in_motion(record: Record) -> bool:
 
 def same_time(records: Mapping[str, AxisRecord]) -> bool:
     """Whether records of several axes have rows at the same instants."""
-    first, *others = (each.record.time for each in records.values())
+    first, *others = (axis_record.record.time for axis_record in records.values())
     return all(np.array_equal(first, time) for time in others)
 
 
@@ -186,7 +186,8 @@ class Replay(Closing):
         self.time, self.interval = one.time, one.interval
         if not same_time(records):
             stretches = ", ".join(
-                f"{axis} {each.record.time[0]:.6g} to {each.record.time[-1]:.6g} s" for axis, each in records.items()
+                f"{axis} {axis_record.record.time[0]:.6g} to {axis_record.record.time[-1]:.6g} s"
+                for axis, axis_record in records.items()
             )
             raise InputError(
                 f"{one.name}: the stretches without a gap differ from axis to axis: {stretches}; give a window that is "
@@ -200,30 +201,32 @@ class Replay(Closing):
             )
         self.pose = dict(machine.pose)
         self._into = {}
-        for axis, each in records.items():
-            speed = float(self._spline(each)(0.0, 1)) if _begins_in_motion(each.record) else 0.0
+        for axis, value in records.items():
+            speed = float(self._spline(value)(0.0, 1)) if _begins_in_motion(value.record) else 0.0
             limits = machine.axes[axis].max_acceleration, machine.path.jerk
             self._into[axis] = speed_change(speed, *limits)
-            self.pose[axis] = float(each.setpoint[0]) - self._into[axis].distance
+            self.pose[axis] = float(value.setpoint[0]) - self._into[axis].distance
         run_in = max(change.duration for change in self._into.values())
         self.lead = self.interval * np.ceil((SETTLING_TIME + run_in) / self.interval)
         self._programs: dict[float, Program] = {}
-        self._loads = [self._load(each) for each in records.values() if each.record.load is not None]
+        self._loads = [
+            self._load(axis_record) for axis_record in records.values() if axis_record.record.load is not None
+        ]
 
     @staticmethod
-    def _spline(each: AxisRecord) -> CubicSpline:
-        return CubicSpline(each.record.time - each.record.time[0], each.setpoint)
+    def _spline(axis_record: AxisRecord) -> CubicSpline:
+        return CubicSpline(axis_record.record.time - axis_record.record.time[0], axis_record.setpoint)
 
-    def _load(self, each: AxisRecord) -> Acting:
+    def _load(self, axis_record: AxisRecord) -> Acting:
         """The known load of a record over the time of the run; ahead of the record it is that of the first row."""
-        record = each.record
+        record = axis_record.record
         assert record.load is not None
         time = np.concatenate([[0.0], self.time - self.time[0] + self.lead])
         torque = np.concatenate([record.load[:1], record.load])
         place = f"load of {record.name}"
         if record.load_on_slide:  # a force counts in the direction of the axis there
-            return Acting(place, SlideLoad.model_construct(axis=each.axis), time, -torque / each.I_P)
-        return Acting(place, MotorLoad.model_construct(axis=each.axis), time, torque)
+            return Acting(place, SlideLoad.model_construct(axis=axis_record.axis), time, -torque / axis_record.I_P)
+        return Acting(place, MotorLoad.model_construct(axis=axis_record.axis), time, torque)
 
     def program(self, machine: Machine) -> Program:
         """The setpoints at the position cycle of a machine."""
@@ -238,14 +241,14 @@ class Replay(Closing):
         time = T_pos * np.arange(count + 1, dtype=np.float64)
         x_s = {axis: np.full(len(time), position) for axis, position in machine.pose.items()}
         n_ffw = {axis: np.zeros(len(time)) for axis in machine.axes}
-        for axis, each in self.records.items():
-            spline, into = self._spline(each), self._into[axis]
+        for axis, axis_record in self.records.items():
+            spline, into = self._spline(axis_record), self._into[axis]
             own = time - self.lead
             within = np.clip(own, 0.0, length)
             x, v = spline(within), spline(within, 1)
             ahead, behind = own < 0, own > length
             covered, v[ahead] = into.at(own[ahead] + into.duration)
-            x[ahead] = covered - into.distance + float(each.setpoint[0])
+            x[ahead] = covered - into.distance + float(axis_record.setpoint[0])
             # Nothing is compared behind the last row: the axis goes on as it was.
             x[behind] += v[behind] * (own[behind] - length)
             x_s[axis], n_ffw[axis] = x, v / machine.axes[axis].I_P
@@ -278,4 +281,4 @@ class Replay(Closing):
 def per_row_of(interval: float, machine: Machine) -> int:
     """Samples of a simulation per row of a record that a delay between the rows can be separated from: up to four."""
     cycles = round(interval / machine.cycles.T_c)
-    return max(each for each in (1, 2, 4) if cycles % each == 0)
+    return max(entry for entry in (1, 2, 4) if cycles % entry == 0)

@@ -78,78 +78,78 @@ class Comparison:
     @property
     def findings(self) -> list[str]:
         """Why the replay may say nothing of the record, and what is left that is not the axis' own."""
-        found: list[str] = []
+        result: list[str] = []
         torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
         recorded = float(np.max(np.abs(torque), initial=0.0))
         if self.limited and not NEAR_TORQUE_LIMIT * self.limit < recorded < self.limit / NEAR_TORQUE_LIMIT:
-            found.append(Wrong(
+            result.append(Wrong(
                 f"axis {self.axis}: the simulated drive is at its torque limit, M_max = {self.limit:.4g} N.m, in "
                 f"{100 * self.limited:.2g} % of the rows, and that of the record is not; give the limit that the "
                 f"drive has (axes.{self.axis}.drive.M_max)"
             ))  # fmt: skip
         off = rms(self.channels["position"].error[self.each.moving])
         if off > self.lag and not self.open_loop:
-            found.append(Wrong(
+            result.append(Wrong(
                 f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) than the recorded "
                 f"one is behind its setpoint ({1e6 * self.lag:.4g} um): this is not the machine of the record"
             ))  # fmt: skip
         if self.outside:
-            found.append(Note(in_words(self.axis, self.outside)))
-        return found
+            result.append(Note(in_words(self.axis, self.outside)))
+        return result
 
     @property
     def figures(self) -> dict[str, Figure]:
         """Figures over the rows in which the axis moves (in open loop over all), by name."""
         rows = self.each.rows if self.open_loop else self.each.moving
-        found: dict[str, Figure] = {}
+        result: dict[str, Figure] = {}
         for name, channel in self.channels.items():
             scale, unit = {"m": (1e6, "um"), "rad/s": (TO_RPM, "rpm")}.get(channel.unit, (1.0, channel.unit))
             error = scale * channel.error[rows]
             key = name.replace(" ", "_")
-            told = f"{channel.meaning}: simulated less recorded{'' if self.open_loop else ', while the axis moves'}"
-            found[f"{self.axis}.{key}_rms"] = Figure(rms(error), unit, f"{told}, root mean square")
-            found[f"{self.axis}.{key}_largest"] = Figure(
-                float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{told}, largest magnitude"
+            reported = f"{channel.meaning}: simulated less recorded{'' if self.open_loop else ', while the axis moves'}"
+            result[f"{self.axis}.{key}_rms"] = Figure(rms(error), unit, f"{reported}, root mean square")
+            result[f"{self.axis}.{key}_largest"] = Figure(
+                float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{reported}, largest magnitude"
             )
         still = self.each.rows & ~self.each.moving
         if "torque" in self.channels and np.count_nonzero(still) >= LEAST_STILL:
-            found[f"{self.axis}.torque_standstill_rms"] = Figure(
+            result[f"{self.axis}.torque_standstill_rms"] = Figure(
                 rms(self.channels["torque"].error[still]), "N.m",
                 "motor torque: simulated less recorded, while the axis stands still, root mean square",
             )  # fmt: skip
         position = self.channels["position"].error[rows]
         if self.open_loop:
-            return found
-        found[f"{self.axis}.lag"] = Figure(
+            return result
+        result[f"{self.axis}.lag"] = Figure(
             1e3 * self.lag, "mm", "distance of the position behind the setpoint in the record, root mean square"
         )
-        found[f"{self.axis}.share_of_lag"] = Figure(
+        result[f"{self.axis}.share_of_lag"] = Figure(
             100 * rms(position) / self.lag if self.lag else nan, "%", "position error as a share of that distance"
         )
         if self.delay is not None:
-            found[f"{self.axis}.torque_delay"] = Figure(
+            result[f"{self.axis}.torque_delay"] = Figure(
                 1e3 * self.delay,
                 "ms",
                 "by how much the record has its torque later than the simulation, which is taken out",
             )
         if self.taps is not None:
-            found[f"{self.axis}.setpoint_delay"] = Figure(
+            result[f"{self.axis}.setpoint_delay"] = Figure(
                 1e3 * self.taps.delay, "ms", "delay of the position setpoint in the control, by regression"
             )
-            found[f"{self.axis}.deviation_left"] = Figure(
+            result[f"{self.axis}.deviation_left"] = Figure(
                 1e9 * self.each.I_P * self.taps.rms, "nm",
                 "contour deviation of the record that setpoint and position do not explain by that delay, "
                 "root mean square",
             )  # fmt: skip
         if self.speed is not None:
-            found[f"{self.axis}.K_v"] = Figure(
+            result[f"{self.axis}.K_v"] = Figure(
                 0.06 * self.speed.K_v, "(m/min)/mm", "position controller gain of the control, by regression"
             )
-            found[f"{self.axis}.speed_setpoint_left"] = Figure(
+            result[f"{self.axis}.speed_setpoint_left"] = Figure(
                 1e3 * self.each.I_P * self.speed.rms, "mm/s",
                 "speed setpoint of the record that setpoint, position and feedforward do not explain, root mean square",
             )  # fmt: skip
-        return found
+        return result
 
     def spectrum(self, name: str) -> tuple[Array, Array]:
         """Frequency [Hz] and amplitude spectrum of what is left of a channel over the window, Hann window."""
@@ -179,18 +179,23 @@ def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | N
     best is taken out, and reported.
     """
     per_row = per_row_of(next(iter(records.values())).record.interval, machine)
-    limits = {axis: each.drive.M_max for axis, each in machine.axes.items() if isinstance(each.drive, Drive)}
+    limits = {axis: value.drive.M_max for axis, value in machine.axes.items() if isinstance(value.drive, Drive)}
     # A drive of another maker need not say when it is at its limit.
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
     with Replay(machine, records, fmus=fmus) as replay:
-        found = replay.follow(machine, signals, per_row)
-    return {axis: compared(each, found[axis], per_row, limits.get(axis, inf)) for axis, each in records.items()}
+        result = replay.follow(machine, signals, per_row)
+    return {
+        axis: compared(axis_record, result[axis], per_row, limits.get(axis, inf))
+        for axis, axis_record in records.items()
+    }
 
 
-def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1, limit: float = inf) -> Comparison:
+def compared(
+    axis_record: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1, limit: float = inf
+) -> Comparison:
     """An axis beside its record. simulated: x_a [m], M_a [N.m] and where it is known torque_limited [1], `per_row`
     samples from row to row; limit: of the drive's torque [N.m]."""
-    record = each.record
+    record = axis_record.record
     assert record.setpoint is not None
     taps = speed = None
     with suppress(InputError):  # the record has no deviation, or nothing moves
@@ -198,35 +203,35 @@ def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1,
     with suppress(InputError):
         speed = speed_setpoint([record])
     x_a = simulated["x_a"][::per_row]
-    channels = {"position": Channel(each.position, x_a, "m", "position")}
+    channels = {"position": Channel(axis_record.position, x_a, "m", "position")}
     delay = None
     if record.driven:
-        delay, torque = _delayed(each, simulated["M_a"], per_row)
+        delay, torque = _delayed(axis_record, simulated["M_a"], per_row)
         channels["torque"] = Channel(record.torque, torque, "N.m", "motor torque")
     if speed is not None and record.speed_setpoint is not None:
-        asked = speed.of(record.setpoint, x_a / each.I_P, record.feedforward)
+        asked = speed.of(record.setpoint, x_a / axis_record.I_P, record.feedforward)
         asked[: speed.taps.reach] = record.speed_setpoint[: speed.taps.reach]  # there is no past to form it from
         channels["speed setpoint"] = Channel(record.speed_setpoint, asked, "rad/s", "speed setpoint of the control")
-    lag = rms((each.setpoint - each.position)[each.moving])
+    lag = rms((axis_record.setpoint - axis_record.position)[axis_record.moving])
     limited = simulated.get("torque_limited", np.zeros_like(simulated["x_a"]))
-    limited = limited[np.repeat(each.rows, per_row)[per_row - 1 :]]
+    limited = limited[np.repeat(axis_record.rows, per_row)[per_row - 1 :]]
     return Comparison(
-        each.axis, each, channels, taps, speed, lag, delay, limit, float(np.mean(limited)),
-        outside=without_outside(each)[1],
+        axis_record.axis, axis_record, channels, taps, speed, lag, delay, limit, float(np.mean(limited)),
+        outside=without_outside(axis_record)[1],
     )  # fmt: skip
 
 
-def _delayed(each: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:
+def _delayed(axis_record: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:
     """The delay [s] with which the simulated torque agrees best with the recorded one, and that torque at the rows."""
-    time, h = each.record.time, each.record.interval
+    time, h = axis_record.record.time, axis_record.record.interval
     fine = time[0] + h / per_row * np.arange(len(torque))
-    rows = each.moving if np.any(each.moving) else each.rows
+    rows = axis_record.moving if np.any(axis_record.moving) else axis_record.rows
 
     def at(delay: float) -> Array:
         return np.asarray(np.interp(time - delay, fine, torque), dtype=np.float64)
 
     def left(delay: float) -> float:
-        return rms((at(delay) - each.record.torque)[rows])
+        return rms((at(delay) - axis_record.record.torque)[rows])
 
     best = minimize_scalar(left, bounds=(-LATEST, LATEST), method="bounded", options={"xatol": 1e-6}).x
     # A delay that hardly helps is none.

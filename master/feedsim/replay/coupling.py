@@ -51,12 +51,12 @@ def coupled(
     """
     table = checked_modes(machine)
     modes = {axis: np.flatnonzero(~table.rigid & (table.ports[f"n_{axis}"] != 0)) for axis in records}
-    found: dict[tuple[int, str], Beside] = {}
+    result: dict[tuple[int, str], Beside] = {}
     plain = None
     with Replay(machine, records, fmus=fmus) as replay:
         for mover, own in modes.items():
-            for still, each in records.items():
-                stretches = _at_rest(each, records[mover]) if still != mover and len(own) else []
+            for still, axis_record in records.items():
+                stretches = _at_rest(axis_record, records[mover]) if still != mover and len(own) else []
                 if sum(map(len, stretches)) < FEWEST_ROWS:
                     continue
                 if plain is None:
@@ -65,21 +65,21 @@ def coupled(
                 for k in own:
                     tried = replay.follow(_with_trial(machine, int(k), mover, still), ("x_a",))[still]["x_a"]
                     columns.append((tried - plain[still]["x_a"]) / TRIAL)
-                left = each.position - plain[still]["x_a"]
+                remaining = axis_record.position - plain[still]["x_a"]
                 D, e = (
                     np.concatenate([detrended(signal, rows) for rows in stretches])
-                    for signal in (np.column_stack(columns), left)
+                    for signal in (np.column_stack(columns), remaining)
                 )
                 for k, shape in zip(own, _shapes(D, e), strict=True):
                     if shape is not None:
-                        found[int(k), still] = Beside(still, *shape)
-    return found
+                        result[int(k), still] = Beside(still, *shape)
+    return result
 
 
-def _at_rest(each: AxisRecord, mover: AxisRecord) -> list[Rows]:
+def _at_rest(axis_record: AxisRecord, mover: AxisRecord) -> list[Rows]:
     """Stretches of rows in which an axis stands still and has died away, while another one moves or swings."""
-    h = each.record.interval
-    own, other = (replace(one, rows=np.ones_like(one.rows)).moving for one in (each, mover))
+    h = axis_record.record.interval
+    own, other = (replace(one, rows=np.ones_like(one.rows)).moving for one in (axis_record, mover))
     count = len(own)
     own = np.convolve(own, np.ones(round(DIES_AWAY / h) + 1))[:count] > 0.5
     other = np.convolve(other, np.ones(round(RINGS / h) + 1))[:count] > 0.5
@@ -114,8 +114,8 @@ def _shapes(D: Array, e: Array) -> list[tuple[float, float] | None]:
         if not rms(e[other] - D[other] @ b) ** 2 < PREDICTED * rms(e[other]) ** 2:
             return nothing
     b = np.linalg.lstsq(D, e, rcond=1e-9)[0]
-    left = e - D @ b
-    covariance = Covariance.of(D.T @ D).by(stretched(D, left, 0.0, correlation_length))
+    remaining = e - D @ b
+    covariance = Covariance.of(D.T @ D).by(stretched(D, remaining, 0.0, correlation_length))
     sigma = np.sqrt(np.diag(covariance))
     return [
         (float(value), float(own)) if shows(float(value), half_width(float(own))) else None

@@ -74,24 +74,24 @@ class Resonance:
     gain: float
 
 
-def resonance(each: AxisRecord, simulated: Array, per_row: int, K_v: float) -> Resonance | None:
+def resonance(axis_record: AxisRecord, simulated: Array, per_row: int, K_v: float) -> Resonance | None:
     """The resonance that takes most of what a simulation leaves; None where the rows are too far apart for any.
 
     Args:
         simulated: ((N - 1) per_row + 1,) position [m]. K_v: of the position loop [1/s].
     """
-    h = each.record.interval
-    left = each.position - simulated[::per_row]
+    h = axis_record.record.interval
+    remaining = axis_record.position - simulated[::per_row]
     behind = np.ones(round(RINGS / h) + 1)
-    rows = np.flatnonzero(each.rows & (np.convolve(each.moving, behind)[: len(left)] > 0.5))
+    rows = np.flatnonzero(axis_record.rows & (np.convolve(axis_record.moving, behind)[: len(remaining)] > 0.5))
     acceleration = np.gradient(np.gradient(simulated, h / per_row), h / per_row)
     low, high = ABOVE_LOOP * K_v / (2 * pi), BELOW_RATE / h
     best: tuple[float, Resonance] | None = None
     for f in np.geomspace(low, high, RESONANCE_FREQUENCIES) if low < high else ():
         for D in DAMPING:
             A = _filtered(float(f), D, acceleration, h / per_row)[::per_row][rows]
-            c = _solved(A, left[rows])
-            off = float(np.sum((left[rows] - A @ c) ** 2))
+            c = _solved(A, remaining[rows])
+            off = float(np.sum((remaining[rows] - A @ c) ** 2))
             if best is None or off < best[0]:
                 best = off, Resonance(float(f), D, float(np.copysign(np.hypot(c[0], c[1]), c[0])))
     return best[1] if best is not None else None
@@ -101,8 +101,8 @@ def _filtered(frequency: float, damping: float, a: Array, h: float) -> Array:
     """(N, 2) q and dq/dt / w of a resonance, by its exact answer to steps of `a`."""
     w = 2 * pi * frequency
     A, B = np.array([[0.0, 1.0], [-(w**2), -2 * damping * w]]), np.array([[0.0], [w**2]])
-    held = cont2discrete((A, B, np.diag([1.0, 1.0 / w]), np.zeros((2, 1))), h, "zoh")
-    numerators, denominator = ss2tf(*held[:4])
+    fixed = cont2discrete((A, B, np.diag([1.0, 1.0 / w]), np.zeros((2, 1))), h, "zoh")
+    numerators, denominator = ss2tf(*fixed[:4])
     return np.column_stack([lfilter(numerator, denominator, a) for numerator in numerators])
 
 
@@ -119,12 +119,12 @@ def with_modes(machine: Machine, axis: str, modes: Sequence[ElasticMode]) -> Mac
     table = checked_modes(machine)
     n_0 = 1 / sqrt(table.J_tot(axis))
     x_0 = n_0 * machine.axes[axis].I_P
-    further = [{f"n_{axis}": each.motor * n_0, f"x_{axis}": each.scale * x_0, f"tcp_{axis}": each.scale * x_0}
-               for each in modes]  # fmt: skip
+    further = [{f"n_{axis}": mode.motor * n_0, f"x_{axis}": mode.scale * x_0, f"tcp_{axis}": mode.scale * x_0}
+               for mode in modes]  # fmt: skip
     whole = Modes(
         machine.modes,
-        np.append(table.frequency, [each.frequency for each in modes]),
-        np.append(table.damping, [each.damping for each in modes]),
+        np.append(table.frequency, [mode.frequency for mode in modes]),
+        np.append(table.damping, [mode.damping for mode in modes]),
         {port: np.append(column, [moved.get(port, 0.0) for moved in further]) for port, column in table.ports.items()},
     )
     name = hashlib.sha256(repr(modes).encode()).hexdigest()[:16]
@@ -146,10 +146,10 @@ def begin_mode(k: int, one: Resonance, sign: float) -> dict[str, float]:
 
 def modes_of(values: Mapping[str, float]) -> list[ElasticMode]:
     """The modes in values of a fit."""
-    found = []
+    elastic_modes = []
     k = 1
     while f"mode_f_{k}" in values:
         f, D, u, v = (values[f"{key}_{k}"] for key in KEYS)
-        found.append(ElasticMode(f, D, u, v))
+        elastic_modes.append(ElasticMode(f, D, u, v))
         k += 1
-    return found
+    return elastic_modes

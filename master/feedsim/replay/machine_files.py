@@ -28,9 +28,9 @@ ASSUMED = "assumed: the record does not show it"
 def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
     """A drive with what a record determines, and without what it does not: no reference model, no filters, an ideal
     current loop. values: K_v, k_ffw, T_dyn, T_sym, K_p, K_i = K_p/T_n. torque: limit [N.m]."""
-    told = {name: values[name] for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p")}
+    reported = {name: values[name] for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p")}
     assumed = {"ramp_speed_setpoint": False, "reference_model": False, "ideal_current_loop": True, "K_t": 1.0}
-    return Drive.model_validate({**told, "T_n": values["K_p"] / values["K_i"], "M_max": torque, **assumed})
+    return Drive.model_validate({**reported, "T_n": values["K_p"] / values["K_i"], "M_max": torque, **assumed})
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,11 @@ def machine_files(
 ) -> dict[str, str]:
     """File name -> text, of the whole folder. interval: of the record's rows [s]. control: that the record is of."""
     files = {"machine.yaml": _machine(name, note, axes, interval, position_cycle, control), "modes.csv": _modes(axes)}
-    for axis, each in axes.items():
-        files[drive_file(axis)] = drive_text(each.drive, each.estimates, ASSUMED, each.head)
-        files[friction_file(axis)] = friction_axis_text(axis, each.values, each.estimates, each.head, each.correlation)
+    for axis, rigid_axis in axes.items():
+        files[drive_file(axis)] = drive_text(rigid_axis.drive, rigid_axis.estimates, ASSUMED, rigid_axis.head)
+        files[friction_file(axis)] = friction_axis_text(
+            axis, rigid_axis.values, rigid_axis.estimates, rigid_axis.head, rigid_axis.correlation
+        )
     return files
 
 
@@ -79,15 +81,15 @@ def _modes(axes: Mapping[str, RigidAxis]) -> str:
     ports = [f"{kind}_{axis}" for kind in ("n", "x") for axis in axes] + [f"tcp_{axis}" for axis in TOOL_AXES]
     lines = [",".join(["mode", "frequency [Hz]", "damping ratio [1]", *ports])]
     rows: list[tuple[float, float, dict[str, float]]] = []
-    for axis, each in axes.items():
-        n = 1.0 / sqrt(each.values["J"])
-        x = n * each.pitch / (2 * pi)
+    for axis, rigid_axis in axes.items():
+        n = 1.0 / sqrt(rigid_axis.values["J"])
+        x = n * rigid_axis.pitch / (2 * pi)
         moved = {f"n_{axis}": n, f"x_{axis}": x, f"tcp_{axis}": x}
         rows.append((0.0, 0.0, moved))
-    for axis, each in axes.items():
-        n = 1.0 / sqrt(each.values["J"])
-        x = n * each.pitch / (2 * pi)
-        for mode in each.modes:
+    for axis, rigid_axis in axes.items():
+        n = 1.0 / sqrt(rigid_axis.values["J"])
+        x = n * rigid_axis.pitch / (2 * pi)
+        for mode in rigid_axis.modes:
             moved = {f"n_{axis}": mode.motor * n, f"x_{axis}": mode.scale * x, f"tcp_{axis}": mode.scale * x}
             for other in mode.beside:
                 moved |= {f"x_{other.axis}": other.shape * x, f"tcp_{other.axis}": other.shape * x}
@@ -101,27 +103,27 @@ def _modes(axes: Mapping[str, RigidAxis]) -> str:
 def _machine(
     name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float, of: str
 ) -> str:
-    pose = ", ".join(f"{axis}: {_text(1e3 * each.position)} mm" for axis, each in axes.items())
+    pose = ", ".join(f"{axis}: {_text(1e3 * rigid_axis.position)} mm" for axis, rigid_axis in axes.items())
     control = control_cycle(interval)
     lines = [
         f"name: {_quoted(name)}", f"note: {_quoted(note)}", *([f"control: {of}"] if of else []), "",
         "modes: modes.csv", f"pose: {{{pose}}}", "",
         f"cycles: {{control: {_text(1e6 * control)} us, position: {_text(1e6 * position_cycle)} us, "
         f"interpolation: {_text(1e6 * interval)} us}}",
-        f"path: {{jerk: {_text(max(each.limits['jerk'] for each in axes.values()))} m/s^3, "
-        f"acceleration: {_text(max(each.limits['acceleration'] for each in axes.values()))} m/s^2}}",
+        f"path: {{jerk: {_text(max(axis.limits['jerk'] for axis in axes.values()))} m/s^3, "
+        f"acceleration: {_text(max(axis.limits['acceleration'] for axis in axes.values()))} m/s^2}}",
         "", "# Travel, speed and acceleration are those of the record with a reserve of a half.", "axes:",
     ]  # fmt: skip
-    for axis, each in axes.items():
-        own = each.limits
+    for axis, value in axes.items():
+        own = value.limits
         lines += [
             f"  {axis}:",
-            f"    pitch: {_text(1e3 * each.pitch)} mm",
+            f"    pitch: {_text(1e3 * value.pitch)} mm",
             f"    travel: [{_text(1e3 * own['low'])} mm, {_text(1e3 * own['high'])} mm]",
             f"    max_speed: {_text(own['speed'])} m/s",
             f"    max_acceleration: {_text(own['acceleration'])} m/s^2",
             "    limits_from: that of the record and a reserve of a half; the axis itself may have more",
-            f"    constant_load: {_text(each.values['M_0'])} N.m{_remark(each.estimates.get('M_0'))}",
+            f"    constant_load: {_text(value.values['M_0'])} N.m{_remark(value.estimates.get('M_0'))}",
             f"    drive: {drive_file(axis)}",
             f"    friction: {friction_file(axis)}",
         ]
@@ -191,12 +193,14 @@ def _identified(axis: str, estimates: Mapping[str, Estimate], correlation: Corre
     def named(name: str) -> str:
         return name if name in Friction.model_fields or name in (*beside, "delay") else f"drive.{name}"
 
-    known = {name: each for name, each in estimates.items() if name in correlation.names}
+    known = {name: estimate for name, estimate in estimates.items() if name in correlation.names}
     ends = {
-        name: [float(f"{end:.8g}") if each.unit == "1" else f"{end:.8g} {each.unit}" for end in each.interval]
-        for name, each in known.items()
+        name: [
+            float(f"{end:.8g}") if estimate.unit == "1" else f"{end:.8g} {estimate.unit}" for end in estimate.interval
+        ]
+        for name, estimate in known.items()
     }
-    parts = {name: {"status": each.status, "interval": ends[name]} for name, each in known.items()}
+    parts = {name: {"status": estimate.status, "interval": ends[name]} for name, estimate in known.items()}
     matrix = [[round(float(value), 4) for value in row] for row in correlation.matrix]
     return {
         "axis": axis,
@@ -206,14 +210,14 @@ def _identified(axis: str, estimates: Mapping[str, Estimate], correlation: Corre
     }
 
 
-def _remark(found: Estimate | None) -> str:
-    if found is None:
+def _remark(estimate: Estimate | None) -> str:
+    if estimate is None:
         return ""
-    interval = interval_text(found)
-    told = f"95 %: {interval}" if interval else ""
-    if found.status == "undetermined":
-        told = f"not determined: {found.reason}" + (f" ({told})" if told else "")
-    return f"  # {told}" if told else ""
+    interval = interval_text(estimate)
+    reported = f"95 %: {interval}" if interval else ""
+    if estimate.status == "undetermined":
+        reported = f"not determined: {estimate.reason}" + (f" ({reported})" if reported else "")
+    return f"  # {reported}" if reported else ""
 
 
 def _number(value: float) -> str:

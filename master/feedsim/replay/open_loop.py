@@ -33,23 +33,23 @@ def driven(
     Raises InputError: a record without torque; an axis whose friction is not the shipped unit's; parameters that the
     friction law refuses.
     """
-    found = {}
+    comparisons = {}
     with FrictionLaw(fmus) as law:
-        for axis, each in records.items():
-            if not each.record.driven:
+        for axis, axis_record in records.items():
+            if not axis_record.record.driven:
                 raise InputError(
-                    f"{each.record.name}, axis {axis}: no torque, current or force is recorded; in open loop it is "
-                    "what drives the axis"
+                    f"{axis_record.record.name}, axis {axis}: no torque, current or force is recorded; in open loop it "
+                    "is what drives the axis"
                 )
             friction = machine.shipped_friction(axis, "a replay in open loop")
             values = {name: float(getattr(friction, name)) for name in FRICTION_NAMES}
             values |= {"J": checked_modes(machine).J_tot(axis), "M_0": machine.axes[axis].M_0}
             values["delay"] = read[axis].provenance.torque_delay or 0.0
-            rows = np.flatnonzero(each.rows)
-            part = each.record.between(int(rows[0]), int(rows[-1]) + 1)
+            rows = np.flatnonzero(axis_record.rows)
+            part = axis_record.record.between(int(rows[0]), int(rows[-1]) + 1)
             # The rows ahead of the window are not compared; as many as there are keep their place.
-            x = each.position.copy()
-            x[rows] = each.I_P * reached(part, law, values)
-            channel = Channel(each.position, x, "m", "position in open loop")
-            found[axis] = Comparison(axis, each, {"position": channel}, None, None, 0.0, open_loop=True)
-    return found
+            x = axis_record.position.copy()
+            x[rows] = axis_record.I_P * reached(part, law, values)
+            channel = Channel(axis_record.position, x, "m", "position in open loop")
+            comparisons[axis] = Comparison(axis, axis_record, {"position": channel}, None, None, 0.0, open_loop=True)
+    return comparisons

@@ -52,16 +52,16 @@ class Line:
         )
 
 
-def without_outside(each: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
+def without_outside(axis_record: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
     """The record without lines from outside, and those lines; the record itself where there are none."""
-    position, torque = each.position.copy(), each.record.torque.copy()
-    time, clean = each.record.time, 0  # clean: rows ahead of it have lost their lines
+    position, torque = axis_record.position.copy(), axis_record.record.torque.copy()
+    time, clean = axis_record.record.time, 0  # clean: rows ahead of it have lost their lines
     lines: list[Line] = []
-    for before, after in _rests(each):
+    for before, after in _rests(axis_record):
         # A short rest is behind one motion and ahead of the next one: either side is looked at as it was recorded.
-        own, beside = each.position.copy(), each.record.torque.copy()
+        own, beside = axis_record.position.copy(), axis_record.record.torque.copy()
         whole = np.arange(before[0], after[-1] + 1)
-        rows, found = whole[whole >= clean], len(lines)
+        rows, count = whole[whole >= clean], len(lines)
         for _ in range(MOST_LINES):
             frequency = _line(time, own, before, after)
             if frequency is None:
@@ -71,22 +71,22 @@ def without_outside(each: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
                 break
             waves = _waves(time[whole], frequency)
             own[whole] -= waves @ sine
-            force = _sine(time, beside, frequency, before, after) if each.record.driven else np.zeros(2)
+            force = _sine(time, beside, frequency, before, after) if axis_record.record.driven else np.zeros(2)
             beside[whole] -= waves @ force
             sizes = float(np.hypot(*sine)), float(np.hypot(*force))
             lines.append(Line(frequency, *sizes, float(time[rows[0]]), float(time[rows[-1]])))
-        if len(lines) > found:
+        if len(lines) > count:
             position[rows], torque[rows], clean = own[rows], beside[rows], int(rows[-1]) + 1
     if not lines:
-        return each, ()
-    record = replace(each.record, angle=position / each.I_P, torque=torque)
-    return replace(each, record=record), tuple(lines)
+        return axis_record, ()
+    record = replace(axis_record.record, angle=position / axis_record.I_P, torque=torque)
+    return replace(axis_record, record=record), tuple(lines)
 
 
-def _rests(each: AxisRecord) -> Iterator[tuple[Rows, Rows]]:
+def _rests(axis_record: AxisRecord) -> Iterator[tuple[Rows, Rows]]:
     """Rows at rest ahead of every motion and behind it, where there are enough of both."""
-    h = each.record.interval
-    moving = replace(each, rows=np.ones_like(each.rows)).moving
+    h = axis_record.record.interval
+    moving = replace(axis_record, rows=np.ones_like(axis_record.rows)).moving
     behind = np.ones(round(DIES_AWAY / h) + 1)
     moving = np.convolve(moving, behind)[: len(moving)] > 0.5
     edges = np.flatnonzero(np.diff(moving.astype(int)))

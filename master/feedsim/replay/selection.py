@@ -35,7 +35,7 @@ INDEPENDENT_TIME = 0.05  # [s]: residuals further apart than that are taken to b
 
 
 def friction_parts(
-    problem: Problem, found: Tuned, progress: Progress
+    problem: Problem, tuned: Tuned, progress: Progress
 ) -> tuple[tuple[str, ...], dict[str, float], Tuned, list[Tuned]]:
     """Parts of the friction law that the record asks for: chosen, the gain of each, a fit with them, and the fits with
     one part more that predict as well as that: the record decides for neither."""
@@ -45,14 +45,14 @@ def friction_parts(
     while len(chosen) < len(BLOCKS):
         progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
         # As near to its end as what it is compared with.
-        found = problem.exact(problem.fitted(found.names, found.values, found))
-        score = _predicted(problem, found)
+        tuned = problem.exact(problem.fitted(tuned.names, tuned.values, tuned))
+        score = _predicted(problem, tuned)
         tried = {}
         for part, block in BLOCKS.items():
             if part in chosen:
                 continue
-            begin = {**found.values, **{name: _begin(problem, name) for name in block}}
-            tried[part] = problem.fitted([*found.names, *block], begin, found)
+            begin = {**tuned.values, **{name: _begin(problem, name) for name in block}}
+            tried[part] = problem.fitted([*tuned.names, *block], begin, tuned)
             if _at_end(problem, tried[part], block):
                 gains[part] = -inf
                 continue
@@ -62,31 +62,31 @@ def friction_parts(
             gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
         gain, part = max((gains[part], part) for part in tried)
         if not gain >= BETTER:
-            undecided = [each for part, each in tried.items() if gains[part] > -BETTER]
+            undecided = [value for part, value in tried.items() if gains[part] > -BETTER]
             break
         chosen.append(part)
-        found = tried[part]
-        problem.weigh(found)
-    return tuple(chosen), gains, found, undecided
+        tuned = tried[part]
+        problem.weigh(tuned)
+    return tuple(chosen), gains, tuned, undecided
 
 
-def with_elastic_modes(problem: Problem, found: Tuned, count: int | None) -> tuple[Tuned, Mapping[int, float]]:
+def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tuple[Tuned, Mapping[int, float]]:
     """A fit with elastic modes, and the position [m] that it predicts of quarters of the motion with how many.
 
     One mode after the other: where it is, regression says of what the units leave. It stays where the units, fitted to
     three quarters, predict the fourth one better with it, or where the number is given.
     """
     folds = np.array_split(np.arange(len(problem.rows)), FOLDS)
-    found = problem.exact(found)
-    predicted = {0: unpredicted(problem, found, folds)[0] * problem.weights["position"]}
+    result = problem.exact(result)
+    predicted = {0: unpredicted(problem, result, folds)[0] * problem.weights["position"]}
     for k in range(1, (MOST_MODES if count is None else count) + 1):
-        machine, scale = problem.tuned(found.values)
+        machine, scale = problem.tuned(result.values)
         simulated = problem.replay.follow(machine, ("x_a",), problem.per_row, scale)[problem.each.axis]["x_a"]
-        K_v = (problem.start | dict(found.values))["K_v"]
+        K_v = (problem.start | dict(result.values))["K_v"]
         one = resonance(problem.each, simulated, problem.per_row, K_v)
         if one is None:
             break
-        before, start = found, dict(problem.start)
+        before, start = result, dict(problem.start)
         best: tuple[float, Tuned, dict[str, float]] | None = None
         for sign in (1.0, -1.0):
             first = begin_mode(k, one, sign)
@@ -106,10 +106,10 @@ def with_elastic_modes(problem: Problem, found: Tuned, count: int | None) -> tup
         if count is None and not gain > BETTER:
             problem.start = start
             break
-        found = fit
-        problem.weigh(found)
-        found = problem.exact(problem.fitted(found.names, found.values, found))
-    return found, predicted
+        result = fit
+        problem.weigh(result)
+        result = problem.exact(problem.fitted(result.names, result.values, result))
+    return result, predicted
 
 
 def _begin(problem: Problem, name: str) -> float:
@@ -117,12 +117,12 @@ def _begin(problem: Problem, name: str) -> float:
     return {"F_log": 0.1 * F_C, "gamma": 0.5, EXCESS: 0.1 * F_C, "asymmetry": 0.0}.get(name, problem.start[name])
 
 
-def _at_end(problem: Problem, found: Tuned, block: Sequence[str]) -> bool:
+def _at_end(problem: Problem, tuned: Tuned, block: Sequence[str]) -> bool:
     """Whether a part sits at a bound: the record does not determine it."""
-    return any(problem.no_effect(name, found.values[name]) for name in block)
+    return any(problem.no_effect(name, tuned.values[name]) for name in block)
 
 
-def _predicted(problem: Problem, found: Tuned) -> Array:
+def _predicted(problem: Problem, tuned: Tuned) -> Array:
     """(2,) logarithm of the likelihood of every part of the motion, predicted from the others.
 
     Parts are stretches of time, and then kinds of motion: either direction, slow and fast. What predicts only motion
@@ -132,28 +132,28 @@ def _predicted(problem: Problem, found: Tuned) -> Array:
     kinds = 2 * (speed > 0) + (np.abs(speed) > FAST * np.max(np.abs(speed)))
     every = np.arange(len(speed))
     partitions = np.array_split(every, FOLDS), [every[kinds == kind] for kind in np.unique(kinds)]
-    return np.array([_likelihood(problem, found, folds) for folds in partitions if len(folds) > 1])
+    return np.array([_likelihood(problem, tuned, folds) for folds in partitions if len(folds) > 1])
 
 
-def _likelihood(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> float:
+def _likelihood(problem: Problem, tuned: Tuned, folds: Sequence[Rows]) -> float:
     """Of the folds, each predicted from the others."""
     count = sum(map(len, folds))
-    position, torque = unpredicted(problem, found, folds)
+    position, torque = unpredicted(problem, tuned, folds)
     return -independent(problem, count) * (log(position) + log(torque))
 
 
-def unpredicted(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> tuple[float, float]:
+def unpredicted(problem: Problem, tuned: Tuned, folds: Sequence[Rows]) -> tuple[float, float]:
     """Rms of position and torque, in their weights, where each fold is predicted from the others."""
     count = sum(map(len, folds))
-    J, r = found.jacobian, found.residuals
+    J, r = tuned.jacobian, tuned.residuals
     prior = np.arange(2 * count, len(r))
-    left = np.empty(2 * count)
+    remaining = np.empty(2 * count)
     for fold in folds:
         out = np.concatenate([fold, fold + count])
         others = np.concatenate([np.setdiff1d(np.arange(2 * count), out), prior])
         step = np.linalg.lstsq(J[others], -r[others], rcond=None)[0]
-        left[out] = r[out] + J[out] @ step
-    return rms(left[:count]), rms(left[count:][problem.counted])
+        remaining[out] = r[out] + J[out] @ step
+    return rms(remaining[:count]), rms(remaining[count:][problem.counted])
 
 
 def independent(problem: Problem, count: int) -> float:

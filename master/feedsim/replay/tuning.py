@@ -139,17 +139,17 @@ class Problem:
         machine, scale = self.tuned(values)
         self.runs += 1
         try:
-            found = self.replay.follow(machine, ("x_a", "M_a"), self.per_row, scale)[self.each.axis]
+            result = self.replay.follow(machine, ("x_a", "M_a"), self.per_row, scale)[self.each.axis]
         except FeedsimError as error:  # a drive that is unstable runs away until its numbers do
             raise InputError(str(error)) from None
         delay = (self.start | dict(values))["delay"]
         time, h = self.replay.time, self.replay.interval / self.per_row
-        fine = time[0] + h * np.arange(len(found["M_a"]))
-        torque = scale * np.interp(time - delay, fine, found["M_a"])
+        fine = time[0] + h * np.arange(len(result["M_a"]))
+        torque = scale * np.interp(time - delay, fine, result["M_a"])
         off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
         if self.each.record.clipped is not None:
             off = np.where(self.each.record.clipped, 0.0, off)
-        return found["x_a"][:: self.per_row] - self.each.position, off
+        return result["x_a"][:: self.per_row] - self.each.position, off
 
     def damping_penalty(self, values: Mapping[str, float]) -> float:
         """How far the speed loop J s^2 + K_p s + K_i is less damped than a tuned one, in standard deviations."""
@@ -165,13 +165,13 @@ class Problem:
         """Standard deviation of a parameter's prior, in its own unit, at values."""
         return parameter(name, self.start).slope(abs(values[name]))
 
-    def weigh(self, found: Tuned) -> None:
+    def weigh(self, tuned: Tuned) -> None:
         """Take what is left with what was found as what a residual is worth.
 
         What is left of either channel is correlated over rows, and counts by as many as say something of their own:
         so the channels are weighed against each other, and against what is usual.
         """
-        position, torque = found.position, found.torque
+        position, torque = tuned.position, tuned.torque
         least = LEAST_WEIGHT["torque"] * rms(self.each.record.torque[self.rows]) if self.each.record.driven else 1.0
         self.weights = {
             "position": max(rms(position), LEAST_WEIGHT["position"])
@@ -215,7 +215,7 @@ class Problem:
             return np.append(x, self.damping_penalty(problem.values(x)))
 
         weights = np.repeat([self.weights["position"], self.weights["torque"]], len(self.rows))
-        steps = np.array([difference(each) for each in parameters])
+        steps = np.array([difference(entry) for entry in parameters])
         problem = LeastSquares(errors, parameters, steps, prior, weights)
         return problem
 

@@ -39,18 +39,18 @@ def _span(part: str, marks: Sequence[Mark]) -> tuple[float, float]:
         return at, at
     counted = _COUNTED.fullmatch(part)
     name, number = (counted[1], int(counted[2])) if counted else (part, None)
-    found = [i for i, mark in enumerate(marks) if _begins(mark.text, name)]
-    if not found or (number is not None and not 1 <= number <= len(found)):
+    indexes = [i for i, mark in enumerate(marks) if _begins(mark.text, name)]
+    if not indexes or (number is not None and not 1 <= number <= len(indexes)):
         there = "; ".join(dict.fromkeys(_short(mark.text) for mark in marks)) if len(marks) <= MOST_TOLD else ""
         known = f"there is {there}" if there else _known(marks)
-        how_often = f"{name!r} begins {len(found)} of them" if found else f"none begins with {name!r}"
+        how_often = f"{name!r} begins {len(indexes)} of them" if indexes else f"none begins with {name!r}"
         raise InputError(f"of the {len(marks)} blocks of the record {how_often}; {known}")
-    if number is None and len(found) > 1:
-        times = ", ".join(f"{marks[i].time:.6g} s" for i in found[:MOST_TOLD])
+    if number is None and len(indexes) > 1:
+        times = ", ".join(f"{marks[i].time:.6g} s" for i in indexes[:MOST_TOLD])
         raise InputError(
-            f"{len(found)} blocks of the record begin with {name!r}, at {times}; say which, for example {name} #2"
+            f"{len(indexes)} blocks of the record begin with {name!r}, at {times}; say which, for example {name} #2"
         )
-    i = found[(number or 1) - 1]
+    i = indexes[(number or 1) - 1]
     return marks[i].time, marks[i + 1].time if i + 1 < len(marks) else math.inf
 
 
@@ -67,5 +67,5 @@ def _short(text: str) -> str:
 
 def _known(marks: Sequence[Mark]) -> str:
     first = dict.fromkeys(text.split()[0] for mark in marks if (text := mark.text.strip()))
-    shown = [_short(each) for each in first][:MOST_TOLD]
+    shown = [_short(name) for name in first][:MOST_TOLD]
     return f"they begin with {', '.join(shown)}{' ...' if len(first) > len(shown) else ''}" if shown else "it has none"

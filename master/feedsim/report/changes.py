@@ -34,11 +34,16 @@ def changes_section(
         return None
     rows: list[tuple[Text, ...]] = [
         (
-            each.cause[:1].upper() + each.cause[1:], each.axis, code(each.parameter.removeprefix("drive.")),
-            *_values(each), _named(each, machine), typeset(each.reason), _margins(each),
+            proposal.cause[:1].upper() + proposal.cause[1:],
+            proposal.axis,
+            code(proposal.parameter.removeprefix("drive.")),
+            *_values(proposal),
+            _named(proposal, machine),
+            typeset(proposal.reason),
+            _margins(proposal),
         )
-        for each in proposals
-    ]  # fmt: skip
+        for proposal in proposals
+    ]
     heads = ("Cause", "Axis", "Parameter", "Present", "Proposed", "In the control", "Why", "Margins")
     further = _further(proposals, typed(scenario)) if scenario is not None and scenario.suffix != ".ssp" else None
     return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes")
@@ -46,69 +51,75 @@ def changes_section(
 
 def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
     """The commands that find all values of a drive, or of a compensation, on many motions."""
-    axes = dict.fromkeys(each.axis for each in proposals if each.parameter.removeprefix("drive.") in TUNED)
-    found: list[Text] = [
+    axes = dict.fromkeys(proposal.axis for proposal in proposals if proposal.parameter.removeprefix("drive.") in TUNED)
+    result: list[Text] = [
         (f"All values of the drive of {axis} together, within margins: ",
          code(f"feedsim tune drive {scenario} --axis {axis}"))
         for axis in axes
     ]  # fmt: skip
-    if any(each.cause.startswith(REVERSALS) for each in proposals):
-        found.append(("Values of a friction compensation: ", code(f"feedsim tune compensation {scenario}")))
-    return Bullets(found) if found else None
+    if any(proposal.cause.startswith(REVERSALS) for proposal in proposals):
+        result.append(("Values of a friction compensation: ", code(f"feedsim tune compensation {scenario}")))
+    return Bullets(result) if result else None
 
 
 def first_change(proposals: Sequence[Proposal]) -> str:
     """The first proposal that has a value, in a few words: "X.K_v 4 → 4.2 (m/min)/mm"; "" without one."""
-    each = next((each for each in proposals if each.proposed is not None), None)
-    if each is None:
+    proposal = next((entry for entry in proposals if entry.proposed is not None), None)
+    if proposal is None:
         return ""
-    present, proposed = _values(each)
-    return f"{each.axis}.{each.parameter.removeprefix('drive.')} {present.split(' ')[0]} → {proposed}"
+    present, proposed = _values(proposal)
+    return f"{proposal.axis}.{proposal.parameter.removeprefix('drive.')} {present.split(' ')[0]} → {proposed}"
 
 
 def change_lines(proposals: Sequence[Proposal]) -> list[str]:
     """A line each for the terminal."""
-    found = []
-    for each in proposals:
-        present, proposed = _values(each)
-        value = f"{present} -> {proposed}" if each.proposed is not None else f"{proposed} (now {present})"
-        found.append(f"change: {each.axis}.{each.parameter.removeprefix('drive.')} {value}: {each.cause}")
-    return found
+    result = []
+    for proposal in proposals:
+        present, proposed = _values(proposal)
+        value = f"{present} -> {proposed}" if proposal.proposed is not None else f"{proposed} (now {present})"
+        result.append(f"change: {proposal.axis}.{proposal.parameter.removeprefix('drive.')} {value}: {proposal.cause}")
+    return result
 
 
 def changes_part(proposals: Sequence[Proposal]) -> list[dict[str, Any]]:
     """The proposals in summary.json, in SI."""
     return [
         {
-            "cause": each.cause, "axis": each.axis, "parameter": each.parameter, "present": each.present,
-            "proposed": each.proposed, "unit": each.unit, "direction": each.direction, "reason": each.reason,
-            "margins": None if each.margins is None else [list(map(finite, margin)) for margin in each.margins],
+            "cause": proposal.cause,
+            "axis": proposal.axis,
+            "parameter": proposal.parameter,
+            "present": proposal.present,
+            "proposed": proposal.proposed,
+            "unit": proposal.unit,
+            "direction": proposal.direction,
+            "reason": proposal.reason,
+            "margins": None if proposal.margins is None else [list(map(finite, margin)) for margin in proposal.margins],
         }
-        for each in proposals
-    ]  # fmt: skip
+        for proposal in proposals
+    ]
 
 
-def _values(each: Proposal) -> tuple[str, str]:
-    present = "–" if each.present is None else _value(each, each.present)
-    return present, each.direction if each.proposed is None else _value(each, each.proposed)
+def _values(proposal: Proposal) -> tuple[str, str]:
+    present = "–" if proposal.present is None else _value(proposal, proposal.present)
+    return present, proposal.direction if proposal.proposed is None else _value(proposal, proposal.proposed)
 
 
-def _value(each: Proposal, value: float) -> str:
-    unit = parameters("controller")[each.parameter.removeprefix("drive.")].display_unit
-    number = minus(f"{convert(value, each.unit, unit):.4g}")
+def _value(proposal: Proposal, value: float) -> str:
+    unit = parameters("controller")[proposal.parameter.removeprefix("drive.")].display_unit
+    number = minus(f"{convert(value, proposal.unit, unit):.4g}")
     return number if unit == "1" else f"{number} {unit}"
 
 
-def _named(each: Proposal, machine: Machine | None) -> str:
+def _named(proposal: Proposal, machine: Machine | None) -> str:
     control = asked(machine)
-    name = names_of(control).get(each.parameter) if control else None
+    name = names_of(control).get(proposal.parameter) if control else None
     if name is None:
         return "–"
-    return f"{name.number} {name.name}" if each.proposed is None else name.text(each.proposed)
+    return f"{name.number} {name.name}" if proposal.proposed is None else name.text(proposal.proposed)
 
 
-def _margins(each: Proposal) -> str:
-    if each.margins is None:
+def _margins(proposal: Proposal) -> str:
+    if proposal.margins is None:
         return ""
-    (a, b), (c, d) = each.margins
+    (a, b), (c, d) = proposal.margins
     return minus(f"{a:.3g} dB, {b:.3g}° -> {c:.3g} dB, {d:.3g}°")

@@ -209,7 +209,7 @@ class Report:
     @property
     def findings(self) -> list[tuple[str, str]]:
         """Severity and text of the warnings, the gravest first."""
-        return [(severity(each), str(each)) for each in ranked(self.warnings)]
+        return [(severity(name), str(name)) for name in ranked(self.warnings)]
 
     @property
     def pictures(self) -> list[Picture]:

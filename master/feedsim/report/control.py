@@ -73,12 +73,12 @@ def section(control: str, machine: Machine | None, changes: Mapping[str, Sequenc
 
 def axis_values(control: str, machine: Machine, axis: str) -> dict[str, float]:
     """Our parameter -> value in the control's unit, of an axis, as far as it has them."""
-    found = {}
+    values = {}
     for key, name in names_of(control).items():
-        value = reduce(lambda each, step: getattr(each, step, None), key.split("."), _start(machine, axis))
+        value = reduce(lambda entry, step: getattr(entry, step, None), key.split("."), _start(machine, axis))
         if isinstance(value, bool | int | float):
-            found[key] = name.shown(float(value))
-    return found
+            values[key] = name.shown(float(value))
+    return values
 
 
 def _start(machine: Machine, axis: str) -> Any:

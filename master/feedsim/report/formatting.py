@@ -46,7 +46,7 @@ def display_unit(unit: str) -> str:
     """A unit as it is printed: µm, N·m, kg·m²; nothing for a plain number."""
     if unit in DISPLAY_UNITS:
         return DISPLAY_UNITS[unit]
-    raised = re.sub(r"(?<=[a-z])\^?([23])\b", lambda found: found[1].translate(SUPERSCRIPTS), unit.replace(".", "·"))
+    raised = re.sub(r"(?<=[a-z])\^?([23])\b", lambda match: match[1].translate(SUPERSCRIPTS), unit.replace(".", "·"))
     return typeset(raised)
 
 
@@ -89,15 +89,15 @@ def typeset(text: str) -> str:
 
 def _signs(text: str) -> str:
     text = re.sub(r"\bum\b", "µm", text.replace("+-", "±").replace(" -> ", " → "))
-    text = re.sub(r"\bN\.m\b(\.s\b)?", lambda found: found[0].replace(".", "·"), text)
+    text = re.sub(r"\bN\.m\b(\.s\b)?", lambda match: match[0].replace(".", "·"), text)
     text = re.sub(r"(?<=\d) deg\b", "°", text)
-    text = re.sub(r"(?<=[a-z])\^([23])\b", lambda found: found[1].translate(SUPERSCRIPTS), text)
+    text = re.sub(r"(?<=[a-z])\^([23])\b", lambda match: match[1].translate(SUPERSCRIPTS), text)
     text = re.sub(r"(?<![\w.])\d+(\.\d+)?e[-+]\d+\b", _with_power, text)
     return re.sub(r"(?:(?<=[\s(])|^)-(?=\d)", "−", text)
 
 
-def _with_power(found: re.Match[str]) -> str:
-    mantissa, _, exponent = found[0].partition("e")
+def _with_power(match: re.Match[str]) -> str:
+    mantissa, _, exponent = match[0].partition("e")
     return f"{mantissa}×10{str(int(exponent)).translate(SUPERSCRIPTS)}"
 
 

@@ -72,7 +72,7 @@ class Picture:
         path = Path(path)
         kind = path.suffix.lower().removeprefix(".")
         if kind not in PICTURE_FORMATS:
-            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{each}' for each in PICTURE_FORMATS)}")
+            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{name}' for name in PICTURE_FORMATS)}")
         try:
             path.write_bytes(self.content(kind))
         except OSError as error:

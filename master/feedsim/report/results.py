@@ -81,7 +81,7 @@ def replaced(directory: Path, inputs: Sequence[Path], asked: Sequence[str]) -> s
     """
     before = _summary(directory)
     try:
-        files = {each["sha256"] for each in before["inputs"]}
+        files = {entry["sha256"] for entry in before["inputs"]}
         settings = before.get("settings", {}).items()
         subject: dict[str, Any] = next((before[name] for name in ("scenario", "subject") if name in before), {})
         settings_before = [*subject.get("overrides", ()), *(f"{name}={value}" for name, value in settings)]
@@ -253,10 +253,10 @@ def _listed(directory: Path) -> list[str] | None:
 def _summary(directory: Path) -> dict[str, Any]:
     """The summary of an earlier run in ``directory``; empty where there is none."""
     try:
-        found = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
+        result = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return result if isinstance(result, dict) else {}
 
 
 def _move(sources: Mapping[str, Path], directory: Path, stale: Sequence[str], scratch: Path) -> None:

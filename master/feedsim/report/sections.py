@@ -64,9 +64,9 @@ def parameters_section(machine: Machine) -> Section:
     keys = dict.fromkeys((g, n) for groups in by_axis.values() for g, names in groups.items() for n in names)
     rows: list[tuple[Text, ...]] = []
     for group, name in keys:
-        found = [groups[group].get(name) for groups in by_axis.values()]
-        unit = next(pair[1] for pair in found if pair is not None)
-        values = (_value(pair[0]) if pair else "–" for pair in found)
+        result = [groups[group].get(name) for groups in by_axis.values()]
+        unit = next(pair[1] for pair in result if pair is not None)
+        values = (_value(pair[0]) if pair else "–" for pair in result)
         rows.append((group, code(name), display_unit(unit), *values))
     heads = ("Group", "Parameter", "SI unit", *by_axis)
     note = "A parameter that is not listed has the start value of its unit."

@@ -193,7 +193,7 @@ def _inline(svg: str, stem: str, title: str) -> str:
 
 def standalone_drawing(svg: str) -> str:
     """An SVG as a file of its own: colours as numbers, a size, a light ground."""
-    svg = re.sub(r"var\(--(\w+)\)", lambda found: PAGE_COLOURS[found[1]], svg)
+    svg = re.sub(r"var\(--(\w+)\)", lambda match: PAGE_COLOURS[match[1]], svg)
     if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
         svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
     end = svg.index(">") + 1

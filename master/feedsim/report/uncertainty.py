@@ -68,7 +68,7 @@ def drawn_values(cloud: Cloud, sets: Mapping[str, Known] | None = None) -> Table
 
 def pictures_of(uncertainty: Uncertainty, of: Mapping[str, str] | None = None) -> list[Picture]:
     """A band for every circle and stop. of: prefix -> its words."""
-    return [_picture(each, uncertainty, (of or {}).get(each.prefix, each.prefix)) for each in uncertainty.bands]
+    return [_picture(band, uncertainty, (of or {}).get(band.prefix, band.prefix)) for band in uncertainty.bands]
 
 
 def _picture(band: Spread, uncertainty: Uncertainty, name: str) -> Picture:
@@ -80,7 +80,7 @@ def _picture(band: Spread, uncertainty: Uncertainty, name: str) -> Picture:
     else:
         order, x = np.arange(len(band.at)), 1e3 * band.at
         across, up, what = Axis("time since the end of the motion", "ms"), "position beyond the target", "Stop"
-    low, high, nominal = (1e6 * each[order] for each in (band.low, band.high, band.nominal))
+    low, high, nominal = (1e6 * values[order] for values in (band.low, band.high, band.nominal))
     panel = Panel(
         "", across, Axis(up, "µm"), [Curve("machine as it is", x, nominal, SIMULATED)],
         bands=[Band(f"{100 * uncertainty.share:.0f} % of draws", low, high, x, SIMULATED)],
@@ -95,15 +95,15 @@ def _picture(band: Spread, uncertainty: Uncertainty, name: str) -> Picture:
 
 def answers(uncertainty: Uncertainty, figures: Mapping[str, Figure], leading: Sequence[str]) -> list[str]:
     """The leading figures with their intervals, in a sentence."""
-    found = []
+    result = []
     for name in leading:
         low, high = uncertainty.figures.get(name, (math.nan, math.nan))
         if math.isfinite(low):
-            found.append(f"{name} {low:.4g} to {high:.4g} {figures[name].unit}")
-    if not found:
+            result.append(f"{name} {low:.4g} to {high:.4g} {figures[name].unit}")
+    if not result:
         return []
     of = f"{100 * uncertainty.share:.0f} %, {uncertainty.count} draws"
-    return [f"With what identification leaves open: {', '.join(found)} ({of})."]
+    return [f"With what identification leaves open: {', '.join(result)} ({of})."]
 
 
 def bands_csv(uncertainty: Uncertainty) -> str:
@@ -113,7 +113,7 @@ def bands_csv(uncertainty: Uncertainty) -> str:
     writer.writerow(["of", "curve", "angle [deg] or time [ms]", "value [um]", "from [um]", "to [um]"])
     for band in uncertainty.bands:
         at = np.degrees(band.at) if band.kind == "contour" else 1e3 * band.at
-        for row in zip(at, *(1e6 * each for each in (band.nominal, band.low, band.high)), strict=True):
+        for row in zip(at, *(1e6 * values for values in (band.nominal, band.low, band.high)), strict=True):
             writer.writerow([band.prefix, band.kind, *(f"{value:.6g}" for value in row)])
     return text.getvalue()
 

@@ -153,9 +153,9 @@ def _named_files(source: Source, place: Place) -> Iterator[tuple[Place, str]]:
 
 
 def _relocate(source: Source, place: Place, moved: Mapping[str, str]) -> None:
-    for found, text in list(_named_files(source, place)) if moved else ():
+    for value, text in list(_named_files(source, place)) if moved else ():
         if text in moved:
-            at(source.data, found[:-1])[found[-1]] = moved[text]
+            at(source.data, value[:-1])[value[-1]] = moved[text]
 
 
 def _source(change: Change) -> Source:

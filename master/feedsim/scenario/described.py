@@ -71,10 +71,10 @@ def load_described(path: str | Path) -> Described:
     """
     path = Path(path)
     if path.is_dir():
-        found = [path / name for name in (Machine.IN_FOLDER, STRUCTURE_FILE) if (path / name).is_file()]
-        if not found:
+        paths = [path / name for name in (Machine.IN_FOLDER, STRUCTURE_FILE) if (path / name).is_file()]
+        if not paths:
             raise InputError(f"{path}: no {Machine.IN_FOLDER} and no {STRUCTURE_FILE} in this folder")
-        path = found[0]
+        path = paths[0]
     source = read_group(path)
     if "kind" in source.data or path.name == STRUCTURE_FILE:
         return _alone(path)

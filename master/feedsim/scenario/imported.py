@@ -54,10 +54,10 @@ class Imported:
 
     def text(self) -> str:
         """The machine file."""
-        remarks = {place_of(each): each.source for each in self.values}
+        remarks = {place_of(value): value.source for value in self.values}
         head = ["# Written by feedsim machine import; behind each value that a control's file holds stands its place."]
         if self.missing:
-            head += ["# A draft: a machine file needs these keys besides:", *(f"#   {each}" for each in self.missing)]
+            head += ["# A draft: a machine file needs these keys besides:", *(f"#   {name}" for name in self.missing)]
         return "\n".join([*head, *_lines(self.tree, (), remarks, 0)]) + "\n"
 
     def files(self) -> dict[str, str | bytes]:
@@ -66,12 +66,12 @@ class Imported:
         return {Machine.IN_FOLDER: self.text(), **modes}
 
 
-def place_of(each: Taken) -> Place:
+def place_of(taken: Taken) -> Place:
     """The place of a value in a machine file."""
-    parts = tuple(int(part) if part.isdecimal() else part for part in each.parameter.split("."))
-    if each.value == "off" and parts[-1] != "type":
+    parts = tuple(int(part) if part.isdecimal() else part for part in taken.parameter.split("."))
+    if taken.value == "off" and parts[-1] != "type":
         parts = parts[:-1]
-    return ("axes", each.axis, *parts) if each.axis else parts
+    return ("axes", taken.axis, *parts) if taken.axis else parts
 
 
 def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
@@ -81,40 +81,40 @@ def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
     InputError: the machine is faulty, or has not one of the axes.
     """
     source, base = _base(machine, name, reading)
-    found = Imported(source.data, base, [], [], [])
+    result = Imported(source.data, base, [], [], [])
     before = _faults(source)
-    halved = {(each.axis, _group(each.name.parameter)) for each in reading.refused if each.weight == "doubt"}
+    halved = {(entry.axis, _group(entry.name.parameter)) for entry in reading.refused if entry.weight == "doubt"}
     for group in _groups(reading.taken):
         trial = source.copy()
-        for each in group:
-            _put(trial, each)
+        for item in group:
+            _put(trial, item)
         if (group[0].axis, whole := _group(group[0].parameter)) in halved and whole.startswith(GROUP_PREFIXES):
             reason = "a value that belongs to it was not taken; a half of a filter or of a pulse would be another one"
-            found.refused += [_not(each, reason) for each in group]
+            result.refused += [_not(taken, reason) for taken in group]
             continue
-        if [each.parameter for each in group] in (["travel.0"], ["travel.1"]):
-            found.refused.append(_not(group[0], "a machine file takes both ends of the travel or none"))
+        if [taken.parameter for taken in group] in (["travel.0"], ["travel.1"]):
+            result.refused.append(_not(group[0], "a machine file takes both ends of the travel or none"))
             continue
         new = [fault for fault in _faults(trial) if fault not in before and not _lacking(fault)]
         if new:
             reason = f"a machine file cannot have it: {new[0].partition(': ')[2] or new[0]}"
-            found.refused += [_not(each, reason) for each in group]
+            result.refused += [_not(taken, reason) for taken in group]
             continue
-        for each in group:
-            found.before[place_of(each)] = _at(source.data, place_of(each))
+        for item in group:
+            result.before[place_of(item)] = _at(source.data, place_of(item))
         source = trial
-        found.values += group
+        result.values += group
     source.data["control"] = reading.control
-    found.tree = source.data
+    result.tree = source.data
     faults = _faults(source)
-    found.missing = [fault.partition(": ")[2] for fault in in_order(faults)]
-    if base is not None and found.missing:
+    result.missing = [fault.partition(": ")[2] for fault in in_order(faults)]
+    if base is not None and result.missing:
         raise InputError.of(str(machine), in_order(faults))
-    return found
+    return result
 
 
-def _not(each: Taken, reason: str) -> Refused:
-    return Refused(each.axis, each.name, each.entry.text if each.entry else "", reason, each.where)
+def _not(taken: Taken, reason: str) -> Refused:
+    return Refused(taken.axis, taken.name, taken.entry.text if taken.entry else "", reason, taken.where)
 
 
 def _base(machine: Path | None, name: str, reading: Reading) -> tuple[Source, Machine | None]:
@@ -174,32 +174,32 @@ def _group(parameter: str) -> str:
 
 def _groups(taken: Sequence[Taken]) -> Iterator[list[Taken]]:
     """Values that can only go together: those of a filter, of the pulse, of the reference model, both ends of a way."""
-    found: dict[tuple[str, str], list[Taken]] = {}
-    for each in taken:
-        found.setdefault((each.axis, _group(each.parameter)), []).append(each)
-    yield from found.values()
+    result: dict[tuple[str, str], list[Taken]] = {}
+    for entry in taken:
+        result.setdefault((entry.axis, _group(entry.parameter)), []).append(entry)
+    yield from result.values()
 
 
-def _put(source: Source, each: Taken) -> None:
-    place = place_of(each)
+def _put(source: Source, taken: Taken) -> None:
+    place = place_of(taken)
     data: Any = source.data
     for key, following in pairwise(place):
         if isinstance(data, dict) and not isinstance(data.get(key), dict | list):
             data[key] = ["", ""] if isinstance(following, int) else {}
         data = data[key]
     last = place[-1]
-    data[last] = written(each)
-    if each.value == "off" and last != "type":
+    data[last] = written(taken)
+    if taken.value == "off" and last != "type":
         del data[last]
 
 
-def written(each: Taken) -> Any:
+def written(taken: Taken) -> Any:
     """A value as a machine file has it: with the unit that people write."""
-    value = each.value
+    value = taken.value
     if isinstance(value, bool | str | int):
         return value
-    quantity = _quantity(each.parameter)
-    unit = quantity.unit if quantity is not None else each.name.si
+    quantity = _quantity(taken.parameter)
+    unit = quantity.unit if quantity is not None else taken.name.si
     return f"{value!r} {unit}".removesuffix(" 1") if unit not in ("", "1") else value
 
 
@@ -234,8 +234,8 @@ def _lines(data: Mapping[str, Any], place: Place, remarks: Mapping[Place, str], 
             yield head
             yield from _lines(value, own, remarks, depth + 1)
         elif isinstance(value, list):
-            told = "; ".join(remarks[(*own, k)] for k in range(len(value)) if (*own, k) in remarks)
-            yield _told(f"{head} {_flow(value)}", told)
+            reported = "; ".join(remarks[(*own, k)] for k in range(len(value)) if (*own, k) in remarks)
+            yield _told(f"{head} {_flow(value)}", reported)
         else:
             yield _told(f"{head} {_flow(value)}", remarks.get(own, ""))
 

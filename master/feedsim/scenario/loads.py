@@ -116,10 +116,10 @@ class LoadCourse(Model):
     def _one_source(self) -> Self:
         given = [name for name in ("file", "table", "noise") if getattr(self, name) is not None]
         if len(given) != 1:
-            found = f"{' and '.join(given)} are given" if given else "none is given"
+            text = f"{' and '.join(given)} are given" if given else "none is given"
             raise fault(
                 "a load is in a 'file' with its 'column', in a 'table' of 'time' and 'values', or at random by "
-                f"'noise'; {found}"
+                f"'noise'; {text}"
             )
         if (self.file is None) != (self.column is None):
             raise fault("a 'file' needs the 'column' of the load, and only a file has one")

@@ -108,8 +108,8 @@ _RESOLUTIONS = {"m": "1 nm", "rad/s": "0.001 rad/s", "N.m": "0.01 N.m", "A": "1 
 def _per_signal(name: str, text: str, value: Callable[[str, str], tuple[Any, str]]) -> Any:
     """A group with a key per measured signal; `value`: signal and its unit -> what the key takes, its description."""
     units_of = {name: signal.unit for role in (DRIVE, FRICTION_ROLE) for name, signal in role.signals.items()}
-    found = {signal: value(signal, units_of[signal]) for signal in _MEASURED}
-    fields: Any = {name: (kind | None, Field(default=None, description=said)) for name, (kind, said) in found.items()}
+    result = {signal: value(signal, units_of[signal]) for signal in _MEASURED}
+    fields: Any = {name: (kind | None, Field(default=None, description=said)) for name, (kind, said) in result.items()}
     return create_model(name, __base__=_PerSignal, __module__=__name__, __doc__=text, **fields)
 
 

@@ -191,8 +191,8 @@ class Scenario(Model):
     @model_validator(mode="after")
     def _no_contradictions(self, info: ValidationInfo) -> Self:
         # A file's contradictions are reported by load(), which knows their lines.
-        if not isinstance(info.context, Reading) and (found := [message for _, message in contradictions(self)]):
-            raise fault("; ".join(found))
+        if not isinstance(info.context, Reading) and (result := [message for _, message in contradictions(self)]):
+            raise fault("; ".join(result))
         return self
 
 

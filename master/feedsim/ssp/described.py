@@ -40,11 +40,11 @@ def text(scenario: Scenario) -> str:
             axes[name] |= {role: kept} if kept else {}
     # The parameters of a shipped drive show the others.
     shipped = any(isinstance(axis.drive, Drive) for axis in scenario.machine.axes.values())
-    told = ("interpolation",) if shipped else ("control", "position", "interpolation")
+    reported = ("interpolation",) if shipped else ("control", "position", "interpolation")
     whole["machine"] = {
         "name": machine["name"],
         "note": machine["note"],
-        "cycles": {key: machine["cycles"][key] for key in told},
+        "cycles": {key: machine["cycles"][key] for key in reported},
         "path": machine["path"],
         "axes": axes,
     }
@@ -81,10 +81,10 @@ def plain(value: Any, annotation: Any = None) -> Any:
     options = list(_options(annotation))
     if isinstance(value, Mapping):
         inner = next((get_args(option)[1] for option in options if get_origin(option) is dict), None)
-        return {key: plain(each, inner) for key, each in value.items()}
+        return {key: plain(entry, inner) for key, entry in value.items()}
     if isinstance(value, (tuple, list)):
         inner = next((get_args(option)[0] for option in options if get_origin(option) is tuple), None)
-        return [plain(each, inner) for each in value]
+        return [plain(entry, inner) for entry in value]
     if isinstance(value, float):
         quantity = next((note for option in options for note in _notes(option)), None)
         return f"{value!r} {quantity.unit}" if quantity is not None and quantity.unit != "1" else value

@@ -73,7 +73,7 @@ def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Export
             instances = _instances(scenario.machine, fmus, sources)
         archives = {name: stack.enter_context(Archive(folder / f"{name}.fmu")) for name in content}
         files = _files(scenario, program, archives, instances)
-        platforms = sorted(set.intersection(*(set(each.platforms) for each in archives.values())))
+        platforms = sorted(set.intersection(*(set(entry.platforms) for entry in archives.values())))
     files |= {f"{RESOURCES}/{name}.fmu": data for name, data in content.items()}
     files |= {name: path.read_bytes() for name, path in described.recordings(scenario).items()}
     if (structure := described.structure(scenario)) is not None:
@@ -192,12 +192,14 @@ def _box(instance: str, axes: tuple[str, ...]) -> tuple[float, float, float, flo
         return 0.0, -COMPONENT_HEIGHT, COMPONENT_WIDTH, 0.0
     rows = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}
     kind = instance if instance not in rows else "friction" if instance.startswith("friction") else "controller"
-    left = (COMPONENT_WIDTH + COMPONENT_GAP) * (SETPOINT_INSTANCE, "controller", wiring.PLANT, "friction").index(kind)
+    remaining = (COMPONENT_WIDTH + COMPONENT_GAP) * (SETPOINT_INSTANCE, "controller", wiring.PLANT, "friction").index(
+        kind
+    )
     first, last = (rows[instance],) * 2 if instance in rows else (0, len(axes) - 1)
     return (
-        left,
+        remaining,
         -(COMPONENT_HEIGHT + COMPONENT_GAP) * last - COMPONENT_HEIGHT,
-        left + COMPONENT_WIDTH,
+        remaining + COMPONENT_WIDTH,
         -(COMPONENT_HEIGHT + COMPONENT_GAP) * first,
     )
 
@@ -223,16 +225,16 @@ def _unit_of(unit: Archive, name: str) -> str | None:
 
 def _parameters(unit: Archive, values: Mapping[str, Value], note: str) -> bytes:
     """A parameter set in the order of the unit's variables, with the machine's note: where the numbers come from."""
-    found = tuple(
+    parameters = tuple(
         parameter_set.parameter(name, variable.type, values[name], _unit_of(unit, name))
         for name, variable in unit.variables.items()
         if name in values
     )
-    used = [parameter.unit for parameter in found if parameter.unit]
-    return parameter_set.to_bytes(ParameterSet(found, _definitions([unit], used), note))
+    used = [parameter.unit for parameter in parameters if parameter.unit]
+    return parameter_set.to_bytes(ParameterSet(parameters, _definitions([unit], used), note))
 
 
 def _definitions(archives: Iterable[Archive], used: Iterable[str]) -> dict[str, UnitDefinition]:
     """Definitions of the units that are used, as the archives have them."""
-    known = {name: each for unit in archives for name, each in unit.unit_definitions.items()}
+    known = {name: unit_definition for unit in archives for name, unit_definition in unit.unit_definitions.items()}
     return {name: known.get(name, UnitDefinition({})) for name in dict.fromkeys(used)}

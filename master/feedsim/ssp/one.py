@@ -60,16 +60,16 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
     )
 
 
-def coupling(found: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> dict[str, Any] | None:
+def coupling(result: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> dict[str, Any] | None:
     """How the unit's parts are exchanged, as a scenario has it; None where the parts are components of their own.
 
     Raises:
         InputError: a parameter of the unit is at what feedsim cannot run.
     """
-    if found.setpoint != found.plant:
+    if result.setpoint != result.plant:
         return None
-    given = values[found.plant]
-    problems = [f"{where}: {found.plant}.{name} is {str(given.get(name)).lower()}; true is needed: {why}"
+    given = values[result.plant]
+    problems = [f"{where}: {result.plant}.{name} is {str(given.get(name)).lower()}; true is needed: {why}"
                 for name, why in NEEDED.items() if given.get(name) is not True]  # fmt: skip
     if problems:
         raise InputError.of(where, problems)
@@ -78,13 +78,13 @@ def coupling(found: Roles, values: Mapping[str, Mapping[str, Value]], where: str
 
 
 def split(
-    found: Roles, archives: Mapping[str, Archive], values: Mapping[str, Mapping[str, Value]]
+    result: Roles, archives: Mapping[str, Archive], values: Mapping[str, Mapping[str, Value]]
 ) -> tuple[dict[str, Archive], dict[str, dict[str, Value]]]:
     """Archives and values by part, with the names that units of their own have."""
-    archive, given = archives[found.plant], values[found.plant]
-    parts, by_part = {found.plant: archive}, {found.plant: dict(given)}
-    for name in (*found.drives.values(), *found.frictions.values()):
-        prefix = f"{name.removeprefix(f'{found.plant}.')}."
+    archive, given = archives[result.plant], values[result.plant]
+    parts, by_part = {result.plant: archive}, {result.plant: dict(given)}
+    for name in (*result.drives.values(), *result.frictions.values()):
+        prefix = f"{name.removeprefix(f'{result.plant}.')}."
         parts[name] = archive.part(prefix)
         by_part[name] = {key.removeprefix(prefix): value for key, value in given.items() if key.startswith(prefix)}
     return parts, by_part

@@ -61,10 +61,10 @@ class Opened:
 
     def named(self, text: str) -> str:
         """A text that speaks of the file's parts by their names in it."""
-        found = text
+        result = text
         for place, source in self.sources.items():
-            found = found.replace(str(self.fmus / place), f"{self.path}: {source}")
-        return type(text)(_named(found, self.path, self.fmus))  # what is wrong stays so
+            result = result.replace(str(self.fmus / place), f"{self.path}: {source}")
+        return type(text)(_named(result, self.path, self.fmus))  # what is wrong stays so
 
 
 @contextmanager
@@ -83,28 +83,28 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
     ):
         structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
         archives = _archives(structure, files, folder, path, stack)
-        found = one.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
-        table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")
-        given = values(structure, files, archives, found.foreign, str(path))
-        coupling = one.coupling(found, given, str(path))
+        result = one.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
+        table = _table(archives[result.setpoint], f"{path}: {result.setpoint}")
+        given = values(structure, files, archives, result.foreign, str(path))
+        coupling = one.coupling(result, given, str(path))
         if coupling is not None:
-            archives, given = one.split(found, archives, given)
-        if problems := rebuilt.lacking(found, given, str(path)):
+            archives, given = one.split(result, archives, given)
+        if problems := rebuilt.lacking(result, given, str(path)):
             raise InputError.of(str(path), problems)
         own = rebuilt.annotation(structure.scenario, files, str(path))
-        T_c, T_pos, guessed = rebuilt.cycles(found, archives, given, table, own, structure.step, str(path))
-        parts = Parts(found, archives, given, table, T_c, T_pos, coupling)
+        T_c, T_pos, guessed = rebuilt.cycles(result, archives, given, table, own, structure.step, str(path))
+        parts = Parts(result, archives, given, table, T_c, T_pos, coupling)
         if problems := rebuilt.faults(parts, str(path)):
             raise InputError.of(str(path), problems)
         _lay_out(folder, files, parts, own, path)
         program = _sampled(parts, structure, path)
         with closed(folder), _own_names(path, folder):
             scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
-            told = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
+            reported = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
             if guessed:
                 cycle = units.show(T_c, "s")
-                told += (f"{path.name}: no drive gives its control cycle; it is {cycle}, {guessed}",)
-            yield Opened(scenario, program, path, folder, told, _sources(structure, parts, folder))
+                reported += (f"{path.name}: no drive gives its control cycle; it is {cycle}, {guessed}",)
+            yield Opened(scenario, program, path, folder, reported, _sources(structure, parts, folder))
 
 
 def _archives(
@@ -166,8 +166,8 @@ def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str,
 def _sources(structure: Structure, parts: Parts, folder: Path) -> dict[str, str]:
     places = parts.places
     return {
-        places.get(each.name, str(parts.archives[each.name].path.relative_to(folder))): each.source
-        for each in structure.components
+        places.get(component.name, str(parts.archives[component.name].path.relative_to(folder))): component.source
+        for component in structure.components
     }
 
 

@@ -72,7 +72,7 @@ def read(content: bytes, where: str) -> ParameterSet:
 def from_element(root: xml.Element, where: str) -> ParameterSet:
     """A set that stands inside another document."""
     problems: list[str] = []
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     kinds = {xml.tag(f"ssv:{kind}") for kind in TYPES}
     for entry in root.findall(f"{xml.tag('ssv:Parameters')}/{xml.tag('ssv:Parameter')}"):
         name = entry.get("name", "")
@@ -82,17 +82,17 @@ def from_element(root: xml.Element, where: str) -> ParameterSet:
                 f"{where}: parameter {name or '(without a name)'}: one value of {', '.join(TYPES)} is needed"
             )
             continue
-        if name in found:
+        if name in parameters:
             problems.append(f"{where}: parameter {name} is there twice")
         kind = xml.shown(values[0].tag).partition(":")[2]
-        found[name] = Parameter(name, kind, values[0].get("value", ""), values[0].get("unit"))
+        parameters[name] = Parameter(name, kind, values[0].get("value", ""), values[0].get("unit"))
     if problems:
         more = len(problems) - MOST_PROBLEMS
         raise InputError.of(
             where, problems if more <= 0 else [*problems[:MOST_PROBLEMS], f"{where}: {more} more problems"]
         )
     return ParameterSet(
-        tuple(found.values()), read_units(root.find(xml.tag("ssv:Units")), where), root.get("description", "")
+        tuple(parameters.values()), read_units(root.find(xml.tag("ssv:Units")), where), root.get("description", "")
     )
 
 
@@ -109,15 +109,15 @@ def value(
     """
     text = parameter.text.strip()
     if kind == "Real" and parameter.kind in ("Real", "Integer"):
-        found = number(text)
+        result = number(text)
         if parameter.unit in (None, "", unit):
-            return found
-        return _converted(text, found, str(parameter.unit), unit, definitions)
+            return result
+        return _converted(text, result, str(parameter.unit), unit, definitions)
     if kind == "Integer" and parameter.kind in ("Integer", "Enumeration", "Real"):
-        found = number(text)
-        if found != int(found):
+        result = number(text)
+        if result != int(result):
             raise InputError(f"{text} is no whole number")
-        return int(found)
+        return int(result)
     if kind == "Boolean" and text in ("true", "false", "1", "0") and parameter.kind in ("Boolean", "Integer"):
         return text in ("true", "1")
     if kind == "String" and parameter.kind == "String":
@@ -132,10 +132,10 @@ def number(text: str) -> float:
         raise InputError(f"{shown} has {len(text)} characters; a number has at most {units.LONGEST_NUMBER}")
     if not _XML_NUMBER.fullmatch(text):
         raise InputError(f"{shown!r} is no number")
-    found = float(text)
-    if not isfinite(found):
+    result = float(text)
+    if not isfinite(result):
         raise InputError(f"{shown} is no number to calculate with")
-    return found
+    return result
 
 
 def _converted(

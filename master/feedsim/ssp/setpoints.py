@@ -44,8 +44,8 @@ class Table:
         rounding = np.maximum(1e-9 * np.abs(time), max(2e-9, 2 * UNEVEN * self.cycle))
         slack = np.maximum(ulps, np.minimum(rounding, 0.01 * min(step, self.cycle)))
         rows = np.floor((time - self.time[0] + slack) / self.cycle).astype(np.int64)
-        held: NDArray[np.int64] = np.clip(rows, 0, len(self.time) - 1)
-        return held
+        fixed: NDArray[np.int64] = np.clip(rows, 0, len(self.time) - 1)
+        return fixed
 
 
 def pack_setpoints(base: Path, out: Path, program: Program, *, name: str, note: str) -> None:
@@ -94,8 +94,8 @@ def segments(planned: Program, program: Program) -> tuple[Segment, ...]:
     kept = [segment for segment in planned.segments if segment.start < end - slack]
     if kept and kept[-1].end > end + slack:
         reached = {axis: float(x_s[-1]) for axis, x_s in program.x_s.items()}
-        told = f"{kept[-1].description}, cut at the stop time"
-        kept[-1] = replace(kept[-1], end=end, description=told, target=reached, geometry=None)
+        reported = f"{kept[-1].description}, cut at the stop time"
+        kept[-1] = replace(kept[-1], end=end, description=reported, target=reached, geometry=None)
     return tuple(kept)
 
 
@@ -116,10 +116,10 @@ def _needed(item: Positioning | CircleTest | PositioningAccuracy, planned: Progr
     """Until when the motions must run for an evaluation [s]; None where they have nothing for it."""
     chosen = planned.segments if item.motion is None else planned.segments[item.motion : item.motion + 1]
     if isinstance(item, Positioning):
-        moved = [each.end for each in chosen if each.origin[item.axis] != each.target[item.axis]]
+        moved = [segment.end for segment in chosen if segment.origin[item.axis] != segment.target[item.axis]]
         return min(moved[-1] + EVALUATED_REST, planned.duration) if moved else None
     if isinstance(item, PositioningAccuracy):
-        cycles = [each.end for each in chosen if isinstance(each.geometry, Visits)]
+        cycles = [segment.end for segment in chosen if isinstance(segment.geometry, Visits)]
         return min(cycles[-1], planned.duration) if cycles else None
-    circles = [each.end for each in chosen if isinstance(each.geometry, Circular | Recorded)]
+    circles = [segment.end for segment in chosen if isinstance(segment.geometry, Circular | Recorded)]
     return min(circles[-1], planned.duration) if circles else None

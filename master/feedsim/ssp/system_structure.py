@@ -98,8 +98,8 @@ def to_bytes(structure: Structure) -> bytes:
     if structure.step is not None:
         place = xml.child(xml.child(system, "ssd:Annotations"), "ssc:Annotation", {"type": MASTER})
         master = xml.child(xml.child(place, "oms:Annotations"), "oms:SimulationInformation")
-        told = {"description": "oms-ma", "stepSize": repr(structure.step), "relativeTolerance": "0.0001"}
-        xml.child(master, "oms:FixedStepMaster", told)  # the tolerance is for masters whose step varies
+        reported = {"description": "oms-ma", "stepSize": repr(structure.step), "relativeTolerance": "0.0001"}
+        xml.child(master, "oms:FixedStepMaster", reported)  # the tolerance is for masters whose step varies
     append_units(root, "ssd:Units", structure.units)
     experiment = xml.child(root, "ssd:DefaultExperiment", {"startTime": repr(structure.start)})
     if structure.stop is not None:
@@ -186,7 +186,7 @@ def _component(entry: xml.Element, where: str, problems: list[str]) -> Component
         problems.append(f"{where}: component {name} is {kind}, no FMU")
     connectors = []
     for place in entry.findall(f"{xml.tag('ssd:Connectors')}/{xml.tag('ssd:Connector')}"):
-        typed = next((each for each in place if each.tag.startswith(f"{{{xml.SSC}}}")), None)
+        typed = next((element for element in place if element.tag.startswith(f"{{{xml.SSC}}}")), None)
         type_ = "Real" if typed is None else xml.shown(typed.tag).partition(":")[2]
         unit = None if typed is None else typed.get("unit")
         connectors.append(Connector(place.get("name", ""), place.get("kind", ""), type_, unit))
@@ -196,30 +196,30 @@ def _component(entry: xml.Element, where: str, problems: list[str]) -> Component
 
 
 def _bindings(entry: xml.Element, owner: str, where: str, problems: list[str]) -> tuple[Binding, ...]:
-    found: list[Binding] = []
-    for each in entry.findall(f"{xml.tag('ssd:ParameterBindings')}/{xml.tag('ssd:ParameterBinding')}"):
-        source, prefix = each.get("source"), each.get("prefix", "")
-        if each.find(xml.tag("ssd:ParameterMapping")) is not None:
+    bindings: list[Binding] = []
+    for element in entry.findall(f"{xml.tag('ssd:ParameterBindings')}/{xml.tag('ssd:ParameterBinding')}"):
+        source, prefix = element.get("source"), element.get("prefix", "")
+        if element.find(xml.tag("ssd:ParameterMapping")) is not None:
             problems.append(f"{where}: {owner}: a parameter mapping is not read; name the parameters as the FMU does")
-        if each.get("sourceBase", "SSD") != "SSD":
+        if element.get("sourceBase", "SSD") != "SSD":
             problems.append(f"{where}: {owner}: parameters inside the FMU ({source}) are not read")
         if source:
-            found.append(Binding(source=source, prefix=prefix))
+            bindings.append(Binding(source=source, prefix=prefix))
             continue
-        for inline in each.findall(f"{xml.tag('ssd:ParameterValues')}/{xml.tag('ssv:ParameterSet')}"):
+        for inline in element.findall(f"{xml.tag('ssd:ParameterValues')}/{xml.tag('ssv:ParameterSet')}"):
             try:
-                found.append(Binding(inline=from_element(inline, f"{where}: {owner}"), prefix=prefix))
+                bindings.append(Binding(inline=from_element(inline, f"{where}: {owner}"), prefix=prefix))
             except InputError as error:
                 problems += error.problems
-    return tuple(found)
+    return tuple(bindings)
 
 
 def _link(entry: xml.Element) -> Link:
     transformed = False
-    for each in entry:
-        if each.tag == xml.tag("ssc:LinearTransformation"):
-            transformed |= (each.get("factor", "1"), each.get("offset", "0")) not in _IDENTITY
-        elif each.tag.endswith("Transformation"):
+    for element in entry:
+        if element.tag == xml.tag("ssc:LinearTransformation"):
+            transformed |= (element.get("factor", "1"), element.get("offset", "0")) not in _IDENTITY
+        elif element.tag.endswith("Transformation"):
             transformed = True
     start, end = (
         (entry.get(f"{which}Element") or "", entry.get(f"{which}Connector", "")) for which in ("start", "end")

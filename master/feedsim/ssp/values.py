@@ -51,10 +51,10 @@ def values(
     """
     problems: list[str] = []
     parameters = {
-        component: [name for name, each in archive.variables.items() if each.causality == "parameter"]
+        component: [name for name, variable in archive.variables.items() if variable.causality == "parameter"]
         for component, archive in archives.items()
     }
-    found: dict[str, dict[str, Value]] = {
+    result: dict[str, dict[str, Value]] = {
         component: {} if component in foreign else {name: start_value(archives[component], name) for name in names}
         for component, names in parameters.items()
     }
@@ -73,15 +73,15 @@ def values(
             problems.append(f"{said.place}: {name}: {what} of {component}{hint}")
         else:
             try:
-                found[component][name] = said.value(archive, structure)
+                result[component][name] = said.value(archive, structure)
             except InputError as error:
                 problems.append(f"{said.place}: {name}: {error}")
-    problems += _held_inputs(inputs, structure, archives, found, foreign)
+    problems += _held_inputs(inputs, structure, archives, result, foreign)
     if len(problems) > parameter_set.MOST_PROBLEMS:
         problems[parameter_set.MOST_PROBLEMS :] = [f"{where}: and more like these; the first are listed"]
     if problems:
         raise InputError.of(where, problems)
-    return found
+    return result
 
 
 def start_value(archive: Archive, name: str) -> Value:
@@ -103,7 +103,7 @@ def _all_said(
     for place, given, prefix in _sets(structure.bindings, files, where, problems):
         for parameter in given.parameters:
             name = prefix + parameter.name
-            owner = next((each for each in archives if name.startswith(f"{each}.")), None)
+            owner = next((archive for archive in archives if name.startswith(f"{archive}.")), None)
             if owner is None:
                 problems.append(f"{place}: {name}: is no parameter of a component")
             else:
@@ -113,26 +113,26 @@ def _all_said(
 def _sets(
     bindings: tuple[Binding, ...], files: Mapping[str, bytes], where: str, problems: list[str]
 ) -> list[tuple[str, ParameterSet, str]]:
-    found = []
+    result = []
     for binding in bindings:
         if binding.inline is not None:
-            found.append((where, binding.inline, binding.prefix))
+            result.append((where, binding.inline, binding.prefix))
             continue
         place = f"{where}: {binding.source}"
         try:
-            found.append((place, parameter_set.read(files[str(binding.source)], place), binding.prefix))
+            result.append((place, parameter_set.read(files[str(binding.source)], place), binding.prefix))
         except KeyError:
             problems.append(f"{place}: is named by a parameter binding, but not in the file")
         except InputError as error:
             problems += error.problems
-    return found
+    return result
 
 
 def _held_inputs(
     inputs: Mapping[tuple[str, str], _Said],
     structure: Structure,
     archives: Mapping[str, Archive],
-    found: dict[str, dict[str, Value]],
+    result: dict[str, dict[str, Value]],
     foreign: Container[str],
 ) -> list[str]:
     """Inputs without a connection that a set wants at another value than the archive's start value.
@@ -149,7 +149,7 @@ def _held_inputs(
         try:
             asked_for = said.value(archive, structure)
             if component in foreign:
-                found[component][name] = asked_for
+                result[component][name] = asked_for
                 continue
             start = start_value(archive, name)
         except InputError as error:

@@ -80,7 +80,7 @@ def append_units(parent: Element, name: str, definitions: Mapping[str, UnitDefin
 
 def read_units(group: Element | None, where: str) -> dict[str, UnitDefinition]:
     """Definitions of a Units element. InputError: a factor or an exponent that is no number."""
-    found: dict[str, UnitDefinition] = {}
+    unit_definitions: dict[str, UnitDefinition] = {}
     for entry in () if group is None else group.findall(tag("ssc:Unit")):
         base = entry.find(tag("ssc:BaseUnit"))
         if base is None:
@@ -92,5 +92,5 @@ def read_units(group: Element | None, where: str) -> dict[str, UnitDefinition]:
             raise InputError(f"{where}: unit {entry.get('name')}: its definition holds no number") from None
         if not (isfinite(factor) and isfinite(offset) and factor):
             raise InputError(f"{where}: unit {entry.get('name')}: factor {factor!r}, offset {offset!r}; not allowed")
-        found[entry.get("name", "")] = UnitDefinition(exponents, factor, offset)
-    return found
+        unit_definitions[entry.get("name", "")] = UnitDefinition(exponents, factor, offset)
+    return unit_definitions

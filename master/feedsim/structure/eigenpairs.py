@@ -138,10 +138,10 @@ def _counted(
             break
         more = _run(assembly, factor, shift, wanted, shapes, say)
         values, shapes = _ritz(assembly, factor, np.hstack([shapes, more]))
-    found = int(np.count_nonzero(values < border))
-    if found != below:
+    count = int(np.count_nonzero(values < border))
+    if count != below:
         raise FeedsimError(
-            f"{assembly.name}: {found} modes found below {math.sqrt(border) / (2 * math.pi):.6g} Hz, where a Sturm "
+            f"{assembly.name}: {count} modes found below {math.sqrt(border) / (2 * math.pi):.6g} Hz, where a Sturm "
             f"sequence counts {below}; a cut-off further from the next mode may help"
         )
     return values, shapes
@@ -165,14 +165,14 @@ def _run(assembly: Assembly, factor: Factor, shift: float, wanted: int, known: F
     """(N, wanted) approximate shapes of the lowest modes beside the known ones (mass-normalised columns)."""
     size = assembly.mass.shape[0]
     mass_known = assembly.mass @ known
-    solves, began, told = 0, time.monotonic(), time.monotonic()
+    solves, began, reported = 0, time.monotonic(), time.monotonic()
 
     def solve(right: Floats) -> Floats:
-        nonlocal solves, told
+        nonlocal solves, reported
         solves += 1
-        if time.monotonic() - told > SECONDS_BETWEEN_MESSAGES:
-            told = time.monotonic()
-            say(f"Lanczos: {solves} solutions in {told - began:.0f} s, for {wanted} modes")
+        if time.monotonic() - reported > SECONDS_BETWEEN_MESSAGES:
+            reported = time.monotonic()
+            say(f"Lanczos: {solves} solutions in {reported - began:.0f} s, for {wanted} modes")
         solution = factor.solve(np.ravel(right))
         return np.asarray(solution - known @ (mass_known.T @ solution))
 

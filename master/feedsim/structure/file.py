@@ -15,8 +15,8 @@ CODE = (Path(__file__).parent, Path(__file__).parents[1] / "scenario" / "structu
 
 def state_of(file: Path) -> State:
     """Time of the last change [ns], length [byte] and number of a file. Raises OSError."""
-    found = file.stat()
-    return found.st_mtime_ns, found.st_size, found.st_ino
+    result = file.stat()
+    return result.st_mtime_ns, result.st_size, result.st_ino
 
 
 @lru_cache(maxsize=8)

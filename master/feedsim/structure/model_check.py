@@ -221,7 +221,7 @@ def _part_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
     order = np.argsort(part, kind="stable")
     starts = np.concatenate([[0], np.cumsum(sizes)])
     free = _free_single(assembly, part, sizes)
-    faults, held = [], []
+    faults, fixed = [], []
     unknown = [p for p in range(count) if p != main and p not in free]
     for p in unknown:
         free[p] = _rigid_modes(assembly, order[starts[p] : starts[p + 1]])
@@ -233,8 +233,8 @@ def _part_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
         if free[p] > len(axes):
             faults.append((p, members, axes))
         elif free[p] == 0:
-            held.append(members)
-    return _flying(assembly, faults, free, sizes, main, count), _held(assembly, held, int(sizes[main]))
+            fixed.append(members)
+    return _flying(assembly, faults, free, sizes, main, count), _held(assembly, fixed, int(sizes[main]))
 
 
 def _flying(

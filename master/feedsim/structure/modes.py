@@ -201,7 +201,7 @@ def joined(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) 
     size = N + len(axes)
     n = [np.concatenate([modes.ports[f"n_{axis}"], np.zeros(len(axes))]) for axis in axes]
     M = np.eye(size)
-    K, D = (np.diag(np.concatenate([each, np.zeros(len(axes))])) for each in (omega**2, 2 * modes.damping * omega))
+    K, D = (np.diag(np.concatenate([values, np.zeros(len(axes))])) for values in (omega**2, 2 * modes.damping * omega))
     for i, (axis, c, d, J) in enumerate(contacts):
         motor = np.zeros(size)
         motor[N + i] = 1.0
@@ -215,13 +215,13 @@ def joined(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) 
             )
     squares, shapes = eigh(K, M)
     slow = int(np.count_nonzero(modes.rigid))
-    found = np.sqrt(np.maximum(squares, 0.0))
-    found[:slow] = 0.0
+    result = np.sqrt(np.maximum(squares, 0.0))
+    result[:slow] = 0.0
     damping = np.zeros(size)
-    damping[slow:] = np.einsum("im,ij,jm->m", shapes, D, shapes)[slow:] / (2 * found[slow:])
+    damping[slow:] = np.einsum("im,ij,jm->m", shapes, D, shapes)[slow:] / (2 * result[slow:])
     ports = {name: shape @ shapes[:N] for name, shape in modes.ports.items()}
     ports |= {f"n_{axis}": shapes[N + i] for i, axis in enumerate(axes)}
-    return Modes(modes.file, found / (2 * np.pi), damping, ports)
+    return Modes(modes.file, result / (2 * np.pi), damping, ports)
 
 
 def checked_modes(machine: Machine) -> Modes:
@@ -248,7 +248,7 @@ def checked_modes(machine: Machine) -> Modes:
 def with_transmissions(machine: Machine, modes: Modes) -> Modes:
     """Modes of the structure with the contacts that join the machine's motors to it; `modes` itself without any."""
     contacts = tuple(
-        (name, each.stiffness * axis.I_P**2, each.damping * axis.I_P**2, each.inertia)
-        for name, axis in machine.axes.items() if (each := axis.transmission) is not None and each.stiffness > 0
+        (name, entry.stiffness * axis.I_P**2, entry.damping * axis.I_P**2, entry.inertia)
+        for name, axis in machine.axes.items() if (entry := axis.transmission) is not None and entry.stiffness > 0
     )  # fmt: skip
     return joined(modes, contacts) if contacts else modes

@@ -180,7 +180,7 @@ def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesO
     except (OSError, FeedsimError):
         return None
     moving = tuple(str(solution.moving[mode]) for mode in own.tolist())
-    return ModesOverAxis(frequency[own], moving, tuple(positions), np.array([each.frequency[own] for each in there]))
+    return ModesOverAxis(frequency[own], moving, tuple(positions), np.array([end.frequency[own] for end in there]))
 
 
 def warnings(change: PoseChange) -> tuple[str, ...]:
@@ -231,7 +231,7 @@ def _kept_between(
         if axis not in _assembler(pose).structure.axes:
             return [[], []]
         modes, compliances = _between(pose, axis, low, high)
-        return [[astuple(mode) for mode in modes], [astuple(each) for each in compliances]]
+        return [[astuple(mode) for mode in modes], [astuple(compliance) for compliance in compliances]]
 
     follows_from = [digest_of(pose.structure, pose.state), pose.axes, axis, low, high]
     modes, compliances = cached("modes-over-pose", follows_from, CODE, find)

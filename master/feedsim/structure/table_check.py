@@ -36,7 +36,7 @@ def table_mismatch(machine: Machine) -> str | None:
         return stale(read_modes(machine.modes, list(machine.axes)), built, SAME_FREQUENCY) if built else ""
 
     try:
-        files = [digest_of(each, state_of(each)) for each in (structure, machine.modes)]
+        files = [digest_of(path, state_of(path)) for path in (structure, machine.modes)]
         how = cached("table-of-modes", [files, [*machine.pose.items()], [*machine.axes]], CODE, find)
     except (OSError, FeedsimError):
         return None

@@ -87,14 +87,14 @@ class Bundle:
     @cached_property
     def digest(self) -> str:
         """What it is known by."""
-        found = hashlib.sha256()
+        result = hashlib.sha256()
         parts = [("base", self.base.encode()), *self.files.items(), *self.fmus.items()]
         if self.native is not None:
             parts.append((self.native[1], self.native[0]))
         for name, content in parts:
-            found.update(f"{len(name)} {name} {len(content)}\n".encode())
-            found.update(content)
-        return found.hexdigest()
+            result.update(f"{len(name)} {name} {len(content)}\n".encode())
+            result.update(content)
+        return result.hexdigest()
 
     def open(self, within: Path | None = None) -> Workplace:
         """Lay it out in a folder of its own in `within`, None: where the system keeps what is temporary."""
@@ -155,15 +155,15 @@ class Workplace:
         except Exception as error:
             said = str(error) if isinstance(error, FeedsimError) else f"{type(error).__name__}: {error}"
             return Outcome(task.run, None, self._as_named(said), time.perf_counter() - begun)
-        told = tuple(self._as_named(WRONG * (severity(each) == "wrong") + each) for each in ranked(warnings))
-        return Outcome(task.run, figures, None, time.perf_counter() - begun, told)
+        reported = tuple(self._as_named(WRONG * (severity(name) == "wrong") + name) for name in ranked(warnings))
+        return Outcome(task.run, figures, None, time.perf_counter() - begun, reported)
 
     def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[str]]:
         scenario = self._base.with_changes(task.changes)
         program = self._program(scenario)
         result = judged(cosim.run(scenario, program=program, fmus=self._fmus), keep=False)
-        found = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
-        return found, result.warnings
+        results = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
+        return results, result.warnings
 
     def _program(self, scenario: Scenario) -> Program:
         """The motion; that of the last run serves again while nothing that it depends on is another."""

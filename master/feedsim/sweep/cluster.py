@@ -122,8 +122,8 @@ def remote(address: str, say: Callable[[str], None] | None = None) -> Iterator[A
 
 def _check_address(address: str) -> None:
     """Dask takes half a minute to find out that there is no port, and then reports it."""
-    found = re.fullmatch(r"(?:[a-z][a-z0-9+]*://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d+)/?", address)
-    if found is None or not 0 < int(found[1]) < 1 << 16:
+    match = re.fullmatch(r"(?:[a-z][a-z0-9+]*://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d+)/?", address)
+    if match is None or not 0 < int(match[1]) < 1 << 16:
         raise InputError(f"{address!r} is no address of a scheduler; an address reads tcp://host:8786, with its port")
 
 

@@ -167,13 +167,13 @@ def _grid(parameters: tuple[Parameter, ...]) -> Array:
 
 
 def _steps(parameter: Parameter) -> Array:
-    found = parameter.distribution
-    if found is None:
+    result = parameter.distribution
+    if result is None:
         return _numbers(parameter, np.arange(len(parameter.choices)))
-    low, high = found.support
-    assert found.count is not None
-    even = np.geomspace if found.kind == "loguniform" else np.linspace
-    return np.asarray(even(low, high, found.count), dtype=np.float64)
+    low, high = result.support
+    assert result.count is not None
+    even = np.geomspace if result.kind == "loguniform" else np.linspace
+    return np.asarray(even(low, high, result.count), dtype=np.float64)
 
 
 def _values(parameters: tuple[Parameter, ...], shares: Array) -> Array:
@@ -183,42 +183,42 @@ def _values(parameters: tuple[Parameter, ...], shares: Array) -> Array:
 
 
 def _column(parameter: Parameter, shares: Array) -> Array:
-    found = parameter.distribution
-    if found is None:
+    result = parameter.distribution
+    if result is None:
         entries = len(parameter.choices)
         return _numbers(parameter, np.minimum((shares * entries).astype(np.int64), entries - 1))
     if parameter.whole:
-        low, high = found.support
+        low, high = result.support
         return np.minimum(low + np.floor(shares * (high - low + 1)), high)
-    return quantile(found, shares)
+    return quantile(result, shares)
 
 
-def quantile(found: Distribution, shares: Array) -> Array:
+def quantile(distribution: Distribution, shares: Array) -> Array:
     """The values below which the given shares of a distribution lie."""
     shares = np.clip(shares, LEAST_SHARE, 1 - LEAST_SHARE)
-    values = np.asarray(frozen(found).ppf(shares), dtype=np.float64)
-    low, high = found.support
+    values = np.asarray(frozen(distribution).ppf(shares), dtype=np.float64)
+    low, high = distribution.support
     return np.clip(values, low, high)  # rounding must not lead over a limit
 
 
-def frozen(found: Distribution) -> Any:
+def frozen(distribution: Distribution) -> Any:
     """The distribution as scipy has it, cut where it is cut."""
     from scipy import stats
 
-    low, high = found.support
-    if found.kind == "uniform":
+    low, high = distribution.support
+    if distribution.kind == "uniform":
         return stats.uniform(low, high - low)
-    if found.kind == "loguniform":
+    if distribution.kind == "loguniform":
         return stats.loguniform(low, high)
-    if found.kind == "triangular":
-        mode = (low + high) / 2 if found.mode is None else found.mode
+    if distribution.kind == "triangular":
+        mode = (low + high) / 2 if distribution.mode is None else distribution.mode
         return stats.triang((mode - low) / (high - low), low, high - low)
-    assert found.mean is not None
-    assert found.deviation is not None
-    if found.kind == "normal":
-        mean, deviation = found.mean, found.deviation
+    assert distribution.mean is not None
+    assert distribution.deviation is not None
+    if distribution.kind == "normal":
+        mean, deviation = distribution.mean, distribution.deviation
         return stats.truncnorm((low - mean) / deviation, (high - mean) / deviation, mean, deviation)
-    return _Lognormal(found.mean, found.deviation, low, high)
+    return _Lognormal(distribution.mean, distribution.deviation, low, high)
 
 
 class _Lognormal:

@@ -141,7 +141,7 @@ class Crowd:
         self.own = own  # a cluster of our own goes as a whole; another's has to be tidied
         self.where = where
         answers = client.run(eval, provenance.QUESTION, on_error="return")
-        faults = [found for address, answer in answers.items() if (found := provenance.fault(address, answer))]
+        faults = [text for address, answer in answers.items() if (text := provenance.fault(address, answer))]
         if faults:
             raise InputError.of("the workers cannot be used", faults)
         self.workers = len(answers)
@@ -217,13 +217,13 @@ class _Flight:
 
     def landed(self) -> list[Outcome]:
         """Outcomes that have come back and were not fetched yet."""
-        found: list[Outcome] = []
+        outcomes: list[Outcome] = []
         with suppress(queue.Empty, InputError, SimulationError):  # what has called for them is to be raised
             for _ in range(self._landed.qsize()):  # one that does not arrive comes again
                 future = self._landed.get_nowait()
                 if future.status == "finished":
-                    found += self._outcomes(future)
-        return found
+                    outcomes += self._outcomes(future)
+        return outcomes
 
     def cancel(self) -> None:
         futures = [sent.future for sent in self._of.values()]

@@ -56,13 +56,13 @@ def failures(table: Table, design: Design) -> tuple[Failure, ...]:
     groups: dict[str, list[int]] = {}
     for row in np.flatnonzero(~table.ok):
         groups.setdefault(shape(messages[row]), []).append(int(row))
-    found = []
+    result = []
     for rows in sorted(groups.values(), key=lambda rows: (-len(rows), rows[0])):
         here = np.zeros(len(runs), dtype=bool)
         here[rows] = True
         numbers = tuple(int(run) for run in runs[rows])
-        found.append(Failure(messages[rows[0]], numbers, _where(design, runs, here, table.ok)))
-    return tuple(found)
+        result.append(Failure(messages[rows[0]], numbers, _where(design, runs, here, table.ok)))
+    return tuple(result)
 
 
 def shape(message: str) -> str:
@@ -72,18 +72,18 @@ def shape(message: str) -> str:
 
 def kinds(messages: Iterable[str]) -> dict[str, tuple[str, int]]:
     """Messages that differ in numbers only as one: its first example and how often it comes."""
-    found: dict[str, tuple[str, int]] = {}
+    result: dict[str, tuple[str, int]] = {}
     for text in messages:
-        first, count = found.get(shape(text), (text, 0))
-        found[shape(text)] = first, count + 1
-    return found
+        first, count = result.get(shape(text), (text, 0))
+        result[shape(text)] = first, count + 1
+    return result
 
 
 def levels(values: Array, *, worded: bool = False) -> Array:
     """Distinct values of a parameter where they are few and come back, or where they are words; else none."""
-    found = np.unique(values)
-    few = len(found) <= FEW_LEVELS and 2 * len(found) <= len(values)
-    return found if worded or few else found[:0]
+    result = np.unique(values)
+    few = len(result) <= FEW_LEVELS and 2 * len(result) <= len(values)
+    return result if worded or few else result[:0]
 
 
 def _where(design: Design, runs: NDArray[np.int64], here: Rows, ok: Rows) -> tuple[Where, ...]:
@@ -93,18 +93,18 @@ def _where(design: Design, runs: NDArray[np.int64], here: Rows, ok: Rows) -> tup
     number of parameters and tests.
     """
     drawn = np.isin(runs, design.independent)
-    told: list[tuple[float, str, Where]] = []
+    reported: list[tuple[float, str, Where]] = []
     for place, parameter in enumerate(design.parameters):
         values = design.values[runs, place]
         if parameter.worded or len(levels(values)):
             chance = _level_chance(values[drawn], here[drawn], ok[drawn])
-            found = _at_levels(place, values, here)
+            where = _at_levels(place, values, here)
         else:
             chance = _chance(values, here, ok)
-            found = _in_range(place, values, here, ok)
+            where = _in_range(place, values, here, ok)
         if chance <= LEVEL / len(design.parameters):
-            told.append((chance, parameter.name, found))
-    return tuple(each for *_, each in sorted(told, key=lambda entry: entry[:2]))
+            reported.append((chance, parameter.name, where))
+    return tuple(value for *_, value in sorted(reported, key=lambda entry: entry[:2]))
 
 
 def _at_levels(place: int, values: Array, here: Rows) -> Where:
@@ -131,13 +131,13 @@ def _chance(values: Array, here: Rows, ok: Rows) -> float:
     if m < 2 or m == n:
         return 1.0
     low, high = int((passed < failed[0]).sum()), int((passed > failed[-1]).sum())
-    found = (
+    result = (
         span_chance(m, n, n - low - high),
         end_chance(m, n, low),
         end_chance(m, n, high),
         float(mannwhitneyu(failed, passed).pvalue),
     )
-    return NUMBERS * min(found)
+    return NUMBERS * min(result)
 
 
 def span_chance(m: int, n: int, span: int) -> float:

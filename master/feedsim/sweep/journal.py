@@ -197,20 +197,20 @@ def read(path: Path, runs: int) -> Iterator[Outcome]:
                 yield outcome
 
 
-def _same_study(path: Path, found: Any, head: Mapping[str, Any]) -> None:
-    if not isinstance(found, dict) or found.get("format") != FORMAT or not isinstance(found.get("parts"), dict):
+def _same_study(path: Path, result: Any, head: Mapping[str, Any]) -> None:
+    if not isinstance(result, dict) or result.get("format") != FORMAT or not isinstance(result.get("parts"), dict):
         raise InputError(f"{path}:1: not the journal of a study, or of another version of feedsim; {_ANEW}")
-    if found.get("fingerprint") == head["fingerprint"]:
+    if result.get("fingerprint") == head["fingerprint"]:
         return
-    parts, own = found["parts"], head["parts"]
+    parts, own = result["parts"], head["parts"]
     other = [name for name in own if parts.get(name) != own[name]] or ["study"]
-    raise InputError(_other_study(path, found, ", ".join(other)))
+    raise InputError(_other_study(path, result, ", ".join(other)))
 
 
-def _other_study(path: Path, found: Mapping[str, Any], what: str) -> str:
+def _other_study(path: Path, result: Mapping[str, Any], what: str) -> str:
     return (
         f"{path}: its runs belong to another state of the study; what differs: {what} (begun as "
-        f"{found.get('study')!r}); {_ANEW}"
+        f"{result.get('study')!r}); {_ANEW}"
     )
 
 

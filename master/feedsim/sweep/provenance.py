@@ -53,9 +53,9 @@ def units_of(base: Base, parameters: Iterable[Parameter] = ()) -> tuple[str, ...
     return (*UNIT_NAMES, "machine") if varied or base.scenario.coupling.units == "one" else UNIT_NAMES
 
 
-def fingerprint(found: Mapping[str, str]) -> str:
+def fingerprint(result: Mapping[str, str]) -> str:
     """One SHA-256 of all parts."""
-    return _of_bytes(_canonical(found))
+    return _of_bytes(_canonical(result))
 
 
 def first_runs(study: Study, design: Design) -> Callable[[int], str] | None:
@@ -85,7 +85,7 @@ def _plan(study: Study, hashes: Mapping[str, str]) -> Any:
     return told({"sampling": sampling, "parameters": [asdict(p) for p in study.parameters]})
 
 
-def described(study: Study, design: Design, found: Mapping[str, str]) -> dict[str, Any]:
+def described(study: Study, design: Design, result: Mapping[str, str]) -> dict[str, Any]:
     """What is the same whenever and wherever the study's runs are made."""
     return {
         "study": study.name,
@@ -98,8 +98,8 @@ def described(study: Study, design: Design, found: Mapping[str, str]) -> dict[st
         "parameters": [
             {"name": p.name, "keys": list(p.keys), "unit": p.unit, "factor": p.factor} for p in design.parameters
         ],
-        "fingerprint": fingerprint(found),
-        "parts": dict(found),
+        "fingerprint": fingerprint(result),
+        "parts": dict(result),
     }
 
 
@@ -160,14 +160,14 @@ def fault(address: str, answer: Any, here: Mapping[str, str] | None = None) -> s
 def differences(answers: Mapping[str, Mapping[str, str]]) -> list[str]:
     """Sentences on workers with other versions of what feedsim calculates with: the last digits may differ."""
     here = versions()
-    found: dict[str, list[str]] = {}
+    result: dict[str, list[str]] = {}
     for address, answer in answers.items():
         for name in ("Python", "numpy", "scipy", "ruckig", "machine"):
             if answer.get(name) != here[name]:
-                found.setdefault(f"{name} {answer.get(name)} in place of {here[name]}", []).append(address)
+                result.setdefault(f"{name} {answer.get(name)} in place of {here[name]}", []).append(address)
     return [
         f"{few(addresses, 3)}: {what}; figures from there may differ in the last digits"
-        for what, addresses in found.items()
+        for what, addresses in result.items()
     ]
 
 
@@ -196,9 +196,9 @@ def _version(name: str) -> str:
 def _sources() -> str:
     """SHA-256 over the package's Python files, wherever they lie and however their lines end."""
     root = Path(__file__).resolve().parents[1]
-    found = hashlib.sha256()
+    result = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
         content = file.read_bytes().replace(b"\r\n", b"\n")
-        found.update(f"{file.relative_to(root).as_posix()} {len(content)}\n".encode())
-        found.update(content)
-    return found.hexdigest()
+        result.update(f"{file.relative_to(root).as_posix()} {len(content)}\n".encode())
+        result.update(content)
+    return result.hexdigest()

@@ -124,34 +124,34 @@ def sensitivities(table: Table, design: Design, seed: int = 0) -> Sensitivities:
     columns = [None if parameter.worded else entry for parameter, entry in zip(design.parameters, entries, strict=True)]
     groups = [np.unique(entry, return_inverse=True)[1].astype(np.int64) for entry in entries]
     sobol: dict[str, Indices] = {}
-    found: dict[str, Trends] = {}
+    result: dict[str, Trends] = {}
     for name in table.figures:
         values = np.asarray(table[name], dtype=np.float64)
-        found[name] = trends(columns, groups, values[drawn])
+        result[name] = trends(columns, groups, values[drawn])
         if matrices is not None:
             done = (row[matrices.a] >= 0) & (row[matrices.b] >= 0) & np.all(row[matrices.ab] >= 0, axis=0)
             f_A, f_B = values[row[matrices.a[done]]], values[row[matrices.b[done]]]
             sobol[name] = sobol_indices(f_A, f_B, values[row[matrices.ab[:, done]]], seed=seed)
     names = tuple(parameter.name for parameter in design.parameters)
-    return Sensitivities(names, sobol, found, _warnings(sobol, names))
+    return Sensitivities(names, sobol, result, _warnings(sobol, names))
 
 
 def _warnings(sobol: Mapping[str, Indices], parameters: Sequence[str]) -> tuple[str, ...]:
-    told: dict[str, list[str]] = {}
-    for name, each in sobol.items():
-        if each.reason:
-            told.setdefault(f"no Sobol indices: {each.reason}", []).append(name)
-        elif each.left_out:
-            points = each.used + each.left_out
-            what = f"Sobol indices without {each.left_out} of {points} base points, of which a run has no value"
-            told.setdefault(what, []).append(name)
-        if not each.reason and each.used < USEFUL_POINTS:
-            what = f"Sobol indices from {each.used} base points: they and their intervals can be far off"
-            told.setdefault(f"{what}; at least {USEFUL_POINTS} make a ranking", []).append(name)
-        if impossible := [parameters[k] for k in beyond(each)]:
+    reported: dict[str, list[str]] = {}
+    for name, indices in sobol.items():
+        if indices.reason:
+            reported.setdefault(f"no Sobol indices: {indices.reason}", []).append(name)
+        elif indices.left_out:
+            points = indices.used + indices.left_out
+            what = f"Sobol indices without {indices.left_out} of {points} base points, of which a run has no value"
+            reported.setdefault(what, []).append(name)
+        if not indices.reason and indices.used < USEFUL_POINTS:
+            what = f"Sobol indices from {indices.used} base points: they and their intervals can be far off"
+            reported.setdefault(f"{what}; at least {USEFUL_POINTS} make a ranking", []).append(name)
+        if impossible := [parameters[k] for k in beyond(indices)]:
             what = f"Sobol indices of {', '.join(impossible)} lie beyond what is possible by more than their intervals"
-            told.setdefault(f"{what}; take more base points", []).append(name)
-    return tuple(f"{', '.join(names)}: {text}." for text, names in told.items())
+            reported.setdefault(f"{what}; take more base points", []).append(name)
+    return tuple(f"{', '.join(names)}: {text}." for text, names in reported.items())
 
 
 def sobol_indices(f_A: Array, f_B: Array, f_AB: Array, *, seed: int = 0) -> Indices:
@@ -187,13 +187,13 @@ def sobol_indices(f_A: Array, f_B: Array, f_AB: Array, *, seed: int = 0) -> Indi
     )
 
 
-def beyond(found: Indices) -> list[int]:
+def beyond(indices: Indices) -> list[int]:
     """Parameters of which an interval lies wholly beyond 0 to 1, or the first order wholly above the total."""
-    if found.reason:
+    if indices.reason:
         return []
-    wrong = (found.total_interval[:, 0] > 1 + INDEX_TOLERANCE) | (found.first_interval[:, 0] > 1 + INDEX_TOLERANCE)
-    wrong |= (found.first_interval[:, 1] < -INDEX_TOLERANCE) | (
-        found.first_interval[:, 0] > found.total_interval[:, 1] + INDEX_TOLERANCE
+    wrong = (indices.total_interval[:, 0] > 1 + INDEX_TOLERANCE) | (indices.first_interval[:, 0] > 1 + INDEX_TOLERANCE)
+    wrong |= (indices.first_interval[:, 1] < -INDEX_TOLERANCE) | (
+        indices.first_interval[:, 0] > indices.total_interval[:, 1] + INDEX_TOLERANCE
     )
     return [int(k) for k in np.flatnonzero(wrong)]
 
@@ -262,11 +262,11 @@ def _resamples(points: int, seed: int) -> Iterator[Array]:
     """Weights (some, points) of the points in RESAMPLES draws with replacement, in blocks that stay small."""
     generator = np.random.default_rng([seed, points])
     even = np.full(points, 1 / points)
-    left = RESAMPLES
-    while left > 0:
-        some = min(left, max(1, _BLOCK // points))
+    remaining = RESAMPLES
+    while remaining > 0:
+        some = min(remaining, max(1, _BLOCK // points))
         yield generator.multinomial(points, even, size=some) / points
-        left -= some
+        remaining -= some
 
 
 def _ranks(values: Array) -> Array:

@@ -120,10 +120,10 @@ def run(
 
         def write() -> Table:
             journal.sync()
-            told = Counter(text for outcome in journal.outcomes() for text in outcome.warnings)
+            reported = Counter(text for outcome in journal.outcomes() for text in outcome.warnings)
             table = table_of(planned, journal.done, journal.outcomes(), study.figures, record)
             write_table(table, directory / f"{STEM}.{format}")
-            note(provenance.now(), **{"warnings of runs": dict(told.most_common(20))})
+            note(provenance.now(), **{"warnings of runs": dict(reported.most_common(20))})
             return table
 
         def tell() -> None:
@@ -140,8 +140,8 @@ def run(
                     unchanged = [] if nominal else [Task(planned.runs, ())]
                     for outcome in engine.map(chain(planned.tasks(journal.missing()), unchanged)):
                         if outcome.run == planned.runs:
-                            found = outcome.figures or {}
-                            nominal = {name: value for name, (value, _) in found.items() if isfinite(value)}
+                            result = outcome.figures or {}
+                            nominal = {name: value for name, (value, _) in result.items() if isfinite(value)}
                             continue
                         journal.add(outcome)
                         if outcome.figures is not None and not checked:
@@ -173,13 +173,13 @@ def _nominal(before: Mapping[str, Any]) -> dict[str, float]:
 def _sessions(before: Mapping[str, Any], resumed: int) -> list[dict[str, Any]]:
     """The sessions in which the `resumed` runs were made, as the record of the last one shows."""
     try:
-        told = [dict(each) for each in before["sessions"]] if resumed else []
-        for each in told:
-            if each["runs"] is None:  # it was killed
-                each["runs"] = resumed - sum(other["runs"] or 0 for other in told)
+        reported = [dict(entry) for entry in before["sessions"]] if resumed else []
+        for item in reported:
+            if item["runs"] is None:  # it was killed
+                item["runs"] = resumed - sum(other["runs"] or 0 for other in reported)
     except (ValueError, KeyError, TypeError):
         return []
-    return told
+    return reported
 
 
 def _remove(path: Path) -> None:

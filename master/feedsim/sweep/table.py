@@ -113,7 +113,7 @@ def table_of(
     rows = len(runs)
     place = np.full(design.runs, -1, dtype=np.int64)
     place[runs] = np.arange(rows)
-    found: dict[str, NDArray[np.float64]] = {}
+    result: dict[str, NDArray[np.float64]] = {}
     units: dict[str, str] = {}
     first: dict[str, tuple[int, int]] = {}  # figure -> the first run that has it, and where in it
     status, message, warnings = (np.full(rows, text, dtype=object) for text in (OK, "", ""))
@@ -128,16 +128,16 @@ def table_of(
             status[row], message[row] = FAILED, _in_one_line([outcome.error or "failed"])
             continue
         for i, (name, (value, unit)) in enumerate(outcome.figures.items()):
-            if name not in found:
-                found[name] = np.full(rows, np.nan)
+            if name not in result:
+                result[name] = np.full(rows, np.nan)
                 units[name] = unit
             first[name] = min(first.get(name, (design.runs, 0)), (outcome.run, i))
-            found[name][row] = value
-    names = chosen(sorted(found, key=first.__getitem__), figures) if found else []
+            result[name][row] = value
+    names = chosen(sorted(result, key=first.__getitem__), figures) if result else []
     columns: dict[str, NDArray[Any]] = {"run": runs}
     for i, parameter in enumerate(design.parameters):
         columns[parameter.name] = _parameter_column(parameter, design.values[runs, i])
-    columns |= {name: found[name] for name in names}
+    columns |= {name: result[name] for name in names}
     columns |= {"status": status, "message": message, "warnings": warnings, "seconds": seconds}
     heads = {parameter.name: parameter.unit for parameter in design.parameters}
     return Table(
@@ -200,10 +200,10 @@ def read_table(path: str | Path) -> Table:
     """
     path = Path(path)
     if path.is_dir():
-        found = [path / f"{STEM}.{kind}" for kind in ("parquet", "csv") if (path / f"{STEM}.{kind}").is_file()]
-        if not found:
+        paths = [path / f"{STEM}.{kind}" for kind in ("parquet", "csv") if (path / f"{STEM}.{kind}").is_file()]
+        if not paths:
             raise InputError(f"{path}: no {STEM}.csv and no {STEM}.parquet in this folder")
-        path = max(found, key=lambda file: file.stat().st_mtime_ns)
+        path = max(paths, key=lambda file: file.stat().st_mtime_ns)
     if not path.is_file():
         raise InputError(no_such_file(path))
     return _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
@@ -212,10 +212,10 @@ def read_table(path: str | Path) -> Table:
 def record_of(directory: Path) -> dict[str, Any]:
     """study.json of a folder: how its runs were made; empty where there is none, or none that can be read."""
     try:
-        found = json.loads((directory / RECORD).read_text(encoding="utf-8"))
+        result = json.loads((directory / RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return result if isinstance(result, dict) else {}
 
 
 def parquet() -> Any:

@@ -40,16 +40,16 @@ class Trial:
 
 def spread(runs: int) -> Iterator[int]:
     """All of so many runs, those that are far from one another first: the middle, the quarters, the eighths ..."""
-    told = set[int]()
+    indexes = set[int]()
     parts = 2
-    while len(told) < runs:
+    while len(indexes) < runs:
         for i in range(1, parts, 2):
-            if (run := runs * i // parts) not in told:
-                told.add(run)
+            if (run := runs * i // parts) not in indexes:
+                indexes.add(run)
                 yield run
         parts *= 2
         if parts > 4 * runs:  # what rounding has left out
-            yield from (run for run in range(runs) if run not in told)
+            yield from (run for run in range(runs) if run not in indexes)
             return
 
 

@@ -118,7 +118,7 @@ def _content(path: Path) -> _Content:
 
 
 def _walked(stream: JsonStream, path: Path) -> _Content:
-    found = _Content(path)
+    content = _Content(path)
     if stream.peek() != "{":
         stream.value()
         raise _missing(path, "Header")
@@ -126,28 +126,28 @@ def _walked(stream: JsonStream, path: Path) -> _Content:
         if key == "Header":
             header = stream.value()
             if isinstance(header, dict):
-                found.header, found.names = header, _names(path, header)
-                found.cycle = _cycle(path, header)
+                content.header, content.names = header, _names(path, header)
+                content.cycle = _cycle(path, header)
         elif key == "Payload" and stream.peek() == "[":
-            found.payload = True
+            content.payload = True
             for k in stream.items():
-                _message(stream, found, k)
+                _message(stream, content, k)
         else:
             stream.value()
     stream.end()
-    if found.header is None:
+    if content.header is None:
         raise _missing(path, "Header")
-    if not found.payload:
+    if not content.payload:
         raise _missing(path, "Payload")
-    if found.rows < 2:
-        raise InputError(f"{path}: {found.rows} rows of HFData; at least 2 are needed")
-    if found.width != len(found.names):
-        raise _of_length(found, 0, f"{found.width} values")
-    return found
+    if content.rows < 2:
+        raise InputError(f"{path}: {content.rows} rows of HFData; at least 2 are needed")
+    if content.width != len(content.names):
+        raise _of_length(content, 0, f"{content.width} values")
+    return content
 
 
-def _message(stream: JsonStream, found: _Content, number: int) -> None:
-    no_list = InputError(f"{found.path}: Payload, message {number + 1}: no list of rows under HFData")
+def _message(stream: JsonStream, content: _Content, number: int) -> None:
+    no_list = InputError(f"{content.path}: Payload, message {number + 1}: no list of rows under HFData")
     if stream.peek() != "{":
         raise no_list
     for key in stream.members():
@@ -155,47 +155,49 @@ def _message(stream: JsonStream, found: _Content, number: int) -> None:
             if stream.peek() != "[":
                 raise no_list
             for _ in stream.items():
-                _row(found, stream.value())
+                _row(content, stream.value())
         else:
             value = stream.value()
             if key == "HFBlockEvent" and isinstance(value, dict):
-                _event(found, value)
+                _event(content, value)
 
 
-def _row(found: _Content, row: object) -> None:
-    wanted = len(found.names) or found.width  # a header may stand behind its rows
+def _row(content: _Content, row: object) -> None:
+    wanted = len(content.names) or content.width  # a header may stand behind its rows
     if not isinstance(row, list) or (wanted is not None and len(row) != wanted):
-        raise _of_length(found, found.rows, f"{len(row)} values" if isinstance(row, list) else "no list")
-    found.width = len(row)
-    found.rows += 1
-    if len(found.cells) + len(row) > MOST_NUMBERS:
+        raise _of_length(content, content.rows, f"{len(row)} values" if isinstance(row, list) else "no list")
+    content.width = len(row)
+    content.rows += 1
+    if len(content.cells) + len(row) > MOST_NUMBERS:
         raise InputError(
-            f"{found.path}, row {found.rows}: more than {MOST_NUMBERS:,} numbers, rows of {found.width} signals; "
+            f"{content.path}, row {content.rows}: more than {MOST_NUMBERS:,} numbers, rows of {content.width} signals; "
             f"allowed: up to that ({8e-9 * MOST_NUMBERS:.1f} GB in memory). Record fewer signals or less time"
         )
     try:
-        found.cells.extend(row)
+        content.cells.extend(row)
     except (TypeError, OverflowError):
         for k, cell in enumerate(row):
             if not isinstance(cell, (int, float)) or abs(cell) > MAX_MAGNITUDE:
-                name = found.names[k] if found.names else f"value {k + 1}"
+                name = content.names[k] if content.names else f"value {k + 1}"
                 fault = ", no finite number"
                 if isinstance(cell, int) and not isinstance(cell, bool):
                     fault = f"; allowed: up to {MAX_MAGNITUDE:g}"
-                raise InputError(f"{found.path}, row {found.rows}: {name} is {_shown(cell)}{fault}") from None
+                raise InputError(f"{content.path}, row {content.rows}: {name} is {_shown(cell)}{fault}") from None
 
 
-def _event(found: _Content, event: Mapping[str, Any]) -> None:
+def _event(content: _Content, event: Mapping[str, Any]) -> None:
     at, block = event.get("HFProbeCounter"), event.get("GCode")
     if isinstance(at, (int, float)) and abs(at) <= MAX_MAGNITUDE and isinstance(block, str):
-        if len(found.blocks) == MOST_BLOCKS:
-            raise InputError(f"{found.path}: more than {MOST_BLOCKS:,} NC blocks; allowed: up to that")
-        found.blocks.append((float(at), block.strip()))
+        if len(content.blocks) == MOST_BLOCKS:
+            raise InputError(f"{content.path}: more than {MOST_BLOCKS:,} NC blocks; allowed: up to that")
+        content.blocks.append((float(at), block.strip()))
 
 
-def _of_length(found: _Content, row: int, there: str) -> InputError:
-    wanted = f"Header.SignalListHFData has {len(found.names)} signals" if found.names else f"others have {found.width}"
-    return InputError(f"{found.path}, row {row + 1}: {there}; {wanted}")
+def _of_length(content: _Content, row: int, there: str) -> InputError:
+    wanted = (
+        f"Header.SignalListHFData has {len(content.names)} signals" if content.names else f"others have {content.width}"
+    )
+    return InputError(f"{content.path}, row {row + 1}: {there}; {wanted}")
 
 
 def _missing(path: Path, key: str) -> InputError:
@@ -215,7 +217,7 @@ def _cycle(path: Path, header: Mapping[str, Any]) -> float:
 
 def _signals(header: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     listed = header.get("SignalListHFData")
-    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+    return [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
 
 
 def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
@@ -235,12 +237,12 @@ def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
 
 def _axes(header: Mapping[str, Any]) -> dict[str, str]:
     """Number -> name of the axes that signals are of."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for signal in _signals(header):
         _, bar, number = str(signal.get("Address") or signal.get("Name")).partition("|")
         if bar and number.isdecimal():
-            found.setdefault(number, str(signal.get("Axis") or number))
-    return dict(sorted(found.items(), key=lambda item: (len(item[0]), item[0])))
+            result.setdefault(number, str(signal.get("Axis") or number))
+    return dict(sorted(result.items(), key=lambda item: (len(item[0]), item[0])))
 
 
 def _shown(cell: object) -> str:

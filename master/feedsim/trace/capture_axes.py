@@ -89,17 +89,17 @@ def _axis(number: str, names: Mapping[str, str], columns: Mapping[str, Array]) -
     signals = [columns.get(f"{signal}|{number}") for signal in ("TORQUE", "POWER", "ENC_POS")]
     torque, power, position = signals
     if torque is None or power is None or position is None:
-        lacking = [name for name, each in zip(("TORQUE", "POWER", "ENC_POS"), signals, strict=True) if each is None]
+        lacking = [name for name, values in zip(("TORQUE", "POWER", "ENC_POS"), signals, strict=True) if values is None]
         return replace(blank, why=f"the file has no {' and no '.join(lacking)} of it")
     for name, values in (("ENC_POS", position), ("TORQUE", torque), ("POWER", power)):
         if not np.ptp(values):
             what = "it does not move" if name == "ENC_POS" else f"{name} is {values[0]:.6g} throughout"
             return replace(blank, why=what)
-    found, doubts = _fitted(columns["time"], torque, power, position)
-    if found is None:
+    fit, doubts = _fitted(columns["time"], torque, power, position)
+    if fit is None:
         return replace(blank, why=_swapped(number, names, columns) or "POWER is not TORQUE times the motor's speed",
                        doubts=doubts)  # fmt: skip
-    return _with_units(replace(blank, doubts=doubts), found, columns)
+    return _with_units(replace(blank, doubts=doubts), fit, columns)
 
 
 def _fitted(time: Array, torque: Array, power: Array, position: Array) -> tuple[_Fit | None, tuple[str, ...]]:
@@ -145,16 +145,16 @@ def _spikes(values: Array) -> Rows:
     off = np.abs(values - np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1))
     usual = float(np.quantile(off, 1 - OUTLIER_SHARE))
     span = float(np.quantile(values, 0.99) - np.quantile(values, 0.01))
-    found: Rows = off > max(10 * usual, 0.5 * span)
-    return found if found.mean() < OUTLIER_SHARE else np.zeros(len(values), dtype=bool)
+    result: Rows = off > max(10 * usual, 0.5 * span)
+    return result if result.mean() < OUTLIER_SHARE else np.zeros(len(values), dtype=bool)
 
 
 def _jumps(position: Array) -> Rows:
     """Rows before which a position goes on by far more than it does elsewhere."""
     steps = np.abs(np.diff(position, prepend=position[0]))
     usual = float(np.quantile(steps, 1 - OUTLIER_SHARE))
-    found: Rows = steps > (20 * usual if usual else np.inf)
-    return found
+    values: Rows = steps > (20 * usual if usual else np.inf)
+    return values
 
 
 def _widened(rows: Rows) -> Rows:
@@ -163,13 +163,13 @@ def _widened(rows: Rows) -> Rows:
 
 def _cut_off(values: Array) -> tuple[Rows, str]:
     """Rows that are the largest or the smallest value of all to the last digit, if they are many; and that value."""
-    rows, told = np.zeros(len(values), dtype=bool), []
+    rows, reported = np.zeros(len(values), dtype=bool), []
     for end in (float(values.max()), float(values.min())):
         same = values == end
         if end and same.mean() > HEAP and same.sum() > 5:
             rows |= same
-            told.append(f"{end:.6g} in {100 * same.mean():.2g} % of the rows")
-    return rows, " and ".join(told)
+            reported.append(f"{end:.6g} in {100 * same.mean():.2g} % of the rows")
+    return rows, " and ".join(reported)
 
 
 def _fit(time: Array, torque: Array, power: Array, position: Array, rows: Rows) -> _Fit:
@@ -220,7 +220,7 @@ def _with_units(axis: CaptureAxis, fit: _Fit, columns: Mapping[str, Array]) -> C
     """With pitch and units. A figure that no screw has is another unit of length, or, if CURRENT says so, of torque."""
     size = abs(fit.pitch)
     rotary = abs(size - DEGREES_PER_TURN) < PITCH_TOLERANCE * DEGREES_PER_TURN
-    found = replace(axis, sign=1 if fit.pitch > 0 else -1, rotary=rotary)
+    capture_axis = replace(axis, sign=1 if fit.pitch > 0 else -1, rotary=rotary)
     if not rotary and (constant := _torque_constant(axis.number, columns)) is not None:
         low, high = TORQUE_CONSTANTS
         if not low <= constant <= high:
@@ -230,7 +230,7 @@ def _with_units(axis: CaptureAxis, fit: _Fit, columns: Mapping[str, Array]) -> C
                 f"({size:.4g} mm) is wrong; give the factor in a mapping, torque: {{column: TORQUE|{axis.number}, "
                 "factor: 0.2 N.m}"
             )
-            return replace(found, pitch=None, torque="", why=why)
+            return replace(capture_axis, pitch=None, torque="", why=why)
     if size < LEAST_PITCH:
         for unit, factor in OTHER_LENGTHS.items():
             if (usual := _usual(size * factor)) is not None:
@@ -238,14 +238,14 @@ def _with_units(axis: CaptureAxis, fit: _Fit, columns: Mapping[str, Array]) -> C
                     f"in mm its pitch would be {size:.4g} mm, which no screw has; positions are taken as {unit}, which "
                     f"makes it {usual:g} mm"
                 )
-                return replace(found, pitch=usual, length=unit, doubts=(*axis.doubts, doubt))
+                return replace(capture_axis, pitch=usual, length=unit, doubts=(*axis.doubts, doubt))
     pitch = DEGREES_PER_TURN if rotary else _usual(size, NEAR_WITHOUT if axis.doubts else PITCH_TOLERANCE)
-    return replace(found, pitch=float(pitch) if pitch is not None else size)
+    return replace(capture_axis, pitch=float(pitch) if pitch is not None else size)
 
 
 def _usual(size: float, near: float = PITCH_TOLERANCE) -> float | None:
     """The usual pitch that an estimate [mm] holds, `near` at the most (relative); None where it holds none."""
-    usual = min(USUAL_PITCHES, key=lambda each: abs(np.log(each / size)))
+    usual = min(USUAL_PITCHES, key=lambda value: abs(np.log(value / size)))
     return float(usual) if abs(usual - size) < near * usual else None
 
 

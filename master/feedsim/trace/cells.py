@@ -175,9 +175,9 @@ def _names_above_units(above: Sequence[str], header: Sequence[str]) -> list[tupl
     units_below = [cell.strip().strip("[]()").strip() for cell in header]
     if any(len(cell) > LONGEST_UNIT for cell in (*units_below, *above)):
         return None
-    if not any(units_below) or not all(each in ("", "-") or known_unit(each) for each in units_below):
+    if not any(units_below) or not all(name in ("", "-") or known_unit(name) for name in units_below):
         return None
-    if any(each in TIME_NAMES for each in units_below):
+    if any(name in TIME_NAMES for name in units_below):
         return None  # names that are units as well: t, m
     if any(_is_number(cell) or known_unit(cell.strip()) for cell in above[: len(header)] if len(cell.strip()) > 1):
         return None
@@ -191,7 +191,7 @@ def _remarks(text: str) -> int:
     head = text[:MOST_REMARKS].splitlines()
     for k, (line, below) in enumerate(pairwise(head)):
         for separator in _SEPARATORS:
-            cells, values = (next(csv.reader([each], delimiter=separator), []) for each in (line, below))
+            cells, values = (next(csv.reader([name], delimiter=separator), []) for name in (line, below))
             numbers_below = sum(_is_number(cell) for cell in values)
             if len(cells) == len(values) > 1 and numbers_below > len(values) / 2 and not any(map(_is_number, cells)):
                 return k
@@ -209,14 +209,14 @@ def _numbers(path: Path, head: str, header_line: int, rest: io.StringIO, separat
     if not body or not cells:
         return None
     try:
-        found = np.loadtxt(io.StringIO(body), delimiter=separator, comments=None, ndmin=2)
+        values = np.loadtxt(io.StringIO(body), delimiter=separator, comments=None, ndmin=2)
     except ValueError:
         return None
-    if found.shape != (body.count("\n") + 1, len(cells)):
+    if values.shape != (body.count("\n") + 1, len(cells)):
         return None  # empty lines, or a header that is not that of the rows
     names, header_units = split(cells, f"{path}:{header_line}")
-    lines = range(header_line + 1, header_line + 1 + len(found))
-    return Table(str(path), header_line, names, header_units, (), lines, False, found)
+    lines = range(header_line + 1, header_line + 1 + len(values))
+    return Table(str(path), header_line, names, header_units, (), lines, False, values)
 
 
 def _text(path: Path) -> str:
@@ -257,7 +257,7 @@ def _separator(header: str, where: str) -> str:
 
 def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     names: list[str] = []
-    found: list[str] = []
+    result: list[str] = []
     for i, cell in enumerate(cells):
         match = _HEADER.fullmatch(cell.strip())
         name, unit = (match[1], (match[2] or "").strip()) if match else ("", "")
@@ -268,16 +268,16 @@ def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[st
         if name in names:
             raise InputError(f"{where}: duplicate column {name!r} (columns {names.index(name) + 1} and {i + 1})")
         names.append(name)
-        found.append(unit)
+        result.append(unit)
     if all(re.fullmatch(r"[-+0-9.,eE]+", name) for name in names):
         raise InputError(f"{where}: the first line holds numbers; a header of name [unit] is needed")
-    for name, unit in zip(names, found, strict=True):
+    for name, unit in zip(names, result, strict=True):
         try:
             check_unit(unit)
             name == "time" or check_name(name)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
-    return tuple(names), tuple(found)
+    return tuple(names), tuple(result)
 
 
 def round_unit(cell: str) -> tuple[str, str] | None:

@@ -94,11 +94,11 @@ def read_signals(
             f"(the file runs from {whole.time[0]:.9g} to {whole.time[-1]:.9g} s)"
         )
     values = {}
-    for signal, (name, told) in columns.items():
+    for signal, (name, column) in columns.items():
         known = trace.unit(name)
-        if told and known and units.unit(told).factor != units.unit(known).factor:
-            raise InputError(f"{path}:1: column {name!r} is in {known} by its header, in {told} by the scenario")
-        if not (given := told or known):
+        if column and known and units.unit(column).factor != units.unit(known).factor:
+            raise InputError(f"{path}:1: column {name!r} is in {known} by its header, in {column} by the scenario")
+        if not (given := column or known):
             example = {"m": "mm"}.get(unit, unit)
             raise InputError(
                 f"{path}:1: column {name!r} has no unit; write '{name} [{example}]' in the header or give the unit"

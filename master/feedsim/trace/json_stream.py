@@ -36,9 +36,9 @@ class JsonStream:
     def peek(self) -> str:
         """The next character that is no blank; "" at the end."""
         while True:
-            found = _BLANK.match(self._buffer, self._at)
-            assert found is not None
-            self._at = found.end()
+            result = _BLANK.match(self._buffer, self._at)
+            assert result is not None
+            self._at = result.end()
             if self._at < len(self._buffer):
                 return self._buffer[self._at]
             if not self._fill():
@@ -50,11 +50,11 @@ class JsonStream:
         return InputError(f"{self._path} is no JSON file that can be read: {expected} is expected {where}")
 
     def _take(self, allowed: str) -> str:
-        found = self.peek()
-        if not found or found not in allowed:
+        text = self.peek()
+        if not text or text not in allowed:
             raise self.wrong(" or ".join(allowed))
         self._at += 1
-        return found
+        return text
 
     def value(self) -> Any:
         """The next value, whole."""

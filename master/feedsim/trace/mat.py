@@ -75,17 +75,17 @@ def _variables(content: bytes) -> dict[str, Value]:
     reader = _Reader(
         "<" if content[126:128] == b"IM" else ">", min(MAX_INFLATED_BYTES, max(FREE, RATIO * len(content)))
     )
-    found: dict[str, Value] = {}
+    result: dict[str, Value] = {}
     at = 128
     while at < len(content):
-        kind, data, at = reader.element(content, at, f"variable {len(found) + 1}")
+        kind, data, at = reader.element(content, at, f"variable {len(result) + 1}")
         if kind == _COMPRESSED:
-            kind, data, _ = reader.element(reader.inflated(data), 0, f"variable {len(found) + 1}")
+            kind, data, _ = reader.element(reader.inflated(data), 0, f"variable {len(result) + 1}")
         if kind != _MATRIX:
-            raise _Fault(f"where variable {len(found) + 1} should stand, there is data of type {kind}")
+            raise _Fault(f"where variable {len(result) + 1} should stand, there is data of type {kind}")
         name, value = reader.matrix(data, 0)
-        found[name] = Other("several variables of that name") if name in found else value
-    return found
+        result[name] = Other("several variables of that name") if name in result else value
+    return result
 
 
 class _Reader:
@@ -115,15 +115,15 @@ class _Reader:
     def inflated(self, data: memoryview) -> bytes:
         try:
             stream = zlib.decompressobj()
-            found = stream.decompress(data, self.allowed + 1)
+            result = stream.decompress(data, self.allowed + 1)
         except zlib.error as error:
             raise _Fault(f"a variable cannot be inflated: {error}") from None
-        self.allowed -= len(found)
+        self.allowed -= len(result)
         if self.allowed < 0:
             raise _Fault("its variables inflate to more bytes than are allowed of a file of this size")
         if not stream.eof:
             raise _Fault("a variable is cut off")
-        return found
+        return result
 
     def matrix(self, data: memoryview, depth: int) -> tuple[str, Value]:
         """Name and value of a variable or a field."""
@@ -183,8 +183,8 @@ class _Reader:
                 raise _Fault(f"{where} holds {len(values)} values; its size {shape} gives {math.prod(shape)}")
             with np.errstate(all="ignore"):
                 parts.append(values.astype(dtype.newbyteorder("="), copy=False))
-        found = parts[0] + 1j * parts[1] if is_complex else parts[0]
-        return found.reshape(shape, order="F").squeeze()
+        result = parts[0] + 1j * parts[1] if is_complex else parts[0]
+        return result.reshape(shape, order="F").squeeze()
 
     def _fields(self, data: memoryview, at: int, depth: int, where: str) -> dict[str, Value]:
         lengths, at = self._numbers(data, at, f"the fields of {where}")
@@ -192,15 +192,15 @@ class _Reader:
         length = int(lengths[0]) if len(lengths) == 1 else 0
         if length <= 0 or len(text) % length:
             raise _Fault(f"the names of the fields of {where} have no length")
-        found: dict[str, Value] = {}
+        result: dict[str, Value] = {}
         for i in range(0, len(text), length):
             name = _text(bytes(text[i : i + length]))
             kind, inner, at = self.element(data, at, f"the field {name[:60]!r} of {where}")
             if kind != _MATRIX:
                 raise _Fault(f"the field {name[:60]!r} of {where} is data of type {kind}")
             value = self.matrix(inner, depth + 1)[1]
-            found[name] = Other("several fields of that name") if name in found else value
-        return found
+            result[name] = Other("several fields of that name") if name in result else value
+        return result
 
 
 def _text(raw: bytes) -> str:
@@ -211,39 +211,39 @@ def _version_4(content: bytes) -> dict[str, Value]:
     (first,) = struct.unpack_from("<i", content)
     order = "<" if 0 <= first <= 5000 else ">"
     head = struct.Struct(f"{order}5i")
-    found: dict[str, Value] = {}
+    result: dict[str, Value] = {}
     at = 0
     while at < len(content):
         if at + head.size > len(content):
-            raise _Fault(f"it ends within the head of variable {len(found) + 1}")
+            raise _Fault(f"it ends within the head of variable {len(result) + 1}")
         code, rows, columns, imaginary, length = head.unpack_from(content, at)
         at += head.size
         kind, precision = code % 10, code // 10 % 10
         fits = 0 <= code < 5000 and not code // 100 % 10 and kind <= 2 and precision < len(_VERSION_4)
         if not fits or min(rows, columns) < 0 or not 0 < length <= 1024 or imaginary not in (0, 1):
-            raise _Fault(f"the head of variable {len(found) + 1} is that of none")
+            raise _Fault(f"the head of variable {len(result) + 1} is that of none")
         name = _text(content[at : at + length])
         dtype = np.dtype(order + _VERSION_4[precision])
         at += length
         size = rows * columns * dtype.itemsize
         if at + size * (1 + imaginary) > len(content):
             raise _Fault(f"it ends within {name[:60]!r}, which is to have {rows} rows and {columns} columns")
-        if name in found:
-            found[name] = Other("several variables of that name")
+        if name in result:
+            result[name] = Other("several variables of that name")
         elif kind:
-            found[name] = Other(("text", "a sparse matrix")[kind - 1])
+            result[name] = Other(("text", "a sparse matrix")[kind - 1])
         else:
             values = np.frombuffer(content, dtype, rows * columns, at).astype(dtype.newbyteorder("="), copy=False)
             if imaginary:
                 values = values + 1j * np.frombuffer(content, dtype, rows * columns, at + size)
-            found[name] = values.reshape((rows, columns), order="F").squeeze()
+            result[name] = values.reshape((rows, columns), order="F").squeeze()
         at += size * (1 + imaginary)
-    return found
+    return result
 
 
 def flat(content: Mapping[str, Value], prefix: str = "") -> list[tuple[str, NDArray[np.generic] | Other]]:
     """Variables, those inside structures too, each with its name, "structure.field"."""
-    found: list[tuple[str, NDArray[np.generic] | Other]] = []
+    result: list[tuple[str, NDArray[np.generic] | Other]] = []
     for name, value in content.items():
-        found += flat(value, f"{prefix}{name}.") if isinstance(value, dict) else [(prefix + name, value)]
-    return found
+        result += flat(value, f"{prefix}{name}.") if isinstance(value, dict) else [(prefix + name, value)]
+    return result

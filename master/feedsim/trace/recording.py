@@ -110,9 +110,9 @@ def read_recording(path: str | Path) -> Recording:
     """
     path = Path(path)
     if path.suffix.lower() == capture.SUFFIX:
-        found = capture.read_capture(path)
+        result = capture.read_capture(path)
         return Recording(
-            path, tuple(found.columns), found.units, axes=found.axes, marks=found.marks, _variables=found.columns
+            path, tuple(result.columns), result.units, axes=result.axes, marks=result.marks, _variables=result.columns
         )
     if path.suffix.lower() == MAT:
         return _read_mat(path)

@@ -125,14 +125,14 @@ def read_response_csv(path: str | Path, *, columns: Mapping[str, Sequence[str]] 
     path = Path(path)
     table = read_table(path)
     at = table.axis(None, FREQUENCY_NAMES, "Hz")
-    found = _by_name(table, at, path.stem) if columns is None else _by_choice(table, columns)
-    values = table.values(sorted({at, *(index for parts in found.values() for index in parts.values())}))
+    indexes = _by_name(table, at, path.stem) if columns is None else _by_choice(table, columns)
+    values = table.values(sorted({at, *(index for parts in indexes.values() for index in parts.values())}))
     hertz = values[at] * table.factor(at, "Hz", "frequency", "Hz")
     kept = hertz > 0 if hertz[0] == 0 else np.ones(hertz.size, dtype=np.bool_)
     if not kept.any():
         raise InputError(f"{path}: no row above 0 Hz")
     responses, units, coherence = {}, {}, {}
-    for name, parts in found.items():
+    for name, parts in indexes.items():
         response, units[name] = _values(table, parts, values)
         responses[name] = response[kept]
         if "coherence" in parts:
@@ -145,46 +145,46 @@ def read_response_csv(path: str | Path, *, columns: Mapping[str, Sequence[str]] 
 
 def _by_name(table: Table, at: int, file: str) -> dict[str, dict[str, int]]:
     """Responses that the columns' names show; columns of other names are left alone."""
-    found: dict[str, dict[str, int]] = {}
+    indexes: dict[str, dict[str, int]] = {}
     for i, column in enumerate(table.names):
         match = _COLUMN_NAME.fullmatch(column)
         if i == at or not match:
             continue
         name, part = match[1] or file, _PART[match[2].lower()]
-        parts = found.setdefault(name, {})
+        parts = indexes.setdefault(name, {})
         if part in parts:
             raise InputError(
                 f"{table.head}: {table.names[parts[part]]!r} and {column!r} are both the {part} of {name!r}; "
                 "choose the columns"
             )
         parts[part] = i
-    found = {name: each for name, each in found.items() if each.keys() != {"coherence"}}
-    if not found:
+    indexes = {name: value for name, value in indexes.items() if value.keys() != {"coherence"}}
+    if not indexes:
         raise InputError(
             f"{table.head}: no frequency response; its columns are called 'NAME magnitude' and 'NAME phase', or "
             f"'NAME re' and 'NAME im'; there is {', '.join(table.names)}"
         )
-    for name, each in found.items():
+    for name, entry in indexes.items():
         for one, other in (("magnitude", "phase"), ("phase", "magnitude"), ("re", "im"), ("im", "re")):
-            if one in each and other not in each:
+            if one in entry and other not in entry:
                 raise InputError(f"{table.head}: response {name!r} has a column of {one}, but none of {other}")
-        if each.keys() >= {"magnitude", "re"}:
+        if entry.keys() >= {"magnitude", "re"}:
             raise InputError(
                 f"{table.head}: response {name!r} has magnitude and phase, and re and im too; choose the columns"
             )
-    return found
+    return indexes
 
 
 def _by_choice(table: Table, columns: Mapping[str, Sequence[str]]) -> dict[str, dict[str, int]]:
-    found = {}
+    indexes = {}
     for name, chosen in columns.items():
         if len(chosen) not in (2, 3) or not all(chosen):
             raise InputError(
                 f"columns {', '.join(chosen)!r}: magnitude and phase are expected, and coherence if there is one"
             )
         parts = zip(("magnitude", "phase", "coherence"), chosen, strict=False)
-        found[name] = {part: table.index(column) for part, column in parts}
-    return found
+        indexes[name] = {part: table.index(column) for part, column in parts}
+    return indexes
 
 
 def _values(table: Table, parts: Mapping[str, int], values: Mapping[int, Array]) -> tuple[Complexes, str]:

@@ -54,8 +54,8 @@ def read_scope(path: Path) -> Signals | None:
     head = _decoded(raw)
     if _HALSCOPE.match(head):
         return _halscope(path, _decoded(regular.content(path)))
-    if found := _TWINCAT.search(head):
-        return _twincat(path, _decoded(regular.content(path)), found[1])
+    if result := _TWINCAT.search(head):
+        return _twincat(path, _decoded(regular.content(path)), result[1])
     return None
 
 
@@ -71,16 +71,16 @@ def _decoded(raw: bytes) -> str:
 
 def unique(names: Iterable[str]) -> list[str]:
     """Names that a column may have: without brackets, each once."""
-    found: list[str] = []
+    result: list[str] = []
     for name in names:
         plain = "".join(c for c in name.strip().replace("[", "(").replace("]", ")") if c.isprintable()) or "signal"
         plain = f"{plain} (1)" if plain == "time" else plain
         again = 2
         candidate = plain
-        while candidate in found:
+        while candidate in result:
             candidate, again = f"{plain} ({again})", again + 1
-        found.append(candidate)
-    return found
+        result.append(candidate)
+    return result
 
 
 # --- TwinCAT ---
@@ -141,14 +141,14 @@ def _grouped(
         raise InputError(f"{path}: {time.size} rows of values; at least 2 are needed")
     order = [k for own in groups.values() for k in own[1]]
     titles = dict(zip(order, unique(channels[k] for k in order), strict=True))
-    columns, units, notes, held, unknown, scaled = {"time": time}, {"time": "s"}, [], [], [], []
+    columns, units, notes, fixed, unknown, scaled = {"time": time}, {"time": "s"}, [], [], [], []
     for times, values in groups.values():
         same = times.size == time.size and bool(np.all(np.abs(times - time) <= 1e-9 + 1e-9 * time))
         for k, signal in values.items():
             name = titles[k]
             rows = np.searchsorted(times, time + 1e-9, side="right") - 1
             columns[name] = signal if same else signal[rows.clip(0)]
-            held += [] if same else [name]
+            fixed += [] if same else [name]
             unit = _cell(header, "Unit", k)
             known = bool(unit) and known_unit(unit)
             units[name] = spelled(unit) if known else ""
@@ -156,7 +156,7 @@ def _grouped(
             factor = _cell(header, "ScaleFactor", k).replace(",", ".")
             scaled += [name] if factor not in ("", "1", "1.0") else []
     for names, words in (
-        (held, "has another sampling time: its values are kept until its next one"),
+        (fixed, "has another sampling time: its values are kept until its next one"),
         (unknown, "is in a unit that is not known"),
         (scaled, "has a scale factor; the file does not say whether its values are scaled"),
     ):
@@ -193,8 +193,8 @@ def _numbers(path: Path, rows: Sequence[tuple[int, Sequence[str]]], k: int, name
 def _halscope(path: Path, text: str) -> Signals:
     """Lines of `label value label value`, below the sampling period in ns."""
     first, *lines = text.splitlines()
-    found = _HALSCOPE.match(first)
-    if found is None or not int(found[1][:MAX_PERIOD_DIGITS]) or len(found[1]) > MAX_PERIOD_DIGITS:
+    result = _HALSCOPE.match(first)
+    if result is None or not int(result[1][:MAX_PERIOD_DIGITS]) or len(result[1]) > MAX_PERIOD_DIGITS:
         raise InputError(
             f"{path}:1: {first[:80]!r}; a sampling period in ns is expected, of up to {MAX_PERIOD_DIGITS} digits"
         )
@@ -215,7 +215,7 @@ def _halscope(path: Path, text: str) -> Signals:
             raise InputError(f"{path}:{line}: {wrong!r} is no number") from None
     table = np.array(values[:-1], dtype=np.float64)  # halscope writes one sample more than it has recorded
     names = unique(labels)
-    columns: dict[str, Array] = {"time": np.arange(len(table), dtype=np.float64) * (int(found[1]) * 1e-9)}
+    columns: dict[str, Array] = {"time": np.arange(len(table), dtype=np.float64) * (int(result[1]) * 1e-9)}
     columns |= {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
     note = f"{path}: halscope writes one sample more than it has recorded: the last one is left out"
     return Signals(columns, {"time": "s"} | dict.fromkeys(names, ""), (note,))

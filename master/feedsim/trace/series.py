@@ -97,9 +97,9 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     instants = read[at]
     if instants is None or not np.all(np.isfinite(instants)):
         row = 0 if instants is None else int(np.argmin(np.isfinite(instants)))
-        found = repr(table.columns[at][row]) if table.numbers is None else f"{table.numbers[row, at]}"
+        text = repr(table.columns[at][row]) if table.numbers is None else f"{table.numbers[row, at]}"
         raise InputError(
-            f"{path}:{table.lines[row]}: {found} in the time column {table.names[at]!r}; "
+            f"{path}:{table.lines[row]}: {text} in the time column {table.names[at]!r}; "
             "every instant must be a finite number"
         )
     seconds = instants * table.factor(at, "s", "time column", time_unit or "s")

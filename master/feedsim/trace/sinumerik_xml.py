@@ -66,7 +66,7 @@ def read_signals(path: Path) -> Signals:
 
 
 def _trace(path: Path, root: ElementTree.Element, frame: ElementTree.Element) -> Signals:
-    described = {each.get("key", each.get("name", "")): each for each in root.iter("signal")}
+    described = {element.get("key", element.get("name", "")): element for element in root.iter("signal")}
     listed = frame.findall("dataSignal")
     if not listed:
         raise InputError(f"{path}: traceData lists no dataSignal")
@@ -101,21 +101,21 @@ def _trace(path: Path, root: ElementTree.Element, frame: ElementTree.Element) ->
         raise InputError(f"{path}: its signals have no rows in common")
     if slow := [titles[k] for k in whole if not known[first:, k].all()]:
         notes.append(f"{path}: {few(slow, 4)}: sampled less often; values are kept until the next one")
-    columns, found = {"time": time[first:]}, {"time": "s"}
+    columns, result = {"time": time[first:]}, {"time": "s"}
     for k in whole:
         last = np.maximum.accumulate(np.where(known[:, k], np.arange(len(rows)), 0))
         columns[titles[k]] = table[last, k][first:]
         unit = units[k]
-        found[titles[k]] = spelled(unit) if unit and known_unit(unit) else ""
-        if unit and not found[titles[k]]:
+        result[titles[k]] = spelled(unit) if unit and known_unit(unit) else ""
+        if unit and not result[titles[k]]:
             notes.append(f"{path}: {titles[k]} is in {unit!r}, a unit that is not known")
-    return Signals(columns, found, tuple(notes))
+    return Signals(columns, result, tuple(notes))
 
 
 def _title(name: str) -> str:
     """ "nckServoDataActPos1stEnc64 [u1, 2]" -> "nckServoDataActPos1stEnc64 2": the signal, and the axis."""
-    found = re.fullmatch(r"(.*?)\s*\[u\d+[,;]\s*(\d+)\]", name.strip())
-    return f"{found[1]} {found[2]}" if found else name
+    match = re.fullmatch(r"(.*?)\s*\[u\d+[,;]\s*(\d+)\]", name.strip())
+    return f"{match[1]} {match[2]}" if match else name
 
 
 # --- frequency responses ---
@@ -158,16 +158,16 @@ _DIGIT = {character: k for k, character in enumerate(ALPHABET)}
 
 def _nodes(path: Path, root: ElementTree.Element) -> dict[str, ElementTree.Element]:
     """Title -> signal of the measurement, the instance's number among its children."""
-    found = root.findall(".//LinkedList[@name='m_MeasurementSignalNodeList']/PlatformSignalNode")
-    if not found:
+    elements = root.findall(".//LinkedList[@name='m_MeasurementSignalNodeList']/PlatformSignalNode")
+    if not elements:
         raise InputError(f"{path}: {root.tag} holds no signals (m_MeasurementSignalNodeList)")
-    titles = unique(f"axis {_text(node, 'm_uAxis')} node {_text(node, 'm_uNodeId')}" for node in found)
-    return dict(zip(titles, found, strict=True))
+    titles = unique(f"axis {_text(node, 'm_uAxis')} node {_text(node, 'm_uNodeId')}" for node in elements)
+    return dict(zip(titles, elements, strict=True))
 
 
 def _text(element: ElementTree.Element, name: str) -> str:
-    found = element.find(f"*[@name='{name}']")
-    return (found.text or "").strip() if found is not None else ""
+    result = element.find(f"*[@name='{name}']")
+    return (result.text or "").strip() if result is not None else ""
 
 
 def _time_signals(path: Path, root: ElementTree.Element) -> Signals:
@@ -204,9 +204,9 @@ def read_response_xml(path: Path) -> FrequencyResponse:
     nodes = _nodes(path, root)
     by_instance = {_text(node, "m_iUniqueInstanceId"): title for title, node in nodes.items()}
     pairs = [
-        (by_instance.get(_text(each, "m_iOutputSigNodeUniqueInstanceID")),
-         by_instance.get(_text(each, "m_iInputSigNodeUniqueInstanceID")))
-        for each in root.iter("PrimaryFreqRespSigNodeData")
+        (by_instance.get(_text(element, "m_iOutputSigNodeUniqueInstanceID")),
+         by_instance.get(_text(element, "m_iInputSigNodeUniqueInstanceID")))
+        for element in root.iter("PrimaryFreqRespSigNodeData")
     ]  # fmt: skip
     if not pairs:
         raise InputError(f"{path}: {root.tag} does not say which signal is input and which is output")
@@ -247,7 +247,7 @@ def _spectrum(path: Path, title: str, info: Any) -> tuple[Array, Complexes]:
     spectrum = info.find("CrossSpectrum") if info is not None else None
     if spectrum is None:
         raise InputError(f"{path}: {title} has no spectrum; save it with spectra")
-    arrays = {each.get("name"): each for each in spectrum.findall("NumericArray")}
+    arrays = {entry.get("name"): entry for entry in spectrum.findall("NumericArray")}
     parts = _doubles(path, arrays.get("m_ValueVector"))
     hertz = _doubles(path, arrays.get("m_FrequencyVector"))
     if parts.size != 2 * hertz.size:

@@ -63,9 +63,9 @@ class Table:
             try:
                 for i, values in enumerate(block):
                     self._file.seek(8 * (i * self.rows + first))
-                    left = np.ascontiguousarray(values).data.cast("B")
-                    while left:
-                        left = left[self._file.write(left) :]
+                    remaining = np.ascontiguousarray(values).data.cast("B")
+                    while remaining:
+                        remaining = remaining[self._file.write(remaining) :]
             except OSError as error:
                 raise self._unusable(error) from error
         self.filled = last
@@ -91,7 +91,7 @@ class Table:
 
 def release(*arrays: Array) -> None:
     """Give back the memory that the pages of mapped arrays have taken; they stay readable. Others are left alone."""
-    for mapped in {id(found): found for array in arrays if (found := _mapping(array)) is not None}.values():
+    for mapped in {id(mapping): mapping for array in arrays if (mapping := _mapping(array)) is not None}.values():
         if hasattr(mapped, "madvise"):  # not on Windows
             mapped.madvise(mmap.MADV_DONTNEED)
 
@@ -105,12 +105,12 @@ def stretches(*arrays: Array, rows: int = STRETCH) -> Iterator[tuple[Array, ...]
 
 def unchangeable(array: Array) -> bool:
     """Whether nobody can change the array, be it through another that shares its memory."""
-    held: object = array
-    while isinstance(held, np.ndarray):
-        if held.flags.writeable:
+    fixed: object = array
+    while isinstance(fixed, np.ndarray):
+        if fixed.flags.writeable:
             return False
-        held = held.base
-    return held is None or (isinstance(held, memoryview) and held.readonly)
+        fixed = fixed.base
+    return fixed is None or (isinstance(fixed, memoryview) and fixed.readonly)
 
 
 def least_and_largest(values: Array) -> tuple[float, float]:
@@ -120,8 +120,8 @@ def least_and_largest(values: Array) -> tuple[float, float]:
 
 
 def _mapping(array: Array) -> mmap.mmap | None:
-    held: object = array
-    while isinstance(held, np.ndarray):
-        held = held.base
-    owner = held.obj if isinstance(held, memoryview) else held
+    fixed: object = array
+    while isinstance(fixed, np.ndarray):
+        fixed = fixed.base
+    owner = fixed.obj if isinstance(fixed, memoryview) else fixed
     return owner if isinstance(owner, mmap.mmap) else None

@@ -157,10 +157,10 @@ def matching(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
     """
     names, wanted = list(names), set[str]()
     for pattern in patterns:
-        found = {pattern} if pattern in names else {name for name in names if matches(name, pattern)}
-        if not found:
+        result = {pattern} if pattern in names else {name for name in names if matches(name, pattern)}
+        if not result:
             raise InputError(f"no column matches {pattern!r}{suggest(pattern, names)}")
-        wanted |= found
+        wanted |= result
     return [name for name in names if name in wanted]
 
 

@@ -50,16 +50,16 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
     functions: dict[str, Mapping[str, Any]] = {}
     coherences: dict[str, Mapping[str, Any]] = {}
     others: list[str] = []
-    for each in sets:
-        kind = int(each["func_type"])
+    for entry in sets:
+        kind = int(entry["func_type"])
         if kind not in (RESPONSE, COHERENCE):
             others.append(FUNCTIONS.get(kind, f"function type {kind}"))
             continue
         into = functions if kind == RESPONSE else coherences
-        name = _name(each)
+        name = _name(entry)
         if name in into:
             raise InputError(f"{path}: two functions of type {kind} are called {name!r}")
-        into[name] = each
+        into[name] = entry
     if not functions:
         there = f"; there is {', '.join(dict.fromkeys(others))}" if others else ""
         raise InputError(f"{path}: no frequency response function (dataset 58, function type 4){there}")
@@ -67,10 +67,10 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
     frequency = _frequencies(path, first, functions[first])
     kept = slice(1 if frequency[0] == 0 else 0, None)
     columns, units, coherence = {}, {}, {}
-    for name, each in functions.items():
-        _check_same(path, name, _frequencies(path, name, each), frequency)
-        columns[name] = np.asarray(each["data"], dtype=np.complex128)[kept]
-        units[name] = quotient_unit(_label(each, "ordinate"), _label(each, "orddenom"))
+    for name, entry in functions.items():
+        _check_same(path, name, _frequencies(path, name, entry), frequency)
+        columns[name] = np.asarray(entry["data"], dtype=np.complex128)[kept]
+        units[name] = quotient_unit(_label(entry, "ordinate"), _label(entry, "orddenom"))
         if other := coherences.get(name):
             _check_same(path, f"coherence of {name}", _frequencies(path, name, other), frequency)
             coherence[name] = np.clip(np.real(other["data"])[kept], 0, 1)
@@ -93,15 +93,15 @@ def _sets(path: Path) -> list[Mapping[str, Any]]:
     if DATASET not in kinds:
         there = f"; there is {', '.join(str(kind) for kind in dict.fromkeys(kinds))}" if kinds else ""
         raise InputError(f"{path}: no dataset 58 (function at nodal degrees of freedom){there}")
-    found = []
+    result = []
     for i, kind in enumerate(kinds):
         if kind != DATASET:
             continue
         try:
-            found.append(file.read_sets(i))
+            result.append(file.read_sets(i))
         except Exception as error:
             raise InputError(f"{path}: dataset {i + 1} (of type 58) cannot be read: {error}") from None
-    return found
+    return result
 
 
 def _frequencies(path: Path, name: str, function: Mapping[str, Any]) -> Floats:

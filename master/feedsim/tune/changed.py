@@ -47,7 +47,7 @@ class Changed:
 def changed_values(before: Machine, after: Machine) -> tuple[Changed, ...]:
     """Parameters of shipped drives whose values differ, by axis, in the order of the unit's table."""
     table = parameters("controller")
-    found = []
+    result = []
     for axis in before.axes:
         old, new = before.axes[axis].drive, after.axes[axis].drive
         if not isinstance(old, Drive) or not isinstance(new, Drive):
@@ -60,7 +60,7 @@ def changed_values(before: Machine, after: Machine) -> tuple[Changed, ...]:
             if name.endswith(".type"):
                 group = name.partition(".")[0]
                 types = (getattr(old, group).type, getattr(new, group).type)
-                found.append(Changed(before.name, axis, f"drive.{name}", *types, ""))
+                result.append(Changed(before.name, axis, f"drive.{name}", *types, ""))
             else:
-                found.append(Changed(before.name, axis, f"drive.{name}", was.get(name), value, row.unit))
-    return tuple(found)
+                result.append(Changed(before.name, axis, f"drive.{name}", was.get(name), value, row.unit))
+    return tuple(result)

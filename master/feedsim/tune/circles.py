@@ -65,12 +65,12 @@ def practical(machine: Machine, plane: Sequence[str]) -> list[Pair]:
     span = min(machine.axes[axis].travel[1] - machine.axes[axis].travel[0] for axis in plane)
     speed = min(machine.axes[axis].max_speed for axis in plane)
     most = min([machine.path.acceleration, *(machine.axes[axis].max_acceleration for axis in plane)])
-    found = [Pair(radius, feed) for radius in RADII for feed in FEEDS]
+    pairs = [Pair(radius, feed) for radius in RADII for feed in FEEDS]
     low, high = ACCELERATIONS
     return sorted(
-        (each for each in found if low <= each.acceleration <= min(high, most) and 2 * each.radius < 0.9 * span
-         and each.feed <= speed),
-        key=lambda each: (each.acceleration, each.radius),
+        (pair for pair in pairs if low <= pair.acceleration <= min(high, most) and 2 * pair.radius < 0.9 * span
+         and pair.feed <= speed),
+        key=lambda pair: (pair.acceleration, pair.radius),
     )  # fmt: skip
 
 
@@ -80,15 +80,15 @@ def tuned_on(pairs: Sequence[Pair]) -> list[Pair]:
     What a compensation has to do at a reversal follows most from the acceleration; small radii give it in little time.
     """
     low, high = (pairs[i].acceleration for i in (0, -1))
-    fastest, largest = max(each.feed for each in pairs), max(each.radius for each in pairs)
-    smallest = min(each.radius for each in pairs)
-    found = []
+    fastest, largest = max(pair.feed for pair in pairs), max(pair.radius for pair in pairs)
+    smallest = min(pair.radius for pair in pairs)
+    result = []
     for k, a in enumerate(np.geomspace(low, high, COUNT)):
         radius = min(smallest * (1, 1, 2, 2, 2, 3, 3, 2)[k % 8], largest, fastest**2 / a)
-        found.append(Pair(radius, float(f"{math.sqrt(a * radius) * 60:.3g}") / 60))
+        result.append(Pair(radius, float(f"{math.sqrt(a * radius) * 60:.3g}") / 60))
     # The smallest circle at nearly the highest acceleration: there a pulse has the least time to decay.
-    found.append(Pair(smallest, float(f"{math.sqrt(0.9 * high * smallest) * 60:.3g}") / 60))
-    return [each for each in found if each not in pairs]
+    result.append(Pair(smallest, float(f"{math.sqrt(0.9 * high * smallest) * 60:.3g}") / 60))
+    return [pair for pair in result if pair not in pairs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +113,14 @@ class Circles:
         machine = scenario.machine
         middle = {axis: sum(machine.axes[axis].travel) / 2 for axis in plane}
         motions: list[Move | Arc | Dwell] = []
-        for each in pairs:
-            start = {first: middle[first] + each.radius, second: middle[second]}
+        for pair in pairs:
+            start = {first: middle[first] + pair.radius, second: middle[second]}
             motions += [
                 Move(to=start, feed=0.9 * min(machine.axes[axis].max_speed for axis in plane)),
                 Dwell(duration=REST),
                 Arc(
-                    plane=plane, feed=each.feed, centre_by={first: -each.radius, second: 0.0},
-                    angle=sweep_of(each, machine),
+                    plane=plane, feed=pair.feed, centre_by={first: -pair.radius, second: 0.0},
+                    angle=sweep_of(pair, machine),
                 ),
             ]  # fmt: skip
         columns = tuple(f"{axis}.x_a" for axis in plane)
@@ -137,8 +137,8 @@ class Circles:
         centre = (middle[first], middle[second])
         arcs = [segment for segment, motion in zip(program.segments, own.motions, strict=True) if motion.kind == "arc"]
         turns = tuple(
-            turn_of(program, plane, centre, segment.start, segment.end, run_in(each, machine))
-            for segment, each in zip(arcs, pairs, strict=True)
+            turn_of(program, plane, centre, segment.start, segment.end, run_in(value, machine))
+            for segment, value in zip(arcs, pairs, strict=True)
         )
         return cls(own, program, plane, tuple(pairs), turns, (centre,) * len(pairs))
 
@@ -151,13 +151,13 @@ class Circles:
 
         The larger of two reversals each. Raises as :func:`feedsim.cosim.run`.
         """
-        found = run(self.with_machine(machine), program=self.program, fmus=fmus, torque_feedforward=torque)
-        x, z = (np.asarray(found.trace[f"{axis}.x_a"]) for axis in self.plane)
+        results = run(self.with_machine(machine), program=self.program, fmus=fmus, torque_feedforward=torque)
+        x, z = (np.asarray(results.trace[f"{axis}.x_a"]) for axis in self.plane)
         result = np.empty((len(self.pairs), 2, 2))
-        for i, (each, turn, centre) in enumerate(zip(self.pairs, self.turns, self.centres, strict=True)):
-            rows = (found.trace.time >= turn[0]) & (found.trace.time <= turn[1])
+        for i, (pair, turn, centre) in enumerate(zip(self.pairs, self.turns, self.centres, strict=True)):
+            rows = (results.trace.time >= turn[0]) & (results.trace.time <= turn[1])
             u, w = x[rows] - centre[0], z[rows] - centre[1]
-            deviation, angle = np.hypot(u, w) - each.radius, np.arctan2(w, u)
+            deviation, angle = np.hypot(u, w) - pair.radius, np.arctan2(w, u)
             deviation = deviation - np.median(deviation)
             for k in range(2):
                 near = quadrant(angle, k * math.pi / 2) | quadrant(angle, k * math.pi / 2 + math.pi)

@@ -68,9 +68,9 @@ def with_groups(
 
     The values are those of the control; all torques of a draw are multiplied with one factor, and so are theirs.
     """
-    for axis, each in values.items():
+    for axis, entry in values.items():
         scale = torque_scale(of, machine, axis)
-        own = {name: scale * value if name.startswith("torque_") else value for name, value in each.items()}
+        own = {name: scale * value if name.startswith("torque_") else value for name, value in entry.items()}
         machine = compensated(machine, axis, group, own)
     return machine
 
@@ -90,7 +90,7 @@ def compensated(machine: Machine, axis: str, group: str, values: Mapping[str, fl
     """A machine whose axis has a group of its drive with other values."""
     own = machine.axes[axis]
     kind = type(own.drive).model_fields[group].annotation
-    (model,) = [each for each in kind.__args__ if each is not type(None)]  # type: ignore[union-attr]
+    (model,) = [entry for entry in kind.__args__ if entry is not type(None)]  # type: ignore[union-attr]
     names = model.model_fields
     filled = {name: values.get(name, info.default) for name, info in names.items()}
     drive = own.drive.model_copy(update={group: model.model_construct(**filled)})
@@ -133,8 +133,8 @@ class PulseGrid:
         machine = machines[0]
         scales = tuple(scale_of(machine, axis) if axis in axes else 0.0 for axis in circles.plane)
         none = _over(circles, machines, fmus)
-        found = np.empty((len(AMPLITUDE_SHARES), len(TIME_CONSTANTS), *none.shape))
-        found[0] = none
+        values = np.empty((len(AMPLITUDE_SHARES), len(TIME_CONSTANTS), *none.shape))
+        values[0] = none
         total, done = (len(AMPLITUDE_SHARES) - 1) * len(TIME_CONSTANTS), 0
         for i, share in enumerate(AMPLITUDE_SHARES[1:], start=1):
             for j, time in enumerate(TIME_CONSTANTS):
@@ -144,10 +144,10 @@ class PulseGrid:
                     for axis, scale in zip(circles.plane, scales, strict=True)
                     if scale
                 }
-                found[i, j] = _over(circles, machines, fmus, "friction_pulse", groups)
+                values[i, j] = _over(circles, machines, fmus, "friction_pulse", groups)
                 done += 1
         progress("pulses", total, total)
-        return cls((scales[0], scales[1]), found)
+        return cls((scales[0], scales[1]), values)
 
     def sizes(self, axis: int, amplitudes: Array, time: Array) -> Array:
         """(candidates, pairs) errors [m] of an axis; amplitudes (candidates, pairs) [m/s], time (candidates,) [s].
@@ -171,12 +171,12 @@ def _over(
 
     machines: the first one, and draws of it.
     """
-    found = []
+    result = []
     for k, machine in enumerate(machines):
         own = with_groups(machine, machines[0], group, values or {})
         with draw_named(k - 1, len(machines) - 1, "which the values are found on") if k else nullcontext():
-            found.append(circles.errors(own, fmus=fmus))
-    return np.concatenate(found)
+            result.append(circles.errors(own, fmus=fmus))
+    return np.concatenate(result)
 
 
 def _between(grid: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
@@ -252,7 +252,7 @@ def together(
     before: (machines x pairs, axes) errors [m] without compensation.
     """
     columns = [circles.plane.index(axis) for axis in values]
-    best = {axis: dict(each) for axis, each in values.items()}
+    best = {axis: dict(value) for axis, value in values.items()}
 
     def cost(at: Mapping[str, Mapping[str, float | bool]]) -> float:
         errors = size(_over(circles, machines, fmus, "friction_pulse", at))[:, columns]
@@ -260,7 +260,7 @@ def together(
 
     least, runs = cost(best), 1
     names = ("amplitude", "amplitude_min", "time")
-    free = [(axis, name) for axis, each in best.items() for name in names if each.get(name)]  # 0 stays 0
+    free = [(axis, name) for axis, value in best.items() for name in names if value.get(name)]  # 0 stays 0
     total = 2 * len(PULSE_STEPS) * len(free)
     for step in PULSE_STEPS:
         for axis, name in free:
@@ -268,8 +268,8 @@ def together(
                 progress("both axes", runs, total)
                 runs += 1
                 tried = {**best, axis: {**best[axis], name: factor * best[axis][name]}}
-                if (found := cost(tried)) < least:
-                    best, least = tried, found
+                if (result := cost(tried)) < least:
+                    best, least = tried, result
                     break
     progress("both axes", total, total)
     return best, len(machines) * runs
@@ -323,10 +323,10 @@ def table(
                 tried = {axis: np.maximum(torques[axis] + sign * step * level[axis] * direction, 0.0) for axis in axes}
                 if all(np.array_equal(tried[axis], torques[axis]) for axis in axes):
                     continue
-                found = scores(tried)
+                result = scores(tried)
                 for axis in axes:
-                    if found[axis] < best[axis]:
-                        best[axis], torques[axis] = found[axis], tried[axis]
+                    if result[axis] < best[axis]:
+                        best[axis], torques[axis] = result[axis], tried[axis]
     progress("torques", total, total)
     return Found("table", {axis: values_of(axis, torques[axis]) for axis in axes}, runs)
 

@@ -150,7 +150,11 @@ class _Search:
         stops, circles = wanted
         moves = _program(self.scenario, self.axis, self.partner, (stops, ()))
         turns = _program(self.scenario, self.axis, self.partner, ((), circles))
-        drawn = [Part(each, 1.0, k + 1) for k in range(min(RUN_DRAWS, len(self.draws))) for each in (turns, moves)]
+        drawn = [
+            Part(drive_program, 1.0, k + 1)
+            for k in range(min(RUN_DRAWS, len(self.draws)))
+            for drive_program in (turns, moves)
+        ]
         return (Part(turns, 1.0), *(Part(moves, factor) for factor in self.factors), *drawn)
 
     @property
@@ -160,20 +164,20 @@ class _Search:
 
     def errors(self, parts: Sequence[Part], machine: Machine) -> tuple[Errors, ...]:
         """What a machine makes of every part."""
-        found = []
-        for each in parts:
-            if not each.draw:
-                found.append(each.program.errors(self.with_modes(machine, each.factor), fmus=self.fmus))
+        result = []
+        for part in parts:
+            if not part.draw:
+                result.append(part.program.errors(self.with_modes(machine, part.factor), fmus=self.fmus))
                 continue
-            with draw_named(each.draw - 1, len(self.draws), "which the values are found on"):
-                found.append(self.errors_on(self.draws[each.draw - 1], each.program, machine))
-        return tuple(found)
+            with draw_named(part.draw - 1, len(self.draws), "which the values are found on"):
+                result.append(self.errors_on(self.draws[part.draw - 1], part.program, machine))
+        return tuple(result)
 
     def errors_on(self, draw: Machine, program: DriveProgram, machine: Machine) -> Errors:
         """What a draw makes of a program with the drives of `machine`; the torque as the machine itself has it."""
         before = self.scenario.machine
-        found = program.errors(typed_on(draw, before, machine), fmus=self.fmus)
-        return replace(found, torque=found.torque / torque_scale(before, draw, self.axis))
+        result = program.errors(typed_on(draw, before, machine), fmus=self.fmus)
+        return replace(result, torque=result.torque / torque_scale(before, draw, self.axis))
 
     # --- a candidate ------------------------------------------------------------------------------------------------
 
@@ -187,18 +191,18 @@ class _Search:
     def rank(self, x: Array) -> Rank:
         """Violation of the limits, and mean ratio of errors, of a candidate at places x."""
         drive = self.knobs.drive_at(x)
-        found = self._rank(drive, self.margins(drive))
-        self.tried.append((found, x))
-        return found
+        result = self._rank(drive, self.margins(drive))
+        self.tried.append((result, x))
+        return result
 
     def margins(self, drive: Drive) -> Margins:
         """Of a candidate, which is counted; over draws, too, where the machine itself allows it to run."""
-        found = margins_of(self.judges, drive)
-        if self.drawn_judges and not self.too_little(found):
-            found = worse_of(found, margins_of(self.drawn_judges, drive))
+        result = margins_of(self.judges, drive)
+        if self.drawn_judges and not self.too_little(result):
+            result = worse_of(result, margins_of(self.drawn_judges, drive))
         self.closed += 1
-        self.seen.append(found)
-        return found
+        self.seen.append(result)
+        return result
 
     def _rank(self, drive: Drive, margins: Margins) -> Rank:
         violation = self.violation(margins)
@@ -207,7 +211,7 @@ class _Search:
         errors = self.errors(self.parts, self.machine_with(drive))
         self.runs += 1
         ratios, ratio = _ratios(self.before, errors)
-        torque, before = (max(each.torque for each in some) for some in (errors, self.before))
+        torque, before = (max(errors.torque for errors in some) for some in (errors, self.before))
         most = max(TORQUE * drive.M_max, before)
         violation += max(0.0, torque / most - 1) + float(np.maximum(ratios / WORSE - 1, 0).sum())
         self.points.append(Point(margins, ratio, float(errors[0].peak.max()), violation == 0))
@@ -258,7 +262,7 @@ class _Search:
         for seed, (start, step) in enumerate(zip(starts, SIMPLEX_STEPS, strict=True), start=1):
             least(counted, start(), step=step, evaluations=self.evaluations, seed=seed)
         self.progress("candidates", total, total)
-        allowed = sorted((each for each in self.tried if each[0][0] == 0), key=lambda each: each[0])
+        allowed = sorted((entry for entry in self.tried if entry[0][0] == 0), key=lambda entry: entry[0])
         return [x for _, x in allowed[:FINALISTS]]
 
     def as_present(self) -> Array:
@@ -267,7 +271,7 @@ class _Search:
 
     def best_yet(self) -> Array:
         """Places of the best candidate that was tried."""
-        return min(self.tried, key=lambda each: each[0])[1]
+        return min(self.tried, key=lambda entry: entry[0])[1]
 
     def fast_start(self) -> Array:
         """All gains higher together, as far as the margins allow: by closed forms alone."""
@@ -320,7 +324,7 @@ class _Search:
         """Why no candidate is left: its margins, its noise, or its errors."""
         limits = self.limits
         asked = f"{limits.gain_margin:g} dB and {limits.phase_margin:g} deg"
-        within = [each for each in self.seen if limits.missing(each) == 0]
+        within = [margins for margins in self.seen if limits.missing(margins) == 0]
         if not within:
             nearest = min(self.seen, key=limits.missing)
             has = (
@@ -329,8 +333,8 @@ class _Search:
                 else "none is stable"
             )
             return f"none of {self.closed} candidates has {asked}; {has}; ask for less or raise {spelt('evaluations')}"
-        if all(self.violation(each) > 0 for each in within):
-            noise = min(each.noise for each in within) * limits.encoder_noise
+        if all(self.violation(margins) > 0 for margins in within):
+            noise = min(margins.noise for margins in within) * limits.encoder_noise
             return (
                 f"the {len(within)} candidates with {asked} turn the encoder's noise into {noise:.3g} N.m of torque or "
                 f"more, {self.most_noise:.3g} N.m are allowed; ask for less or correct {spelt('encoder_noise')}"
@@ -365,7 +369,7 @@ class _Search:
                 judges = judges_of(before, self.axis, self.structures, self.factors, draw, name)
                 margins.append(margins_of(judges, tuned.machine.shipped_drive(self.axis, "tuning")))
                 if not tuned.kept:
-                    without, with_it = (self.errors_on(draw, program, each) for each in (before, tuned.machine))
+                    without, with_it = (self.errors_on(draw, program, entry) for entry in (before, tuned.machine))
                     cases.append(Case(name, program, without, with_it))
         self.progress("draws", count, count)
         return Drawn(cloud, tuple(margins), tuple(cases))

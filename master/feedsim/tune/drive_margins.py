@@ -52,30 +52,30 @@ def judges_of(
     """Name -> judge at every pose with every factor on its modes. poses: name -> modes of structures. name: of a
     draw."""
     own = machine if draw is None else draw
-    found = {}
+    judges = {}
     for pose, modes in poses.items():
         for factor in factors:
             words = ", ".join(filter(None, [name, pose, "" if factor == 1 else percent("modes", factor)]))
             candidates = Candidates(own, with_transmissions(own, scaled(modes, factor)), axis)
-            found[words] = Judge(candidates, own, machine, axis)
-    return found
+            judges[words] = Judge(candidates, own, machine, axis)
+    return judges
 
 
 def margins_of(judges: Mapping[str, Judge], drive: Drive) -> Margins:
     """Least margins and largest noise over judges."""
-    found = {name: each.found(drive) for name, each in judges.items()}
-    return _over({name: worst for name, (worst, _) in found.items()}, max(noise for _, noise in found.values()))
+    result = {name: value.found(drive) for name, value in judges.items()}
+    return _over({name: worst for name, (worst, _) in result.items()}, max(noise for _, noise in result.values()))
 
 
 def checked(judges: Mapping[str, Judge], machine: Machine, axis: str) -> Margins:
     """Margins of a result, by a second judgement that keeps nothing and knows nothing of the search."""
     noise = margins_of(judges, machine.shipped_drive(axis, "tuning")).noise
-    return _over({name: each.checked(machine) for name, each in judges.items()}, noise)
+    return _over({name: value.checked(machine) for name, value in judges.items()}, noise)
 
 
 def worse_of(one: Margins, two: Margins) -> Margins:
     """The lesser margins and the larger noise of two."""
-    gain, phase = min(one, two, key=lambda each: each.gain), min(one, two, key=lambda each: each.phase)
+    gain, phase = min(one, two, key=lambda margins: margins.gain), min(one, two, key=lambda margins: margins.phase)
     return Margins(gain.gain, phase.phase, gain.gain_of, phase.phase_of, max(one.noise, two.noise))
 
 
@@ -98,9 +98,13 @@ def _least_of(loops: Sequence[Loop]) -> Worst:
     return (size, f"{gain.kind} loop {gain.state}"), (phase.phase_margin, f"{phase.kind} loop {phase.state}")
 
 
-def _over(found: Mapping[str, Worst], noise: float) -> Margins:
-    gain = min(found, key=lambda name: found[name][0][0])
-    phase = min(found, key=lambda name: found[name][1][0])
+def _over(result: Mapping[str, Worst], noise: float) -> Margins:
+    gain = min(result, key=lambda name: result[name][0][0])
+    phase = min(result, key=lambda name: result[name][1][0])
     return Margins(
-        found[gain][0][0], found[phase][1][0], f"{found[gain][0][1]}, {gain}", f"{found[phase][1][1]}, {phase}", noise
+        result[gain][0][0],
+        result[phase][1][0],
+        f"{result[gain][0][1]}, {gain}",
+        f"{result[phase][1][1]}, {phase}",
+        noise,
     )

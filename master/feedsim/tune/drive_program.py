@@ -106,8 +106,8 @@ class DriveProgram:
         cls, scenario: Scenario, axis: str, partner: str, stops: Sequence[Stop], circles: Sequence[Pair], slower: float
     ) -> DriveProgram:
         machine = scenario.machine
-        stops = [Stop(each.distance, slower * each.feed) for each in stops]
-        circles = [Pair(each.radius, slower * each.feed) for each in circles]
+        stops = [Stop(stop.distance, slower * stop.feed) for stop in stops]
+        circles = [Pair(circle.radius, slower * circle.feed) for circle in circles]
         approach = APPROACH * slower * machine.axes[axis].max_speed
         rest = max(MIN_PROGRAM_REST, RESTS / machine.shipped_drive(axis, "tuning").K_v)
         motions: list[Move | Arc | Sine | Dwell] = [Dwell(duration=REST)]
@@ -118,20 +118,20 @@ class DriveProgram:
             stopping.append((len(motions), at, math.copysign(1.0, stop.distance)))
             motions += [Move(by={axis: stop.distance}, feed=stop.feed), Dwell(duration=rest)]
         centres = []
-        for each in circles:
-            centre = tuple(_centre(machine, name, each.radius) for name in (axis, partner) if name)
+        for pair in circles:
+            centre = tuple(_centre(machine, name, pair.radius) for name in (axis, partner) if name)
             if partner:
-                start = {axis: centre[0] + each.radius, partner: centre[1]}
+                start = {axis: centre[0] + pair.radius, partner: centre[1]}
                 motions += [Move(to=start, feed=approach), Dwell(duration=REST)]
                 turning.append(len(motions))
                 motions.append(Arc(
-                    plane=(axis, partner), feed=each.feed, centre_by={axis: -each.radius, partner: 0.0},
-                    angle=sweep_of(each, machine),
+                    plane=(axis, partner), feed=pair.feed, centre_by={axis: -pair.radius, partner: 0.0},
+                    angle=sweep_of(pair, machine),
                 ))  # fmt: skip
             else:
                 motions += [Move(to={axis: centre[0]}, feed=approach), Dwell(duration=REST)]
                 turning.append(len(motions))
-                sine = SineMove(amplitude=each.radius, frequency=each.feed / (2 * math.pi * each.radius), periods=2)
+                sine = SineMove(amplitude=pair.radius, frequency=pair.feed / (2 * math.pi * pair.radius), periods=2)
                 motions.append(Sine(axis=axis, moves=(sine,)))
             centres.append((centre[0], centre[1] if partner else 0.0))
         interval = max(1, round(INTERVAL / machine.cycles.T_c)) * machine.cycles.T_c
@@ -147,13 +147,13 @@ class DriveProgram:
             end = program.segments[index].end
             spans.append((end, end + rest, target, sense))
         turns = []
-        for index, each, (own_centre, other) in zip(turning, circles, centres, strict=True):
+        for index, pair, (own_centre, other) in zip(turning, circles, centres, strict=True):
             segment = program.segments[index]
             if partner:
-                begin = run_in(each, machine)
+                begin = run_in(pair, machine)
                 turns.append(turn_of(program, (axis, partner), (own_centre, other), segment.start, segment.end, begin))
             else:  # behind the fading a full period, which begins a sixth of it later
-                period = 2 * math.pi * each.radius / each.feed
+                period = 2 * math.pi * pair.radius / pair.feed
                 turns.append((segment.start + (1 + RUN_IN_ANGLE / (2 * math.pi)) * period,
                               segment.start + (2 + RUN_IN_ANGLE / (2 * math.pi)) * period))  # fmt: skip
         return cls(own, program, axis, partner, tuple(stops), tuple(circles), tuple(spans), tuple(turns),
@@ -211,15 +211,15 @@ def stops_of(machine: Machine, axis: str, shares: Sequence[tuple[float, float]])
     low, high = machine.axes[axis].travel
     up, down = high - machine.pose[axis], machine.pose[axis] - low
     sense, room = (1.0, up) if up >= down else (-1.0, down)
-    found, at = [], 0.0
+    stops, at = [], 0.0
     for distance, feed in shares:
         size = min(distance, ROOM * room / 2)
         if not 0 <= at + sense * size <= ROOM * room if sense > 0 else not -ROOM * room <= at + sense * size <= 0:
             sense = -sense
-        found.append(Stop(sense * size, min(feed, SPEED_SHARE * machine.axes[axis].max_speed)))
+        stops.append(Stop(sense * size, min(feed, SPEED_SHARE * machine.axes[axis].max_speed)))
         at += sense * size
         sense = -sense if abs(at) > 0 else sense
-    return found
+    return stops
 
 
 def circles_of(machine: Machine, axis: str, partner: str, wanted: Sequence[tuple[float, float]]) -> list[Pair]:
@@ -228,14 +228,14 @@ def circles_of(machine: Machine, axis: str, partner: str, wanted: Sequence[tuple
     span = min(machine.axes[name].travel[1] - machine.axes[name].travel[0] for name in names)
     speed = min(machine.axes[name].max_speed for name in names)
     most = min([machine.path.acceleration, *(machine.axes[name].max_acceleration for name in names)])
-    found = []
+    pairs = []
     for radius, feed in wanted:
         r = min(radius, ROOM * span / 2)
         v = min(feed, SPEED_SHARE * speed, math.sqrt(ACCELERATION * most * r))
         # the limit of the jerk along the path holds for the turn as well: v^3/r^2
         v = min(v, (ACCELERATION * machine.path.jerk * r**2) ** (1 / 3))
-        found.append(Pair(r, v))
-    return found
+        pairs.append(Pair(r, v))
+    return pairs
 
 
 def partner_of(scenario: Scenario, axis: str) -> str:

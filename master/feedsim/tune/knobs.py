@@ -80,34 +80,34 @@ class Knobs:
         d = self.drive
         names = ["K_p", *(["T_n"] if d.speed_integrator else []), "K_v"]
         fit = self._fit(d)
-        found = [self._ranged(name) for name in names if getattr(d, name)]
+        knobs = [self._ranged(name) for name in names if getattr(d, name)]
         if fit is not None:
-            found += [self._ranged("omega_0"), Knob("fit", min(FIT[0], 0.9 * fit), max(FIT[1], 1.1 * fit))]
+            knobs += [self._ranged("omega_0"), Knob("fit", min(FIT[0], 0.9 * fit), max(FIT[1], 1.1 * fit))]
         if d.k_ffw > 0 and math.isfinite(self._neutral(d)):
             off, width = self._off(d), SYMMETRY * max(self._neutral(d), d.T_sym)
             if width > 0:
-                found.append(Knob("off", min(-width, 1.1 * off), max(width, 1.1 * off), log=False))
+                knobs.append(Knob("off", min(-width, 1.1 * off), max(width, 1.1 * off), log=False))
         if not self.elastic:
-            return tuple(found)
+            return tuple(knobs)
         highest = 0.5 / self.cycles.T_c
         for name in self._filters:
-            each = getattr(d, name)
+            entry = getattr(d, name)
             for part, (low, high) in NOTCH.items():
-                value = getattr(each, part)
-                if value is None or (part == "D_num" and each.type == "low_pass") or value <= 0:
+                value = getattr(entry, part)
+                if value is None or (part == "D_num" and entry.type == "low_pass") or value <= 0:
                     continue
                 top = 0.95 * highest if part == "f" else MOST_DAMPING
                 bottom = 0.0 if part == "f" else LEAST_DAMPING
-                found.append(
+                knobs.append(
                     Knob(f"{name}.{part}", min(max(low * value, bottom), value), max(min(high * value, top), value))
                 )
         if not self._filters:
-            found += [
+            knobs += [
                 Knob("new.f", NEW_NOTCH[0] * highest, NEW_NOTCH[1] * highest),
                 Knob("new.depth", 0.05, 1.0),
                 Knob("new.D_den", 0.2, 1.0),
             ]
-        return tuple(found)
+        return tuple(knobs)
 
     @property
     def present(self) -> Array:
@@ -160,17 +160,17 @@ class Knobs:
         return 1 / (omega * math.sqrt(10 ** (UNMEASURED / 10) * square - 1))
 
     def _values(self, d: Drive) -> dict[str, float]:
-        found = {name: float(getattr(d, name)) for name in RANGES if getattr(d, name)}
+        values = {name: float(getattr(d, name)) for name in RANGES if getattr(d, name)}
         fit = self._fit(d)
         if fit is not None:
-            found["fit"] = fit
-        found["off"] = self._off(d)
+            values["fit"] = fit
+        values["off"] = self._off(d)
         for name in self._filters:
-            found |= {f"{name}.{part}": float(getattr(getattr(d, name), part) or 0.0) for part in NOTCH}
+            values |= {f"{name}.{part}": float(getattr(getattr(d, name), part) or 0.0) for part in NOTCH}
         if not self._filters:
-            found |= {"new.f": 0.5 / self.cycles.T_c * math.sqrt(NEW_NOTCH[0] * NEW_NOTCH[1]), "new.depth": 1.0}
-            found["new.D_den"] = 0.5
-        return found
+            values |= {"new.f": 0.5 / self.cycles.T_c * math.sqrt(NEW_NOTCH[0] * NEW_NOTCH[1]), "new.depth": 1.0}
+            values["new.D_den"] = 0.5
+        return values
 
     def _fit(self, d: Drive) -> float | None:
         gain = model_gain(d, self.J)

@@ -70,24 +70,24 @@ def of_circle(
     machine, modes: None where nothing is known of the machine, so that directions are all there is. searched: values
     that take a search within margins are found, which takes seconds.
     """
-    found: dict[str, Proposal] = {}
+    result: dict[str, Proposal] = {}
     for term in worth_telling(diagnosis):
         proposals = _unknown(diagnosis, term) if machine is None or modes is None else _of(
             diagnosis, term, machine, modes, searched
         )  # fmt: skip
-        for each in proposals:
-            found.setdefault(each.key, each)
-    return list(found.values())
+        for proposal in proposals:
+            result.setdefault(proposal.key, proposal)
+    return list(result.values())
 
 
 def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -> list[Proposal]:
     """What does not fit together within the drives of some axes: T_sym beside neutral, K_p beside its model."""
-    found = []
+    proposals = []
     for axis in axes:
         drive = machine.axes[axis].drive
         if isinstance(drive, Drive):
-            found += [*_neutral(machine, modes, axis, drive, cause), *_fitting(machine, modes, axis, drive, cause)]
-    return found
+            proposals += [*_neutral(machine, modes, axis, drive, cause), *_fitting(machine, modes, axis, drive, cause)]
+    return proposals
 
 
 def of_run(run: Run, causes: Mapping[str, Diagnosis], *, searched: bool = False) -> list[Proposal]:
@@ -103,15 +103,15 @@ def of_run(run: Run, causes: Mapping[str, Diagnosis], *, searched: bool = False)
         modes = checked_modes(machine)
     except FeedsimError:
         return []
-    found: dict[str, Proposal] = {}
+    proposals: dict[str, Proposal] = {}
     for diagnosis in causes.values():
-        for each in of_circle(diagnosis, machine, modes, searched=searched):
-            found.setdefault(each.key, each)
+        for proposal in of_circle(diagnosis, machine, modes, searched=searched):
+            proposals.setdefault(proposal.key, proposal)
     for task in tasks(run.scenario, run.program):
         if isinstance(task, PositioningTask):
-            for each in of_drives(machine, modes, [task.approach.axis], f"stops of {task.approach.axis}"):
-                found.setdefault(each.key, each)
-    return list(found.values())
+            for proposal in of_drives(machine, modes, [task.approach.axis], f"stops of {task.approach.axis}"):
+                proposals.setdefault(proposal.key, proposal)
+    return list(proposals.values())
 
 
 def changed(machine: Machine, axis: str, values: Mapping[str, float]) -> Machine:
@@ -179,7 +179,7 @@ def _servo(axes: tuple[str, str], value: float, machine: Machine, modes: Modes) 
     loops = L.T_dyn + neutral[late] - E.T_dyn - neutral[early]
     if loops > NEUTRAL:
         parts.append((loops, _matching(early, E, E.T_dyn + loops, late, cause)))
-    yield from (each for _, each in sorted(parts, key=lambda part: -part[0]))
+    yield from (proposal for _, proposal in sorted(parts, key=lambda part: -part[0]))
     if axis_lag(L) - axis_lag(E) < 0.5 * abs(value):  # the drives as the file has them do not explain it
         yield _matching(early, E, E.T_dyn + abs(value), late, cause)
 
@@ -193,13 +193,13 @@ def _feedforward(machine: Machine, modes: Modes, late: str, early: str, L: Drive
         )  # fmt: skip
     K_v = (1 - L.k_ffw) / feedforward_lag(E)
     before, after = (
-        least_margins(judge(each, modes), late) for each in (machine, changed(machine, late, {"K_v": K_v}))
+        least_margins(judge(entry, modes), late) for entry in (machine, changed(machine, late, {"K_v": K_v}))
     )
     reason = f"without feedforward an axis is 1/K_v late: as much as {early} is"
     if after[0] < GAIN_MARGIN or after[1] < PHASE_MARGIN:
         K_v = (1 - E.k_ffw) / feedforward_lag(L)
         before, after = (
-            least_margins(judge(each, modes), early) for each in (machine, changed(machine, early, {"K_v": K_v}))
+            least_margins(judge(entry, modes), early) for entry in (machine, changed(machine, early, {"K_v": K_v}))
         )
         reason = f"{late} has no margin for a higher K_v, so {early} is made as slow"
         return Proposal(cause, early, "drive.K_v", E.K_v, K_v, "1/s", reason, "lower", (before, after))
@@ -235,7 +235,7 @@ def _fitting(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
     if K_p is None or abs(drive.K_p / K_p - 1) <= FITS:
         return
     before, after = (
-        least_margins(judge(each, modes), axis) for each in (machine, changed(machine, axis, {"K_p": K_p}))
+        least_margins(judge(entry, modes), axis) for entry in (machine, changed(machine, axis, {"K_p": K_p}))
     )
     reason = "J omega_0/(2 D), which the reference model stands for"
     direction = "higher" if K_p > drive.K_p else "lower"

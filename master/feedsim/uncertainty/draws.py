@@ -90,19 +90,19 @@ def cloud_of(machine: Machine, axes: Sequence[str] | None = None) -> Cloud:
 
     Raises InputError: no axis has identified values with intervals; as :func:`known_of`.
     """
-    found = known_values(machine, axes)
-    if not found:
+    result = known_values(machine, axes)
+    if not result:
         raise InputError(
             f"{machine.name}: no axis has identified values with intervals, which draws could be made from; give an "
             "axis the friction file of feedsim identify or identify-drive"
         )
-    return Cloud(machine, found)
+    return Cloud(machine, result)
 
 
 def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[str, Known]:
     """Axis -> what its files say of its values, of axes that have identified values with intervals. Raises InputError
     as :func:`known_of`."""
-    found = {}
+    result = {}
     for name in axes or machine.axes:
         axis = machine.axes[name]
         if not isinstance(axis.friction, Friction):
@@ -117,8 +117,8 @@ def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[st
             }
         known = known_of(axis.friction, name, present)
         if known.names:
-            found[name] = known
-    return found
+            result[name] = known
+    return result
 
 
 def known_of(friction: Friction, axis: str, present: Mapping[str, Any]) -> Known:
@@ -297,24 +297,24 @@ def _drive(drive: Any, drawn: Mapping[str, float], factor: float) -> Any:
 
 def _group_torques(drive: Drive, factor: float) -> dict[str, ParameterGroup]:
     """Groups of a drive that have torques, cogging and a friction table, with these times `factor`."""
-    found = {}
+    parameter_groups = {}
     for name in Drive.model_fields:
-        if isinstance(each := getattr(drive, name), ParameterGroup):
-            quantities = {key: Quantity.of(info) for key, info in type(each).model_fields.items()}
+        if isinstance(parameter_group := getattr(drive, name), ParameterGroup):
+            quantities = {key: Quantity.of(info) for key, info in type(parameter_group).model_fields.items()}
             torques = [key for key, quantity in quantities.items() if quantity is not None and quantity.unit == "N.m"]
             if torques:
-                found[name] = _times(each, torques, factor)
-    return found
+                parameter_groups[name] = _times(parameter_group, torques, factor)
+    return parameter_groups
 
 
 def _behind_motor(axis: Any, factor: float) -> dict[str, ParameterGroup]:
     """Contact of the motor, and a guide with a law of its own, with their forces times `factor`."""
-    found: dict[str, ParameterGroup] = {}
+    parameter_groups: dict[str, ParameterGroup] = {}
     if axis.transmission is not None:
-        found["transmission"] = _times(axis.transmission, ("stiffness", "damping"), factor)
+        parameter_groups["transmission"] = _times(axis.transmission, ("stiffness", "damping"), factor)
     if axis.guide is not None and axis.guide.share is None:
-        found["guide"] = _times(axis.guide, SHARED_WITH_GUIDE, factor)
-    return found
+        parameter_groups["guide"] = _times(axis.guide, SHARED_WITH_GUIDE, factor)
+    return parameter_groups
 
 
 def _times(group: ParameterGroup, names: Iterable[str], factor: float) -> ParameterGroup:

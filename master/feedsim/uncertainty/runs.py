@@ -88,14 +88,14 @@ def of_run(
         curves.append({key: y for key, (_, y) in curves_of(done).items()})
     progress("draws", count, count)
     bands = tuple(
-        Band.of(prefix, kind, at, y, np.array([each[prefix, kind] for each in curves]))
+        Band.of(prefix, kind, at, y, np.array([curve[prefix, kind] for curve in curves]))
         for (prefix, kind), (at, y) in shapes.items()
     )
     return Uncertainty(cloud, count, intervals_of(evaluate(nominal), figures), bands)
 
 
 def of_compensation(
-    found: Compensation, known: Mapping[str, Known], cloud: Cloud | None, count: int, *, seed: int = 1,
+    compensation: Compensation, known: Mapping[str, Known], cloud: Cloud | None, count: int, *, seed: int = 1,
     fmus: Path | None = None, progress: Callable[[str, int, int], None],
 ) -> Uncertainty:  # fmt: skip
     """Run a circle without and with compensation, with draws of the machine and of the sets that compensate.
@@ -103,9 +103,9 @@ def of_compensation(
     known: axis -> what is known of the set of its compensation, where that is not the machine's. cloud: of the machine,
     where it has identified values. Raises as :func:`feedsim.cosim.run`.
     """
-    scenario, program, turn = found.scenario, found.after.program, found.turn
+    scenario, program, turn = compensation.scenario, compensation.after.program, compensation.turn
     columns = tuple(f"{axis}.x_a" for axis in turn.axes)
-    tool = tuple(name for name in found.after.trace.columns if name.startswith("tcp."))
+    tool = tuple(name for name in compensation.after.trace.columns if name.startswith("tcp."))
     recording = Recording(interval=scenario.recording.interval, variables=(*columns, *tool))
     lean = scenario.model_copy(update={"recording": recording})
     random = np.random.default_rng(seed + 1)
@@ -117,54 +117,54 @@ def of_compensation(
             progress("draws", k, count)
             sets = {
                 axis: drawn_friction(friction, known[axis], random) if axis in known else friction
-                for axis, friction in found.frictions.items()
+                for axis, friction in compensation.frictions.items()
             }
             torque = {
-                axis: torque_scale(scenario.machine, machine, axis) * each
-                for axis, each in friction_feedforward(machine, program, sets, found.delays, law).items()
+                axis: torque_scale(scenario.machine, machine, axis) * values
+                for axis, values in friction_feedforward(machine, program, sets, compensation.delays, law).items()
             }
             plan = on_draw(lean, machine)
             with draw_named(k, count):
                 before = run(plan, program=program, fmus=fmus)
                 after = run(plan, program=program, fmus=fmus, torque_feedforward=torque)
             figures.append(circle_figures(turn, before.trace, after.trace))
-            for name, each in (("without", before), ("with", after)):
-                curves[name].append(contour_of(contour(each.trace, turn)))
+            for name, value in (("without", before), ("with", after)):
+                curves[name].append(contour_of(contour(value.trace, turn)))
     progress("draws", count, count)
     bands = tuple(
-        Band.of(name, "contour", _angles(), contour_of(contour(each.trace, turn)), np.array(curves[name]))
-        for name, each in (("without", found.before), ("with", found.after))
+        Band.of(name, "contour", _angles(), contour_of(contour(judged_run.trace, turn)), np.array(curves[name]))
+        for name, judged_run in (("without", compensation.before), ("with", compensation.after))
     )
-    names = {name: figure for name, figure in found.figures.items() if name in figures[0]}
+    names = {name: figure for name, figure in compensation.figures.items() if name in figures[0]}
     return Uncertainty(cloud or Cloud(scenario.machine, {}), count, intervals_of(names, figures), bands, known)
 
 
 def intervals_of(names: Mapping[str, object], draws: list[Mapping[str, Figure]]) -> dict[str, tuple[float, float]]:
     """Name -> interval of figures; NaN where a draw lacks the figure or its value."""
-    found = {}
+    result = {}
     for name in names:
-        values = np.array([float(each[name]) if name in each else math.nan for each in draws])
+        values = np.array([float(draw[name]) if name in draw else math.nan for draw in draws])
         if np.isfinite(values).all():
             low, high = interval(values)
-            found[name] = float(low), float(high)
+            result[name] = float(low), float(high)
         else:
-            found[name] = math.nan, math.nan
-    return found
+            result[name] = math.nan, math.nan
+    return result
 
 
 def curves_of(result: Result) -> dict[tuple[str, str], tuple[Array, Array]]:
     """(prefix, kind) -> abscissae and ordinates of every circle and stop, on the same abscissae for every machine."""
-    found: dict[tuple[str, str], tuple[Array, Array]] = {}
+    results: dict[tuple[str, str], tuple[Array, Array]] = {}
     for task in tasks(result.scenario, result.program):
         if isinstance(task, CircleTask):
-            found[task.prefix, "contour"] = _angles(), contour_of(contour(result.trace, task.turn))
+            results[task.prefix, "contour"] = _angles(), contour_of(contour(result.trace, task.turn))
         elif isinstance(task, PositioningTask):
             stop = task.approach
             at = np.linspace(0.0, min(stop.until - stop.end, TIME_BEHIND_STOP), STOP_POINTS)
             sense = math.copysign(1.0, stop.target - stop.origin)
             x = np.interp(stop.end + at, result.trace.time, np.asarray(result.trace[f"{stop.axis}.x_a"]))
-            found[task.prefix, "stop"] = at, sense * (x - stop.target)
-    return found
+            results[task.prefix, "stop"] = at, sense * (x - stop.target)
+    return results
 
 
 def contour_of(turn: Contour) -> Array:

@@ -41,7 +41,7 @@ def get_requires_for_build_sdist(config_settings: Settings = None) -> list[str]:
 def get_requires_for_build_wheel(config_settings: Settings = None) -> list[str]:
     """A compiler, where the machine has none that will do."""
     groups = configuration()["dependency-groups"]
-    needed = [each for each in groups["build"] if not each.startswith("setuptools")]
+    needed = [group for group in groups["build"] if not group.startswith("setuptools")]
     try:
         if not (config_settings or {}).get("platform"):
             toolchain.find_compiler()

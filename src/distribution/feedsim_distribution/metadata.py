@@ -28,10 +28,10 @@ def readable_anywhere(page: str, project: dict[str, Any]) -> str:
     """
     address = str(project.get("urls", {}).get(SOURCE, "")).rstrip("/")
     if not address:
-        return _LINK.sub(lambda found: found[1], _PICTURE.sub("", page))
+        return _LINK.sub(lambda match: match[1], _PICTURE.sub("", page))
     address = f"{address}/%s/v{project['version']}/"
-    pictures = re.sub(r"(!\[[^\]]*\]\()(?!\w+:)", lambda found: found[1] + address % "raw", page)
-    return _LINK.sub(lambda found: f"[{found[1]}]({address % 'blob'}{found[2]})", pictures)
+    pictures = re.sub(r"(!\[[^\]]*\]\()(?!\w+:)", lambda match: match[1] + address % "raw", page)
+    return _LINK.sub(lambda match: f"[{match[1]}]({address % 'blob'}{match[2]})", pictures)
 
 
 def _lines() -> Iterator[str]:

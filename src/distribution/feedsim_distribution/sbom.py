@@ -39,7 +39,7 @@ def describe() -> bytes:
 
 def _components() -> list[dict[str, Any]]:
     """The headers, which the C sources hold, then the locked packages, which are installed beside feedsim."""
-    found: list[dict[str, Any]] = [
+    result: list[dict[str, Any]] = [
         {
             "type": "library",
             "bom-ref": "fmi-headers@2.0.4",
@@ -52,7 +52,7 @@ def _components() -> list[dict[str, Any]]:
     lock = (PROJECT / "requirements.lock").read_text(encoding="utf-8")
     for name, version, hashes in _PINNED.findall(lock):
         reference = f"pkg:pypi/{name.lower()}@{version}"
-        found.append(
+        result.append(
             {
                 "type": "library",
                 "bom-ref": reference,
@@ -66,4 +66,4 @@ def _components() -> list[dict[str, Any]]:
                 ],
             }
         )
-    return found
+    return result

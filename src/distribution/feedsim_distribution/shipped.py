@@ -46,10 +46,10 @@ def for_platform(name: str, compiler: Sequence[str], archives: Path | None = Non
     """
     if name not in (*TAGS, ANY):
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
-    held = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
+    fixed = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
     loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
     page = _page(zig_for_pages())
-    return Shipped(held | loop | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
+    return Shipped(fixed | loop | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
 
 
 def _documentation(site: Path | None) -> dict[str, bytes]:
@@ -106,8 +106,8 @@ def _page(compiler: Sequence[str] | None) -> dict[str, bytes]:
 def _plain(compiler: Sequence[str]) -> dict[str, bytes]:
     """Scenarios, and what the master knows of the units' variables."""
     tables = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
-    found = {PLACE + path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in files(SCENARIOS)}
-    return found | {"feedsim/variables.json": declared.dump(tables)}
+    result = {PLACE + path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in files(SCENARIOS)}
+    return result | {"feedsim/variables.json": declared.dump(tables)}
 
 
 def zig() -> tuple[str, ...]:

@@ -40,11 +40,11 @@ def write(folder: Path, shipped: Shipped) -> str:
 
 def python() -> dict[str, bytes]:
     """The files of the packages by their paths in the wheel."""
-    found: dict[str, bytes] = {}
+    result: dict[str, bytes] = {}
     for package in PACKAGES:
         above = (PROJECT / package).parent
-        found |= {path.relative_to(above).as_posix(): path.read_bytes() for path in files(package)}
-    return found
+        result |= {path.relative_to(above).as_posix(): path.read_bytes() for path in files(package)}
+    return result
 
 
 def _record(content: Mapping[str, bytes], record: str) -> bytes:

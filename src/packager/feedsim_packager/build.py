@@ -138,19 +138,19 @@ def _sources(unit: str, directory: Path, given: Resources | None) -> dict[str, b
 
     Without the standard's headers: those of the importer are to be used (FMI 2.0, section 2.3).
     """
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     problems: list[str] = []
     for folder in (SHELL, STANDARD, directory):
         for path in sorted(folder.iterdir()):
             if path.suffix not in (".c", ".h", ".def"):
                 continue
-            if path.name in found or path.name == EMBEDDED:
-                where = found[path.name].parent if path.name in found else "the packager's own output"
+            if path.name in paths or path.name == EMBEDDED:
+                where = paths[path.name].parent if path.name in paths else "the packager's own output"
                 problems.append(f"{path.name} is in {path.parent} and in {where}")
-            found[path.name] = path
+            paths[path.name] = path
     if problems:
         raise InputError(f"{directory}: file names must differ, as the archive's sources folder is flat", problems)
-    files = {name: flat.content(path) for name, path in found.items() if path.parent != STANDARD}
+    files = {name: flat.content(path) for name, path in paths.items() if path.parent != STANDARD}
     if given:
         files[EMBEDDED] = given.embedded_source()
     listed = [name for name in files if name.endswith(".c")]

@@ -136,5 +136,5 @@ def _link_flags(compiler: Sequence[str], target: Target, name: str, stripped: bo
 
 def newest_glibc(library: bytes) -> str | None:
     """Newest symbol version of glibc that an ELF library asks for, e.g. "2.29": it does not load with an older one."""
-    versions = {tuple(map(int, found.split(b"."))) for found in re.findall(rb"GLIBC_(\d+(?:\.\d+)+)\0", library)}
+    versions = {tuple(map(int, entry.split(b"."))) for entry in re.findall(rb"GLIBC_(\d+(?:\.\d+)+)\0", library)}
     return ".".join(map(str, max(versions))) if versions else None

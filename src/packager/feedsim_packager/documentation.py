@@ -75,13 +75,13 @@ def pages(
     """
     body = _rendered(readme) if readme else f"<h1>{table.unit}</h1>\n<p>{html.escape(table.summary)}.</p>\n"
     parts = _marked_parts(variables, resources, machine, with_references=references is not None)
-    found = {INDEX: _index(table, body, parts, licence, version).encode()}
+    result = {INDEX: _index(table, body, parts, licence, version).encode()}
     if references is not None:
-        found[REFERENCES] = _page(f"{table.unit} {version}: reference results", _rendered(references)).encode()
+        result[REFERENCES] = _page(f"{table.unit} {version}: reference results", _rendered(references)).encode()
     if licence is not None:
-        found["documentation/licenses/license.txt"] = (licence + _HEADERS).encode()
-    found["documentation/licenses/fmi-headers.txt"] = _licence_of(standard_header).encode()
-    return found
+        result["documentation/licenses/license.txt"] = (licence + _HEADERS).encode()
+    result["documentation/licenses/fmi-headers.txt"] = _licence_of(standard_header).encode()
+    return result
 
 
 def for_machine(
@@ -193,12 +193,12 @@ def _without_relative_links(tokens: Sequence["Token"]) -> list["Token"]:
 
 def _terminal_table(variables: Sequence[Variable]) -> str:
     """Inputs and outputs as they are connected; empty where none belong together."""
-    found = terminals.find(variables)
-    if not found:
+    result = terminals.find(variables)
+    if not result:
         return ""
     by_name = {variable.name: variable.row for variable in variables}
     rows = []
-    for terminal in found:
+    for terminal in result:
         inputs, outputs = (
             ", ".join(f"<code>{name}</code>" for name in terminal.members.values() if by_name[name].causality == wanted)
             for wanted in ("input", "output")

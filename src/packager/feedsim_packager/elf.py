@@ -55,13 +55,13 @@ def read(content: bytes) -> Binary:
 
 
 def _versions(content: bytes, strings: int, at: int, files: int) -> frozenset[str]:
-    found = set()
+    result = set()
     for _ in range(files):
         _, count, _, first, following = struct.unpack_from("<HHIII", content, at)
         entry = at + first
         for _ in range(count):
             name, step = struct.unpack_from("<II", content, entry + 8)
-            found.add(text(content, strings + name))
+            result.add(text(content, strings + name))
             entry += step
         at += following
-    return frozenset(found)
+    return frozenset(result)

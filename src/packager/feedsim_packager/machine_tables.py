@@ -42,12 +42,12 @@ class MachineTables(Resources):
 
     def files(self) -> dict[str, bytes]:
         """Archive path -> content, in the order in which they are hashed."""
-        found = {"resources/axes.csv": self.axes_csv, "resources/modes.csv": self.modes_csv}
-        return found if self.poses_bin is None else found | {"resources/poses.bin": self.poses_bin}
+        result = {"resources/axes.csv": self.axes_csv, "resources/modes.csv": self.modes_csv}
+        return result if self.poses_bin is None else result | {"resources/poses.bin": self.poses_bin}
 
     def start(self, axis: str, row: str) -> str:
         """Start value of x_0."""
-        return next(repr(each.x_0) for each in self.axes if each.name == axis)
+        return next(repr(entry.x_0) for entry in self.axes if entry.name == axis)
 
     def summary(self) -> str:
         """Its axes, and what its modes do."""
@@ -92,13 +92,13 @@ def read(axes_path: Path, modes_path: Path, poses_path: Path | None = None) -> M
 
 def check(axes: File, modes: File, grid: File | None = None) -> MachineTables:
     """The resources that these contents make; raises InputError with all problems of the file at fault."""
-    found = _axes(axes)
-    names = [axis.name for axis in found]
+    result = _axes(axes)
+    names = [axis.name for axis in result]
     if problems := list(_check_modes(modes.content, names, Path(axes.name).name)):
         raise InputError(modes.name, problems)
     if grid is not None:
         poses.check(grid.content, names, grid.name)
-    return MachineTables(axes.content, modes.content, grid.content if grid is not None else None, found)
+    return MachineTables(axes.content, modes.content, grid.content if grid is not None else None, result)
 
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
@@ -111,8 +111,8 @@ def _axes(file: File) -> tuple[Axis, ...]:
     rows = _rows(file.content)
     header = tuple(rows[0][1]) if rows else ()
     if header != AXES_HEADER:
-        found = ",".join(header) or "(empty)"
-        raise InputError(f"{file.name}: the header must read {','.join(AXES_HEADER)}, but reads {found}")
+        text = ",".join(header) or "(empty)"
+        raise InputError(f"{file.name}: the header must read {','.join(AXES_HEADER)}, but reads {text}")
     if len(rows) - 1 > MOST_AXES:
         raise InputError(f"{file.name}: {len(rows) - 1} axes are listed, at most {MOST_AXES} are allowed")
     axes: list[Axis] = []

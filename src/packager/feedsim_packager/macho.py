@@ -62,17 +62,17 @@ def _c_name(symbol: str) -> str:
 
 
 def _undefined(content: bytes, symbols: int, count: int, strings: int) -> set[str]:
-    found = set()
+    result = set()
     for i in range(count):
         name, kind = struct.unpack_from("<IB", content, symbols + 16 * i)
         if not kind & _N_STAB and kind & _N_EXT and kind & _N_TYPE == _N_UNDF:
-            found.add(_c_name(text(content, strings + name)))
-    return found
+            result.add(_c_name(text(content, strings + name)))
+    return result
 
 
 def _trie(trie: bytes) -> set[str]:
     """Names in the export trie: a node is its value's size (0: no symbol ends here), the value, its children."""
-    found: set[str] = set()
+    result: set[str] = set()
     pending, seen = [(0, b"")] if trie else [], set()
     while pending:
         at, prefix = pending.pop()
@@ -81,7 +81,7 @@ def _trie(trie: bytes) -> set[str]:
         seen.add(at)
         size, at = _uleb(trie, at)
         if size:
-            found.add(_c_name(prefix.decode("ascii")))
+            result.add(_c_name(prefix.decode("ascii")))
         at += size
         children = trie[at]
         at += 1
@@ -90,7 +90,7 @@ def _trie(trie: bytes) -> set[str]:
             child, following = _uleb(trie, end + 1)
             pending.append((child, prefix + trie[at:end]))
             at = following
-    return found
+    return result
 
 
 def _uleb(content: bytes, at: int) -> tuple[int, int]:

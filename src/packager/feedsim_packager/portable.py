@@ -56,49 +56,51 @@ def problems(
     given. `own`: what it may export besides. `machine`: paths of this machine, which must not be in the library.
     """
     try:
-        found = binary.read(content)
+        binaries = binary.read(content)
     except binary.Unreadable as error:
         return [str(error)]
     functions = fmi_functions() if functions is None else functions
     expected = [name.partition("-")[0] for name in target.zig]
-    told = []
-    if [part.processor for part in found] != expected or {part.format for part in found} != {_FORMATS[target.suffix]}:
-        kinds = ", ".join(f"{part.format} for {part.processor}" for part in found)
-        told.append(f"is {kinds}; needed is {_FORMATS[target.suffix]} for {', '.join(expected)}")
-    for part in found:
+    reported = []
+    if [part.processor for part in binaries] != expected or {part.format for part in binaries} != {
+        _FORMATS[target.suffix]
+    }:
+        kinds = ", ".join(f"{part.format} for {part.processor}" for part in binaries)
+        reported.append(f"is {kinds}; needed is {_FORMATS[target.suffix]} for {', '.join(expected)}")
+    for part in binaries:
         if missing := sorted(functions - part.exported):
-            told.append(f"{part.processor}: does not export {', '.join(missing)}")
+            reported.append(f"{part.processor}: does not export {', '.join(missing)}")
         if for_others:
-            told += [f"{part.processor}: {problem}" for problem in _not_for_others(part, functions | own)]
-    told += [f"holds a path of this machine: {path}" for path in machine if path.encode() in content]
-    return told
+            reported += [f"{part.processor}: {problem}" for problem in _not_for_others(part, functions | own)]
+    reported += [f"holds a path of this machine: {path}" for path in machine if path.encode() in content]
+    return reported
 
 
 def _not_for_others(part: Binary, meant: frozenset[str]) -> list[str]:
-    told = []
+    reported = []
     if stray := sorted(part.exported - meant - _LINKERS):
-        told.append(f"exports more than it is meant to: {', '.join(stray)}")
+        reported.append(f"exports more than it is meant to: {', '.join(stray)}")
     foreign = [name for name in part.libraries if not re.fullmatch(_SYSTEM[part.format], name, re.IGNORECASE)]
     if foreign:
-        told.append(f"needs libraries that are no part of the system: {', '.join(foreign)}")
+        reported.append(f"needs libraries that are no part of the system: {', '.join(foreign)}")
     newer = sorted(version for version in part.versions if _newer(version, "GLIBC_" + OLDEST_GLIBC))
     if newer:
-        told.append(
+        reported.append(
             f"needs {', '.join(newer)}, where {OLDEST_GLIBC} is the newest allowed: systems with an older C library "
             "would not load it; zig links against any (make fmus-all)"
         )
     if part.format == "Mach-O":
         if _newer(part.oldest_system or "999", OLDEST_MACOS):
-            told.append(f"needs macOS {part.oldest_system or 'of an unknown version'}; allowed is {OLDEST_MACOS}")
+            reported.append(f"needs macOS {part.oldest_system or 'of an unknown version'}; allowed is {OLDEST_MACOS}")
         if part.processor == "aarch64" and not part.signed:
-            told.append("is not signed, and macOS loads nothing unsigned on this processor")
-    return told
+            reported.append("is not signed, and macOS loads nothing unsigned on this processor")
+    return reported
 
 
 def _newer(version: str, limit: str) -> bool:
     """Versions of another family than the limit's (GLIBC_PRIVATE, GCC_3.0) count as newer."""
-    numbers = [re.fullmatch(r"(\D*)(\d+(?:\.\d+)*)", each) for each in (version, limit)]
+    numbers = [re.fullmatch(r"(\D*)(\d+(?:\.\d+)*)", name) for name in (version, limit)]
     if numbers[0] is None or numbers[1] is None or numbers[0][1] != numbers[1][1]:
         return True
-    found, allowed = ([int(part) for part in match[2].split(".")] for match in numbers if match)
-    return found > allowed
+    indexes, allowed = ([int(part) for part in match[2].split(".")] for match in numbers if match)
+    return indexes > allowed

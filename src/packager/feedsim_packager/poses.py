@@ -52,9 +52,9 @@ class _Reader:
         return _Fault(f"byte {len(MAGIC) + _SIZE * at}: {text}")
 
     def take(self, count: int, what: str) -> Sequence[float]:
-        left = len(self.numbers) - self.at
-        if count > left:
-            raise self.fault(self.at, f"{what}: {count} numbers are needed, but the file ends after {left}")
+        remaining = len(self.numbers) - self.at
+        if count > remaining:
+            raise self.fault(self.at, f"{what}: {count} numbers are needed, but the file ends after {remaining}")
         self.at += count
         return self.numbers[self.at - count : self.at]
 
@@ -117,8 +117,8 @@ def _check(reader: _Reader, axes: Sequence[str]) -> tuple[GridAxis, ...]:
             if lower // stride % axis.cells + 1 < axis.cells:
                 upper = lower + stride
                 _transfer(reader, modes[upper], modes[lower], f"transfer from {_place(grid, lower)} to cell {upper}")
-    if left := len(reader.numbers) - reader.at:
-        raise reader.fault(reader.at, f"{left} numbers too many; nothing may follow the last transfer")
+    if remaining := len(reader.numbers) - reader.at:
+        raise reader.fault(reader.at, f"{remaining} numbers too many; nothing may follow the last transfer")
     return tuple(grid)
 
 

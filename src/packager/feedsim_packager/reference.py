@@ -45,22 +45,22 @@ def files(directory: Path, variables: Iterable[Variable]) -> dict[str, bytes]:
     if not directory.is_dir():
         return {}
     away = {path.name.removesuffix("_modes.csv") for path in directory.glob("*_modes.csv")}
-    found: dict[str, bytes] = {}
+    result: dict[str, bytes] = {}
     for path in sorted(directory.rglob("*")):
         stem = re.sub(r"_(in|ref|par|modes)(\.tolerances|\.bounds)?\.(csv|opt|yaml)$", "", path.name)
         if path.is_file() and stem not in away and path.suffix in (".csv", ".opt", ".yaml", ".md"):
-            found[path.relative_to(directory).as_posix()] = path.read_bytes()
-    if README not in found:
+            result[path.relative_to(directory).as_posix()] = path.read_bytes()
+    if README not in result:
         raise InputError(f"{directory}: has no {README}, which tells importers what the references are")
-    found[README] += (directory.parent / GUIDE).read_bytes()
-    cases = [_case(name, found, directory) for name in _names(found)]
+    result[README] += (directory.parent / GUIDE).read_bytes()
+    cases = [_case(name, result, directory) for name in _names(result)]
     kinds = {variable.name: variable.row.kind for variable in variables}
     for case in cases:
-        if parameters := found.get(f"{case.name}_par.csv"):
-            found[f"{case.name}_par.ssv"] = _parameter_set(case, parameters, kinds, directory)
-    found[EXPERIMENTS] = _experiments(cases, found)
-    found[MANIFEST] = _manifest(cases, found)
-    return {ROOT + path: content for path, content in found.items()}
+        if parameters := result.get(f"{case.name}_par.csv"):
+            result[f"{case.name}_par.ssv"] = _parameter_set(case, parameters, kinds, directory)
+    result[EXPERIMENTS] = _experiments(cases, result)
+    result[MANIFEST] = _manifest(cases, result)
+    return {ROOT + path: content for path, content in result.items()}
 
 
 def without(archive: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -68,17 +68,17 @@ def without(archive: Mapping[str, bytes]) -> dict[str, bytes]:
     return {path: content for path, content in archive.items() if not path.startswith(ROOT) and path != PAGE}
 
 
-def _names(found: Mapping[str, bytes]) -> list[str]:
-    return sorted(path.removesuffix("_ref.opt") for path in found if path.endswith("_ref.opt"))
+def _names(result: Mapping[str, bytes]) -> list[str]:
+    return sorted(path.removesuffix("_ref.opt") for path in result if path.endswith("_ref.opt"))
 
 
-def _case(name: str, found: Mapping[str, bytes], directory: Path) -> _Case:
+def _case(name: str, result: Mapping[str, bytes], directory: Path) -> _Case:
     """The case with its line of the README's table: | `name` | what it is about |"""
-    text = found[README].decode("utf-8")
+    text = result[README].decode("utf-8")
     line = re.search(rf"^\| `{re.escape(name)}` \| (.+?) \|$", text, re.MULTILINE)
     if not line:
         raise InputError(f"{directory / README}: its table has no row of the case '{name}' (| `{name}` | ... |)")
-    options = dict(row.split(",") for row in found[f"{name}_ref.opt"].decode("ascii").split())
+    options = dict(row.split(",") for row in result[f"{name}_ref.opt"].decode("ascii").split())
     return _Case(name, line[1].replace("`", ""), {_OPTIONS[key]: options[key] for key in _OPTIONS})
 
 
@@ -101,12 +101,12 @@ def _parameter_set(case: _Case, parameters: bytes, kinds: Mapping[str, str], dir
     ).encode()
 
 
-def _experiments(cases: Iterable[_Case], found: Mapping[str, bytes]) -> bytes:
+def _experiments(cases: Iterable[_Case], result: Mapping[str, bytes]) -> bytes:
     """All cases in the experiments format; those with results for held inputs a second time."""
     text = ""
     for case in cases:
         for folder, how in (("", ""), (HELD, ", inputs held over each step")):
-            if f"{folder}{case.name}_ref.csv" not in found:
+            if f"{folder}{case.name}_ref.csv" not in result:
                 continue
             times = " ".join(f'{key}="{value}"' for key, value in case.times.items())
             text += f'  <Experiment name="{folder}{case.name}" description={quoteattr(case.about + how)} {times}>\n'
@@ -115,23 +115,23 @@ def _experiments(cases: Iterable[_Case], found: Mapping[str, bytes]) -> bytes:
                 ("Stimuli", f"{case.name}_in.csv"),
                 ("References", f"{folder}{case.name}_ref.csv"),
             ):
-                if path in found:
+                if path in result:
                     text += f'    <{element} source="{path}"/>\n'
             text += "  </Experiment>\n"
     about = "Pinned reference results that do not come from this unit's code; see README.md."
     return f'{_XML}<Experiments name="Reference results" description="{about}">\n{text}</Experiments>\n'.encode()
 
 
-def _manifest(cases: Iterable[_Case], found: Mapping[str, bytes]) -> bytes:
+def _manifest(cases: Iterable[_Case], result: Mapping[str, bytes]) -> bytes:
     """fmi-ls-manifest.xml: every file with its type and role."""
     about = {case.name: case.about for case in cases}
     related = []
-    for path in sorted(found):
+    for path in sorted(result):
         stem = path.removeprefix(HELD)
         case = re.sub(r"_(in|ref|par)(\.tolerances|\.bounds)?\.(csv|opt|ssv|yaml)$", "", stem)
-        held = ", inputs held over each step" if path.startswith(HELD) else ""
+        fixed = ", inputs held over each step" if path.startswith(HELD) else ""
         kind, role, what = _what(stem)
-        description = f"{what}{': ' + about[case] if case in about else ''}{held}"
+        description = f"{what}{': ' + about[case] if case in about else ''}{fixed}"
         related.append(
             f'  <Related type="{kind}" source="{path}" role="{role}" description={quoteattr(description)}/>\n'
         )

@@ -164,9 +164,9 @@ def _parse(text: str) -> tuple[list[Row], list[str]]:
         if row is not None:
             rows.append(row)
         if begin + used < end:
-            left = text[tokens[begin + used].start() : tokens[end - 1].end()]
+            remaining = text[tokens[begin + used].start() : tokens[end - 1].end()]
             where = f"after line {row.line}" if row else "at the start" if not rows else f"near line {rows[-1].line}"
-            problems.append(f"{where}: not a row: {' '.join(left.split())[:100]}")
+            problems.append(f"{where}: not a row: {' '.join(remaining.split())[:100]}")
     return rows, problems
 
 

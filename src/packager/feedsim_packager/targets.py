@@ -48,7 +48,7 @@ def host_target() -> Target:
     """The platform this runs on; CompilerError where FMI has no name for it."""
     host = (platform.system(), platform.machine())
     if host not in _HOSTS:
-        known = ", ".join(" ".join(each) for each in _HOSTS)
+        known = ", ".join(" ".join(entry) for entry in _HOSTS)
         raise CompilerError(f"no binaries folder is known for {' '.join(host)} (known: {known})")
     return _HOSTS[host]
 

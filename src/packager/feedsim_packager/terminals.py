@@ -115,7 +115,7 @@ def find(variables: Iterable[Variable]) -> tuple[Terminal, ...]:
         if variable.row.causality in ("input", "output"):
             group, _, member = variable.name.rpartition(".")
             groups.setdefault(group, {})[member] = variable
-    found: list[Terminal] = []
+    terminals: list[Terminal] = []
     problems: list[str] = []
     for group, present in groups.items():
         for kind in KINDS:
@@ -134,10 +134,10 @@ def find(variables: Iterable[Variable]) -> tuple[Terminal, ...]:
                     f"{name}: {stated}; a connection needs {_words(giver)}, or all of them the other way round"
                 )
             members = {member: present[member].name for member in names}
-            found.append(Terminal(name, kind, group, found_as == giver, members))
+            terminals.append(Terminal(name, kind, group, found_as == giver, members))
     if problems:
         raise InputError("terminals that nothing can be connected to", problems)
-    return tuple(found)
+    return tuple(terminals)
 
 
 def _words(causalities: Mapping[str, str]) -> str:
@@ -149,20 +149,20 @@ def files(directory: Path, variables: Sequence[Variable]) -> tuple[dict[str, byt
 
     The unit's icon is icon.svg of the directory and icon.png, drawn from it. A unit without them goes without.
     """
-    found: dict[str, bytes] = {}
+    result: dict[str, bytes] = {}
     warnings: list[str] = []
     for name in ("icon.png", "icon.svg"):
         if (path := directory / name).is_file():
-            found[f"{FOLDER}/{name}"] = path.read_bytes()
-    if icon := found.get(f"{FOLDER}/icon.png"):
-        found[MODEL_PICTURE] = icon
+            result[f"{FOLDER}/{name}"] = path.read_bytes()
+    if icon := result.get(f"{FOLDER}/icon.png"):
+        result[MODEL_PICTURE] = icon
     else:
-        found = {}  # the standard allows the SVG beside the PNG only
+        result = {}  # the standard allows the SVG beside the PNG only
         warnings.append(f"icon.png of {directory.name} is missing: the archive goes without a picture of the unit")
     for kind in {terminal.kind.name for terminal in find(variables)}:
         for suffix in (".png", ".svg"):
-            found[f"{FOLDER}/{kind}{suffix}"] = (PICTURES / f"{kind}{suffix}").read_bytes()
-    return found | describe(variables, found), warnings
+            result[f"{FOLDER}/{kind}{suffix}"] = (PICTURES / f"{kind}{suffix}").read_bytes()
+    return result | describe(variables, result), warnings
 
 
 def describe(variables: Sequence[Variable], present: Collection[str]) -> dict[str, bytes]:

@@ -122,15 +122,15 @@ def read(file: File) -> dict[str, str]:
     rows = [row for row in csv.reader(io.StringIO(file.content.decode("utf-8-sig", errors="replace"))) if row]
     if not rows or tuple(rows[0]) != HEADER:
         raise InputError(f"{file.name}: the header must read {','.join(HEADER)}")
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     problems: list[str] = []
     for line, row in enumerate(rows[1:], 2):
         if len(row) != len(HEADER):
             problems.append(f"line {line}: {len(row)} fields, expected {len(HEADER)}")
-        elif row[0] in found:
+        elif row[0] in result:
             problems.append(f"line {line}: {row[0]} is already given")
         else:
-            found[row[0]] = row[1]
+            result[row[0]] = row[1]
     if problems:
         raise InputError(file.name, problems)
-    return {name: value for name, value in found.items() if not name.startswith("hash.")}
+    return {name: value for name, value in result.items() if not name.startswith("hash.")}

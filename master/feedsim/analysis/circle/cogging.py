@@ -73,8 +73,8 @@ class Wave:
         turned = sense * angle % (2 * math.pi)
         return np.column_stack(
             [
-                way * np.interp(turned, time, each, period=2 * math.pi)
-                for way, each in zip(back, self.moved, strict=True)
+                way * np.interp(turned, time, value, period=2 * math.pi)
+                for way, value in zip(back, self.moved, strict=True)
             ]
         )
 
@@ -90,35 +90,35 @@ class Wave:
 
 def fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
     """The model fitted to the paths without waves of the motors' torque, and these waves."""
-    found, waves = fit(circle, paths), list[Wave]()
-    plain = found
-    while len(waves) < MAX_WAVES and (wave := strongest(circle, found)) is not None:
+    result, waves = fit(circle, paths), list[Wave]()
+    plain = result
+    while len(waves) < MAX_WAVES and (wave := strongest(circle, result)) is not None:
         waves.append(wave)
-        found = fit(circle, without(circle, paths, waves))
-        waves = settled(circle, found, waves)
-    return (found, waves) if stand_out(plain, found) else (plain, [])
+        result = fit(circle, without(circle, paths, waves))
+        waves = settled(circle, result, waves)
+    return (result, waves) if stand_out(plain, result) else (plain, [])
 
 
 def without(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequence[Wave]) -> list[TurnedPath]:
     """Paths with the waves taken off the positions of their axes."""
-    found = []
+    turned_paths = []
     for path in paths:
         p = (circle.radius + path.deviation) * np.array([np.cos(path.angle), np.sin(path.angle)])
         for wave in waves:
             own = wave.displacements(circle, path.angle, path.sense) @ np.array(wave.parts)
             p[circle.axes.index(wave.axis)] -= own
         angle, deviation = np.arctan2(p[1], p[0]), np.hypot(p[0], p[1]) - circle.radius
-        found.append(replace(path, angle=angle, deviation=deviation) if waves else path)
-    return found
+        turned_paths.append(replace(path, angle=angle, deviation=deviation) if waves else path)
+    return turned_paths
 
 
-def strongest(circle: CircleUnderTest, found: Fit) -> Wave | None:
+def strongest(circle: CircleUnderTest, result: Fit) -> Wave | None:
     """The wave that explains most of what ``found`` leaves between the reversals; None where none stands out."""
-    rest = _Rest(found, few=True)
+    rest = _Rest(result, few=True)
     if circle.response is None or rest.deviation < MIN_REMAINDER:
         return None
     tried = sorted(
-        ((rest.explained(each, circle), each) for axis in circle.axes for each in _waves(circle, axis)),
+        ((rest.explained(wave, circle), wave) for axis in circle.axes for wave in _waves(circle, axis)),
         key=lambda pair: -pair[0],
     )
     if not tried or tried[0][0] < MIN_EXPLAINED_SHARE:
@@ -128,7 +128,7 @@ def strongest(circle: CircleUnderTest, found: Fit) -> Wave | None:
         rest.explained(best, circle, beside=other) < MIN_KEPT_SHARE * tried[0][0] for _, other in tried[1:RIVAL_COUNT]
     ):
         return None
-    return settled(circle, found, [best])[0]
+    return settled(circle, result, [best])[0]
 
 
 def stand_out(before: Fit, after: Fit) -> bool:
@@ -136,14 +136,14 @@ def stand_out(before: Fit, after: Fit) -> bool:
     return _Rest(after).deviation ** 2 <= (1 - MIN_EXPLAINED_BY_ALL) * _Rest(before).deviation ** 2
 
 
-def settled(circle: CircleUnderTest, found: Fit, waves: Sequence[Wave]) -> list[Wave]:
+def settled(circle: CircleUnderTest, results: Fit, waves: Sequence[Wave]) -> list[Wave]:
     """Waves with what ``found`` leaves of them, and their intervals."""
-    rest = _Rest(found)
+    rest = _Rest(results)
     matrix = np.hstack([rest.outside(rest.columns(wave, circle)) for wave in waves])
     change = np.linalg.lstsq(matrix, rest.left, rcond=None)[0]
     off = rest.left - matrix @ change
     covariance = Covariance.of(matrix.T @ matrix)
-    free = max(int(rest.block.max()) + 1 - len(found.names) - len(change), 2)
+    free = max(int(rest.block.max()) + 1 - len(results.names) - len(change), 2)
     blockwise = covariance.of_blocks(matrix, off, rest.block, free)
     single = covariance.of_samples(matrix, off)
     scale = np.sqrt(np.maximum(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0))
@@ -191,22 +191,22 @@ def _waves(circle: CircleUnderTest, axis: str) -> Iterator[Wave]:
 class _Rest:
     """What a fit leaves between the reversals, of all samples or of a few, and what is no term of it, nor a tail."""
 
-    def __init__(self, found: Fit, *, few: bool = False) -> None:
-        step = max(1, sum(len(each) for each in found.angle) // SCREENED_SAMPLES) if few else 1
-        rows = [np.flatnonzero(which < 0)[::step] for which in found.reversal]
-        self._angle = [angle[own] for angle, own in zip(found.angle, rows, strict=True)]
-        self._senses = found.senses
+    def __init__(self, result: Fit, *, few: bool = False) -> None:
+        step = max(1, sum(len(values) for values in result.angle) // SCREENED_SAMPLES) if few else 1
+        rows = [np.flatnonzero(which < 0)[::step] for which in result.reversal]
+        self._angle = [angle[own] for angle, own in zip(result.angle, rows, strict=True)]
+        self._senses = result.senses
         terms = np.concatenate([
-            np.column_stack([*(part[name][own] for name in found.names), tails[own]])
-            for part, tails, own in zip(found.columns, found.tails, rows, strict=True)
+            np.column_stack([*(part[name][own] for name in result.names), tails[own]])
+            for part, tails, own in zip(result.columns, result.tails, rows, strict=True)
         ])  # fmt: skip
         self._terms = np.linalg.qr(terms / np.maximum(np.linalg.norm(terms, axis=0), 1e-300))[0]
-        left = np.concatenate([
+        remaining = np.concatenate([
             (residual - tail)[own]
-            for residual, tail, own in zip(found.residual, found.tail, rows, strict=True)
+            for residual, tail, own in zip(result.residual, result.tail, rows, strict=True)
         ])  # fmt: skip
-        self.deviation = float(np.std(left))
-        self.left = self.outside(left)
+        self.deviation = float(np.std(remaining))
+        self.left = self.outside(remaining)
         self.block = np.unique(blocks_of(self._angle), return_inverse=True)[1]
 
     def outside(self, values: Array) -> Array:

@@ -146,12 +146,12 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     centred: the centre is that of the measurement's set-up and no error of the machine; G is then about the fitted one.
     """
     whole, paths = paths, [path.thinned() for path in paths]
-    found, waves = fitted(circle, paths)
+    fit, waves = fitted(circle, paths)
     circle = replace(circle, response=None)  # a result is data
-    curves = _curves(found, paths, circle)
+    curves = _curves(fit, paths, circle)
     total = [path.deviation for path in paths]
     for wave in waves:
-        curves[f"cogging {wave.axis} {wave.order}"] = [wave.curve(circle, each.angle, each.sense) for each in paths]
+        curves[f"cogging {wave.axis} {wave.order}"] = [wave.curve(circle, path.angle, path.sense) for path in paths]
     orders = {f"cogging {wave.axis} {wave.order}": wave for wave in waves}
     whole, paths = without(circle, whole, waves), without(circle, paths, waves)
     if centred:
@@ -161,7 +161,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     parts = {key: np.concatenate(part) for key, part in curves.items()}
     parts["rest "] = e - sum(parts.values())
     G, high, low = float(np.ptp(e)), int(e.argmax()), int(e.argmin())
-    peaks = tuple(peak for k, path in enumerate(paths) for peak in _peaks(circle, found, k, path.sense))
+    peaks = tuple(peak for k, path in enumerate(paths) for peak in _peaks(circle, fit, k, path.sense))
     terms = []
     for name, part in parts.items():
         key, _, axis = name.partition(" ")
@@ -170,14 +170,14 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
             axis, order = orders[name].axis, orders[name].order
             value, half, unit = orders[name].amplitude, orders[name].half, "N.m"
         else:
-            value, half, unit = _value(circle, found, peaks, key, axis)
+            value, half, unit = _value(circle, fit, peaks, key, axis)
         if key == "rest":
             value = float(np.ptp(part))
         share = float(part[high] - part[low]) / G if G > 0 else 0.0
         gain = G - float(np.ptp(e - part))
         terms.append(Term(key, axis, value, half, unit, float(np.ptp(part)), share, gain, order))
     if centred:
-        value, half, unit = _value(circle, found, peaks, "offset", "")
+        value, half, unit = _value(circle, fit, peaks, "offset", "")
         terms.append(Term("offset", "", value, half, unit, 2 * value, 0.0))
     return Diagnosis(
         circle=circle,
@@ -194,19 +194,17 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
             )
         ),
         peaks=peaks,
-        vibrations=vibrations(circle, found, whole),
+        vibrations=vibrations(circle, fit, whole),
         lag=_lag(circle),
         unlike=_unlike(circle),
-        form=_form(found),
-        noise=found.noise,
-        left_out=found.left_out,
-        centre=(found["offset_0"], found["offset_1"]),
+        form=_form(fit),
+        noise=fit.noise,
+        left_out=fit.left_out,
+        centre=(fit["offset_0"], fit["offset_1"]),
         apart=_apart(paths),
-        angles=found.offset,
-        hidden=2 / circle.radius * found.hidden,
-        rest=tuple(
-            (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
-        ),
+        angles=fit.offset,
+        hidden=2 / circle.radius * fit.hidden,
+        rest=tuple((path.angle, path.deviation - residual) for path, residual in zip(paths, fit.residual, strict=True)),
     )
 
 
@@ -224,12 +222,12 @@ def _unlike(circle: CircleUnderTest) -> float | None:
     return float(abs(circle.gain[circle.axes[0]]) - abs(circle.gain[circle.axes[1]]))
 
 
-def _curves(found: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) -> dict[str, list[Array]]:
+def _curves(fit: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) -> dict[str, list[Array]]:
     """ "term axis" -> radial deviation that it makes, of every path."""
     curves: dict[str, list[Array]] = {}
-    of = dict(zip(found.names, found.values, strict=True))
+    of = dict(zip(fit.names, fit.values, strict=True))
     for k in range(len(paths)):
-        made = {name: of[name] * column for name, column in found.columns[k].items()}
+        made = {name: of[name] * column for name, column in fit.columns[k].items()}
         named = {
             "offset ": made["offset_0"] + made["offset_1"],
             "radius ": made["radius"],
@@ -242,8 +240,8 @@ def _curves(found: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) ->
             named[f"lost_motion {axis}"] = made[f"lost_{i}"]
             if f"pitch_{i}_cos" in made:
                 named[f"pitch {axis}"] = made[f"pitch_{i}_cos"] + made[f"pitch_{i}_sin"]
-            own = (found.reversal[k] >= 0) & (found.reversal[k] % 2 == i)
-            named[f"peaks {axis}"] = np.where(own, found.residual[k], 0.0)
+            own = (fit.reversal[k] >= 0) & (fit.reversal[k] % 2 == i)
+            named[f"peaks {axis}"] = np.where(own, fit.residual[k], 0.0)
         if circle.recorded:
             named |= _set_up(circle, made)
         for name, curve in named.items():
@@ -260,12 +258,12 @@ def _set_up(circle: CircleUnderTest, made: Mapping[str, Array]) -> dict[str, Arr
     return named
 
 
-def _other(found: Fit) -> int:
+def _other(fit: Fit) -> int:
     """Number of the first path in the other direction than the first path; 1 where there is none."""
-    return next((k for k, sense in enumerate(found.senses) if sense != found.senses[0]), 1)
+    return next((k for k, sense in enumerate(fit.senses) if sense != fit.senses[0]), 1)
 
 
-def _value(circle: CircleUnderTest, found: Fit, peaks: Sequence[Peak], key: str, axis: str) -> tuple[float, float, str]:
+def _value(circle: CircleUnderTest, fit: Fit, peaks: Sequence[Peak], key: str, axis: str) -> tuple[float, float, str]:
     """Value of a term, half of its interval, and their unit."""
     number = circle.axes.index(axis) if axis else 0
     if key == "peaks":
@@ -285,42 +283,42 @@ def _value(circle: CircleUnderTest, found: Fit, peaks: Sequence[Peak], key: str,
         "straightness": ((f"bend_{number}",), 1.0, "m"),
         "third": (("third",), 1.0, "m"),
         "drift": (("drift_0", "drift_1"), 1.0, "m"),
-        "centres": ((f"centre_{_other(found)}_0", f"centre_{_other(found)}_1"), 1.0, "m"),
+        "centres": ((f"centre_{_other(fit)}_0", f"centre_{_other(fit)}_1"), 1.0, "m"),
     }[key]
-    value = math.hypot(found[names[0]], found[names[1]]) if len(names) == 2 else found[names[0]]
-    return factor * value, factor * found.half(*names), unit
+    value = math.hypot(fit[names[0]], fit[names[1]]) if len(names) == 2 else fit[names[0]]
+    return factor * value, factor * fit.half(*names), unit
 
 
-def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak]:
+def _peaks(circle: CircleUnderTest, fit: Fit, k: int, sense: int) -> list[Peak]:
     """What stands out behind every reversal of path ``k``."""
     rate = circle.speed / circle.radius
-    calm = _Calm(found, k, sense)
-    per_sample = 2 * math.pi / len(found.angle[k])
+    calm = _Calm(fit, k, sense)
+    per_sample = 2 * math.pi / len(fit.angle[k])
     wide = max(1, round(math.radians(PEAK_ANGLE) / per_sample))
     counts = [wide]
     while counts[-1] // 2 >= MIN_PEAK_SAMPLES:
         counts.append(counts[-1] // 2)
     levels = {count: calm.level(count) for count in counts}
-    ellipse = math.hypot(found["scale"], found["squareness"] + sense * found["servo"]) / circle.radius
+    ellipse = math.hypot(fit["scale"], fit["squareness"] + sense * fit["servo"]) / circle.radius
     peaks = []
     for which in range(4):
         axis = circle.axes[which % 2]
         name = f"{axis}{'+' if which < 2 else '-'}"
         nothing = Peak(name, axis, sense, 0.0, math.nan, which * math.pi / 2, math.nan, math.nan)
-        own = np.flatnonzero(found.reversal[k] == which)
-        own = own[np.argsort(found.since[k][own])]
+        own = np.flatnonzero(fit.reversal[k] == which)
+        own = own[np.argsort(fit.since[k][own])]
         # Between two samples nobody knows on which side of a step of lost motion one is; nor within the angle from the
         # point that is given to the one that an ellipse makes of it, as instruments write the one or the other.
-        own = own[np.abs(found.since[k][own]) > 1.5 * per_sample + ellipse]
+        own = own[np.abs(fit.since[k][own]) > 1.5 * per_sample + ellipse]
         if len(own) < 5 * wide:
             peaks.append(nothing)
             continue
-        since, off = found.since[k][own], found.residual[k][own]
+        since, off = fit.since[k][own], fit.residual[k][own]
         clear, count = _clearest(off, levels)
         if clear < 1:
             peaks.append(replace(nothing, half=levels[wide]))
             continue
-        curve, at, count = _sharpened(off, count, found.noise)
+        curve, at, count = _sharpened(off, count, fit.noise)
         height = float(curve[at])
         # What averaging over as much again takes from it is not less than what averaging has taken already.
         blur = float(averaged(off, 2 * count)[at]) - height if count > 1 else 0.0
@@ -330,8 +328,8 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
             replace(
                 nothing,
                 height=height,
-                half=math.hypot(found.quantile * calm.spread(count), blur),
-                angle=float(found.angle[k][own[at]]) + (found.offset.angle if found.offset else 0.0),
+                half=math.hypot(fit.quantile * calm.spread(count), blur),
+                angle=float(fit.angle[k][own[at]]) + (fit.offset.angle if fit.offset else 0.0),
                 width=float(end - begin) / rate,
                 decay=float(_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
             )
@@ -377,10 +375,10 @@ def _top(off: Array, count: int) -> tuple[Array, int]:
 class _Calm:
     """Means of neighbouring samples of path ``k`` where no axis reverses: what those behind a reversal compare with."""
 
-    def __init__(self, found: Fit, k: int, sense: int) -> None:
-        order = np.argsort(sense * found.angle[k])
-        self._off, self._free = found.residual[k][order], (found.reversal[k] < 0)[order]
-        self._noise, self._rest = found.noise, found.rest_error
+    def __init__(self, fit: Fit, k: int, sense: int) -> None:
+        order = np.argsort(sense * fit.angle[k])
+        self._off, self._free = fit.residual[k][order], (fit.reversal[k] < 0)[order]
+        self._noise, self._rest = fit.noise, fit.rest_error
 
     def spread(self, count: int) -> float:
         """Standard deviation of a mean over ``count`` samples behind a reversal [m]."""
@@ -435,11 +433,11 @@ def _coarse(path: TurnedPath) -> Array:
     return np.bincount(part, path.deviation, SECTORS) / np.maximum(np.bincount(part, minlength=SECTORS), 1)
 
 
-def _form(found: Fit) -> dict[int, float]:
+def _form(fit: Fit) -> dict[int, float]:
     """Amplitude of the orders of FORM in what remains outside the windows [m]."""
-    free: list[NDArray[np.bool_]] = [which < 0 for which in found.reversal]
-    angle = np.concatenate([a[keep] for a, keep in zip(found.angle, free, strict=True)])
-    off = np.concatenate([r[keep] for r, keep in zip(found.residual, free, strict=True)])
+    free: list[NDArray[np.bool_]] = [which < 0 for which in fit.reversal]
+    angle = np.concatenate([a[keep] for a, keep in zip(fit.angle, free, strict=True)])
+    off = np.concatenate([r[keep] for r, keep in zip(fit.residual, free, strict=True)])
     matrix = np.column_stack([wave(n * angle) for n in FORM for wave in (np.cos, np.sin)])
     values = np.linalg.lstsq(matrix, off, rcond=None)[0]
     return {n: float(np.hypot(*values[2 * i : 2 * i + 2])) for i, n in enumerate(FORM)}

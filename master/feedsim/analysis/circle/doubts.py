@@ -70,8 +70,8 @@ def check_feed(where: str, given: float | None, own: float | None) -> None:
 
 
 def _ratio(ratio: float) -> str:
-    for each, words in RATIOS.items():
-        if min(abs(ratio / each - 1), abs(ratio * each - 1)) < RATIO_TOLERANCE:
+    for value, words in RATIOS.items():
+        if min(abs(ratio / value - 1), abs(ratio * value - 1)) < RATIO_TOLERANCE:
             return f": {words}"
     larger = max(ratio, 1 / ratio)
     return f", {larger:.3g} times {'less' if ratio > 1 else 'as much'}"
@@ -142,11 +142,11 @@ def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
     span = float(min(ordered[-3] - ordered[0], ordered[-1] - ordered[2], ordered[-2] - ordered[1]))
     to_reversal = np.abs((turned + math.pi / 4) % (math.pi / 2) - math.pi / 4)
     share = np.where(to_reversal < REVERSAL, OF_RANGE_AT_REVERSAL, OF_RANGE)
-    found = (off > OUTLIER_SCATTER * scatter) & (off > share * span) & (off > FINEST)
+    values = (off > OUTLIER_SCATTER * scatter) & (off > share * span) & (off > FINEST)
     # Three beside each other are a motion.
-    three = found & np.r_[False, found[:-1]] & np.r_[found[1:], False]
+    three = values & np.r_[False, values[:-1]] & np.r_[values[1:], False]
     wide = three | np.r_[False, three[:-1]] | np.r_[three[1:], False]
-    alone: NDArray[np.bool_] = found & ~wide
+    alone: NDArray[np.bool_] = values & ~wide
     return alone
 
 

@@ -130,24 +130,24 @@ def displacements(
 ) -> dict[str, tuple[int, Array]]:
     """Terms that displace one axis: its number, and the displacement for 1 m of the term. Play of `values` is used up
     behind a reversal before it is lost."""
-    found = {}
+    result = {}
     for i in (0, 1):
         side = sense * np.sign(np.sin(angle - turned[i]))
         lost = values.get(f"lost_{i}", 0.0)
         if lost > 0 and PLAYED in values:
             since = sense * (angle - turned[i]) % math.pi
             way = circle.radius * (1 - np.cos(since))
-            found[f"lost_{i}"] = (i, side * np.clip(way / lost - 0.5, -0.5, 0.5))
+            result[f"lost_{i}"] = (i, side * np.clip(way / lost - 0.5, -0.5, 0.5))
         else:
-            found[f"lost_{i}"] = (i, 0.5 * side)
+            result[f"lost_{i}"] = (i, 0.5 * side)
     for i, axis in enumerate(circle.axes):
         if enough_pitches(circle, axis):
             phase = 2 * math.pi / circle.pitch[axis] * positions[i]
-            found[f"pitch_{i}_cos"], found[f"pitch_{i}_sin"] = (i, np.cos(phase)), (i, np.sin(phase))
+            result[f"pitch_{i}_cos"], result[f"pitch_{i}_sin"] = (i, np.cos(phase)), (i, np.sin(phase))
     if circle.recorded:
         u, w = positions / circle.radius
-        found |= {"bend_0": (1, u**2), "bend_1": (0, w**2), "third": (1, u**3 - u / 2)}
-    return found
+        result |= {"bend_0": (1, u**2), "bend_1": (0, w**2), "third": (1, u**3 - u / 2)}
+    return result
 
 
 def columns_of(
@@ -156,9 +156,9 @@ def columns_of(
     """Radial deviation for 1 m of every term; ``both`` senses are there to separate a delay from an angle."""
     angle = undone.angle
     along = np.cos(angle), np.sin(angle)
-    found = {"offset_0": along[0], "offset_1": along[1], "radius": np.ones_like(angle), "scale": np.cos(2 * angle)}
-    found["squareness"] = np.sin(2 * angle)
+    result = {"offset_0": along[0], "offset_1": along[1], "radius": np.ones_like(angle), "scale": np.cos(2 * angle)}
+    result["squareness"] = np.sin(2 * angle)
     if both:
-        found["servo"] = sense * np.sin(2 * angle)
+        result["servo"] = sense * np.sin(2 * angle)
     moved = displacements(circle, angle, undone.positions, sense, undone.turned, values) | dict(undone.moved)
-    return found | {name: along[axis] * displacement for name, (axis, displacement) in moved.items()}
+    return result | {name: along[axis] * displacement for name, (axis, displacement) in moved.items()}

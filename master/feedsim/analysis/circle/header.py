@@ -49,7 +49,7 @@ def own_format(path: Path) -> None:
 
 def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
     """Of "radius" [m] and "feed" [m/s] those that lines give, and words of those that they do not give clearly."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     notes: list[str] = []
     for line in lines:
         match = _LINE.match(line)
@@ -69,11 +69,11 @@ def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
                 what, size = "radius", None if size is None else size / 2
             if size is None or not size > 0:
                 notes.append(f"{line.strip()!r} may be the {what}, and is not read: its unit is not known")
-            elif what in found and abs(found[what] / size - 1) > 1e-9:
+            elif what in values and abs(values[what] / size - 1) > 1e-9:
                 notes.append(f"{line.strip()!r} is another {what} than the one ahead of it, and is not read")
             else:
-                found[what] = size
-    return found, notes
+                values[what] = size
+    return values, notes
 
 
 class Told:
@@ -87,9 +87,9 @@ class Told:
 
     def add(self, file: Path, lines: Sequence[str]) -> None:
         """InputError: the file is of another circle than those ahead of it."""
-        found, unclear = told_ahead(lines)
-        self.doubts += [f"{file}: {each}" for each in unclear]
-        for what, value in found.items():
+        values, unclear = told_ahead(lines)
+        self.doubts += [f"{file}: {name}" for name in unclear]
+        for what, value in values.items():
             if self._given[what] is not None:
                 continue
             self.notes.append(f"{file}: the {what} is {_shown(what, value)}, as its header says")

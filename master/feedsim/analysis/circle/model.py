@@ -157,22 +157,22 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
     signals = [residual + step for residual, step in zip(wide.residual, lost, strict=True)]
     offset = angle_offset(paths, wide.angle, signals, [which < 0 for which in wide.reversal])
-    found = _told(circle, paths, offset.angle)
+    result = _told(circle, paths, offset.angle)
     # What the angles may be off by moves every term that turns with them.
     more, less = (_told(circle, paths, offset.angle + side * offset.deviation) for side in (1, -1))
-    moved = np.array([(more[name] - less[name]) / 2 for name in found.names])
-    return replace(found, covariance=found.covariance + np.outer(moved, moved), offset=offset)
+    moved = np.array([(more[name] - less[name]) / 2 for name in result.names])
+    return replace(result, covariance=result.covariance + np.outer(moved, moved), offset=offset)
 
 
 def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], angle: float) -> Fit:
     """With angles that are larger than those of the machine by ``angle`` [rad]."""
-    found = _pitched(circle, paths, Shape(angle=angle))
-    moved = sum(math.hypot(found[a], found[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
-    moved += abs(found["squareness"])
+    pitched = _pitched(circle, paths, Shape(angle=angle))
+    moved = sum(math.hypot(pitched[a], pitched[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
+    moved += abs(pitched["squareness"])
     if all(path.phase is not None for path in paths) or moved**2 < circle.radius * PROGRAMMED_TOLERANCE:
-        return found
+        return pitched
     other = _pitched(circle, paths, Shape(by_program=True, angle=angle))
-    return other if other.noise < found.noise else found
+    return other if other.noise < pitched.noise else pitched
 
 
 class Left(NamedTuple):
@@ -199,36 +199,36 @@ def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape)
     Where they do not, friction's response may look like them, or they like other terms: what they would move these is
     part of the intervals.
     """
-    found = _shaped(circle, paths, shape)
-    if not any(enough_pitches(circle, axis) for axis in found.left_out):
-        return found
+    shaped = _shaped(circle, paths, shape)
+    if not any(enough_pitches(circle, axis) for axis in shaped.left_out):
+        return shaped
     other = _shaped(circle, paths, shape._replace(pitches=True))
-    if other.noise < CLEARER * found.noise:
+    if other.noise < CLEARER * shaped.noise:
         return other
-    moved = np.array([found[name] - other[name] for name in found.names])
-    return replace(found, covariance=found.covariance + np.outer(moved, moved))
+    moved = np.array([shaped[name] - other[name] for name in shaped.names])
+    return replace(shaped, covariance=shaped.covariance + np.outer(moved, moved))
 
 
 def _shaped(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     """Lost motion as a step, or as play that is used up first, whichever leaves less behind the reversals."""
-    found = _windowed(circle, paths, shape)
-    if max(found["lost_0"], found["lost_1"]) < PLAY:
-        return found
+    windowed = _windowed(circle, paths, shape)
+    if max(windowed["lost_0"], windowed["lost_1"]) < PLAY:
+        return windowed
     other = _windowed(circle, paths, shape._replace(play=True))
-    return other if _behind(other) < _behind(found) else found
+    return other if _behind(other) < _behind(windowed) else windowed
 
 
-def _behind(found: Fit) -> float:
+def _behind(result: Fit) -> float:
     """What is left behind the reversals, in squares [m2]."""
-    return sum(float((off[which >= 0] ** 2).sum()) for off, which in zip(found.residual, found.reversal, strict=True))
+    return sum(float((off[which >= 0] ** 2).sum()) for off, which in zip(result.residual, result.reversal, strict=True))
 
 
 def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     for degrees in ANGLES_BEHIND:
-        found = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(degrees)), shape)
-        if _calm(found):
+        result = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(degrees)), shape)
+        if _calm(result):
             break
-    return found
+    return result
 
 
 def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape: Shape) -> Fit:
@@ -247,22 +247,22 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     residual: Array = np.empty(0)
     for number in range(MAX_WINDOW_PASSES):
         undone = [undo(circle, path, values, shape.by_program, moved) for path, moved in zip(paths, moves, strict=True)]
-        parts = [columns_of(circle, each, path.sense, both, values) for each, path in zip(undone, paths, strict=True)]
-        windows = [_windows(each, path.sense, out) for each, path in zip(undone, paths, strict=True)]
+        parts = [columns_of(circle, value, path.sense, both, values) for value, path in zip(undone, paths, strict=True)]
+        windows = [_windows(value, path.sense, out) for value, path in zip(undone, paths, strict=True)]
         names = tuple(parts[0])
         matrix = np.concatenate([np.column_stack([part[name] for name in names]) for part in parts])
-        deviation: Array = np.concatenate([each.deviation for each in undone])
-        which, since = (np.concatenate(each) for each in zip(*windows, strict=True))
+        deviation: Array = np.concatenate([entry.deviation for entry in undone])
+        which, since = (np.concatenate(window) for window in zip(*windows, strict=True))
         kept = which < 0
         if number == 2:  # the ellipse is undone, so that the windows show the peaks alone
-            usual = _usual([each.angle for each in undone], np.split(residual, ends), [free for free, _ in windows])
+            usual = _usual([entry.angle for entry in undone], np.split(residual, ends), [free for free, _ in windows])
             tails = (
                 known_tails(circle, undone, paths, residual, which)
                 if all(axis in circle.drag for axis in circle.axes)
                 else fading_tails(undone, paths, what_is_left(residual, which, since, window, usual), window)
             )
         fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
-        blocks = blocks_of([each.angle for each in undone])[kept] if len(tails.spread) else np.empty(0)
+        blocks = blocks_of([entry.angle for entry in undone])[kept] if len(tails.spread) else np.empty(0)
         robust = robust_fit(fitted, deviation[kept], tails.spread, blocks)
         step = robust.values[: len(names)]
         values |= {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
@@ -272,14 +272,19 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     tail = tails.columns @ robust.values[len(names) :]
     rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
     covariance, quantile = covariance_of(
-        fitted, (residual - tail)[kept], robust, tails.spread, blocks_of([each.angle for each in undone])[kept], rounded
+        fitted,
+        (residual - tail)[kept],
+        robust,
+        tails.spread,
+        blocks_of([entry.angle for entry in undone])[kept],
+        rounded,
     )
     return Fit(
         names=names,
         values=np.array([values[name] for name in names]),
         covariance=covariance[: len(names), : len(names)],
         quantile=quantile,
-        angle=tuple(each.angle for each in undone),
+        angle=tuple(entry.angle for entry in undone),
         residual=tuple(np.split(residual, ends)),
         reversal=tuple(which for which, _ in windows),
         since=tuple(since for _, since in windows),
@@ -335,13 +340,13 @@ def _usual(angles: Sequence[Array], residuals: Sequence[Array], reversals: Seque
     return float(np.median(np.abs(np.concatenate(around)))) / 0.6745
 
 
-def _calm(found: Fit) -> bool:
+def _calm(result: Fit) -> bool:
     """Whether the peaks have died away where their windows end, as far as noise and what else is left let one see."""
     width = math.radians(NEXT)
-    off = [residual - tail for residual, tail in zip(found.residual, found.tail, strict=True)]
+    off = [residual - tail for residual, tail in zip(result.residual, result.tail, strict=True)]
     # What repeats all the way round, a pitch error or form, is no tail of a peak, however much a window leaves out.
-    usual = _usual(found.angle, off, found.reversal)
-    for angle, residual, which, since in zip(found.angle, off, found.reversal, found.since, strict=True):
+    usual = _usual(result.angle, off, result.reversal)
+    for angle, residual, which, since in zip(result.angle, off, result.reversal, result.since, strict=True):
         for k in range(4):
             own = which == k
             if not own.any():
@@ -351,7 +356,7 @@ def _calm(found: Fit) -> bool:
             next_ &= which < 0
             if not next_.any():
                 continue
-            left = abs(float(residual[next_].mean()))
-            if left > max(CALM * float(np.abs(residual[own]).max()), 4 * usual):
+            remaining = abs(float(residual[next_].mean()))
+            if remaining > max(CALM * float(np.abs(residual[own]).max()), 4 * usual):
                 return False
     return True

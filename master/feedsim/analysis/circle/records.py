@@ -103,17 +103,17 @@ def read_circle(
         both = _beside_each_other(recording)
         polar = None if both else _polar(recording, axes)
         if both:
-            found, mean = _of_both(recording, *both, radius)
+            recorded_turns, mean = _of_both(recording, *both, radius)
         elif polar is None:
             x, y = _positions(recording, axes)
-            found, mean = _of_positions(recording, (x, y), axes, centre, radius)
+            recorded_turns, mean = _of_positions(recording, (x, y), axes, centre, radius)
         else:
-            found, mean = _of_angles(recording, *polar, radius)
+            recorded_turns, mean = _of_angles(recording, *polar, radius)
         notes += recording.notes
-        notes.append(f"{file}: {', '.join(turn.name for turn in found)}")
-        doubts += [f"{file}, {turn.name}: {doubt}" for turn in found for doubt in turn.doubts]
-        turns += found
-        timed += [(file, turn, turn.duration) for turn in found if turn.duration is not None]
+        notes.append(f"{file}: {', '.join(turn.name for turn in recorded_turns)}")
+        doubts += [f"{file}, {turn.name}: {doubt}" for turn in recorded_turns for doubt in turn.doubts]
+        turns += recorded_turns
+        timed += [(file, turn, turn.duration) for turn in recorded_turns if turn.duration is not None]
         radii.append(mean)
     nominal = radius if radius is not None else radii[0]
     _one_feed(timed, nominal)
@@ -139,7 +139,7 @@ def _one_feed(timed: Sequence[tuple[Path, RecordedTurn, float]], radius: float) 
     """Refuse turns of different feed. timed: file, turn and how long it took [s]."""
     if not timed:
         return
-    slowest, fastest = max(timed, key=lambda each: each[2]), min(timed, key=lambda each: each[2])
+    slowest, fastest = max(timed, key=lambda entry: entry[2]), min(timed, key=lambda entry: entry[2])
     if (apart := slowest[2] / fastest[2] - 1) > SAME_FEED:
         one, other = (
             f"{file}: {turn.name}, from {turn.begin:.6g} s on, has a feed of "
@@ -171,8 +171,8 @@ def _column(recording: Recording, names: Sequence[str], unit: str) -> str | None
 
 def _only(recording: Recording, unit: str) -> str | None:
     """The one column that has a unit of this kind, whatever its name is; None where there is none or a choice."""
-    found = [name for name in recording.names if _is(recording, name, unit)]
-    return found[0] if len(found) == 1 else None
+    result = [name for name in recording.names if _is(recording, name, unit)]
+    return result[0] if len(result) == 1 else None
 
 
 def _is(recording: Recording, name: str, unit: str) -> bool:
@@ -287,9 +287,9 @@ def _of_angles(
 
 def _beside_each_other(recording: Recording) -> tuple[str, Mapping[int, str]] | None:
     """The column of the angle, and those of the two directions by their sense; None where the file is another."""
-    found = {sense: _column(recording, names, "m") for sense, names in WAYS.items()}
+    result = {sense: _column(recording, names, "m") for sense, names in WAYS.items()}
     angle = _column(recording, ANGLES, "rad") or _only(recording, "rad")
-    columns = {sense: name for sense, name in found.items() if name is not None}
+    columns = {sense: name for sense, name in result.items() if name is not None}
     return (angle, columns) if angle is not None and len(columns) == len(WAYS) else None
 
 
@@ -336,7 +336,7 @@ def _named(
     axes: tuple[str, str] | None = None,
 ) -> list[RecordedTurn]:
     """axes: whose positions were measured; None: the radius alone was. radius: that the deviation is from [m]."""
-    found = []
+    recorded_turns = []
     for rows, sense in _turns(np.unwrap(angle), str(recording.path)):
         begin = duration = phase = None
         if time is not None:
@@ -352,8 +352,8 @@ def _named(
             begin = float(time[rows][0])
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
             phase = (time[rows] - begin) * (2 * math.pi / duration) if axes else None
-        told = checked(angle[rows], deviation[rows], radius, axes is not None, axes or ("", ""))
-        kept = told.keep
+        reported = checked(angle[rows], deviation[rows], radius, axes is not None, axes or ("", ""))
+        kept = reported.keep
         path = TurnedPath(
             (angle[rows][kept] + math.pi) % (2 * math.pi) - math.pi,
             deviation[rows][kept],
@@ -361,13 +361,13 @@ def _named(
             None if phase is None else phase[kept],
         )
         name = f"a turn {SENSE_WORDS[sense]}, {rows.stop - rows.start} samples"
-        found.append(RecordedTurn(name, path, begin, duration, told.doubts))
-    return found
+        recorded_turns.append(RecordedTurn(name, path, begin, duration, reported.doubts))
+    return recorded_turns
 
 
 def _turns(angle: Array, where: str) -> list[tuple[slice, int]]:
     """The middle full turn of every stretch in one direction, and its sense. angle: unwrapped (N,) [rad]."""
-    found = []
+    result = []
     most = 0.0
     for first, last in _stretches(angle):
         covered = abs(float(angle[last - 1] - angle[first]))
@@ -381,12 +381,12 @@ def _turns(angle: Array, where: str) -> list[tuple[slice, int]]:
         rows = np.flatnonzero((turned >= begin) & (turned < begin + 2 * math.pi))
         if len(rows) < MIN_TURN_SAMPLES:
             raise InputError(f"{where}: a turn has {len(rows)} samples; {MIN_TURN_SAMPLES} or more are needed")
-        found.append((slice(first + int(rows[0]), first + int(rows[-1]) + 1), sense))
-    if not found:
+        result.append((slice(first + int(rows[0]), first + int(rows[-1]) + 1), sense))
+    if not result:
         raise InputError(
             f"{where}: covers {math.degrees(most):.0f} deg in one direction; a full turn, 360 deg, is needed"
         )
-    return found
+    return result
 
 
 def _stretches(angle: Array) -> list[tuple[int, int]]:

@@ -44,7 +44,7 @@ class Offset(NamedTuple):
 def centre_moves(paths: Sequence[TurnedPath]) -> list[Moved]:
     """Of every path: the centre's way in a turn, ("drift_0", "drift_1"), 0 in its middle, and of each path but the
     first how far its centre lies from that of the first, ("centre_1_0", "centre_1_1"), half of it on either side."""
-    found: list[Moved] = []
+    result: list[Moved] = []
     for k, path in enumerate(paths):
         turned = path.sense * np.unwrap(path.angle)
         passed = (turned - turned[0]) / (2 * math.pi) - 0.5
@@ -52,8 +52,8 @@ def centre_moves(paths: Sequence[TurnedPath]) -> list[Moved]:
         for j in range(1, len(paths)):
             side = 0.5 if k == j else -0.5 if k == 0 else 0.0
             own |= {f"centre_{j}_{i}": (i, np.full(len(passed), side)) for i in (0, 1)}
-        found.append(own)
-    return found
+        result.append(own)
+    return result
 
 
 def angle_offset(
@@ -78,7 +78,7 @@ def angle_offset(
     scatter = max(1.4826 * float(np.median(np.abs(around))) if len(around) else 0.0, EDGE_FLOOR / EDGE_RATIO)
     level = max(EDGE_RATIO * scatter, float(np.abs(around).max(initial=0.0)) if len(around) else 0.0)
     near = np.abs(places) <= math.radians(MAX_ANGLE_OFFSET + 2)
-    found: list[tuple[float, float]] = []
+    result: list[tuple[float, float]] = []
     for which in range(4):
         own = {sense: np.mean(edges[which, sense], axis=0) for sense in (1, -1) if (which, sense) in edges}
         height = min(float(np.abs(edge[near]).max()) for edge in own.values())
@@ -87,14 +87,14 @@ def angle_offset(
         noise = math.radians(EDGE_ANGLE) * scatter / height
         if len(own) == 2:
             shift = _shift(own[1], own[-1])
-            found.append((shift / 2, noise))
+            result.append((shift / 2, noise))
         else:
             ((sense, edge),) = own.items()
             at = float(places[near][np.abs(edge[near]).argmax()])
-            found.append((sense * at, math.hypot(noise, math.radians(FRICTION_DELAY_ANGLE))))
-    if not found:
+            result.append((sense * at, math.hypot(noise, math.radians(FRICTION_DELAY_ANGLE))))
+    if not result:
         return Offset(0.0, math.radians(UNKNOWN_ANGLE), False)
-    values, errors = (np.array(column) for column in zip(*found, strict=True))
+    values, errors = (np.array(column) for column in zip(*result, strict=True))
     weights = 1 / (errors**2 + math.radians(ANGLE_ACCURACY) ** 2)
     mean = float(weights @ values / weights.sum())
     own_error = 1 / math.sqrt(float(weights.sum()))

@@ -47,7 +47,7 @@ def what_is_left(
     """
     width = math.radians(FALLEN)
     decays = np.radians(DECAYS)[:, None]
-    found = [(0.0, 0.0)] * 4
+    result = [(0.0, 0.0)] * 4
     for axis in (0, 1):
         sizes: dict[int, Array] = {}
         errors: dict[int, Array] = {}
@@ -62,39 +62,39 @@ def what_is_left(
             fallen = top + np.flatnonzero(means[top:] < 0.5 * means[top])
             if len(fallen) == 0 or len(means) - fallen[0] < 3:
                 continue
-            left = means[fallen[0] :]
-            left = left - left.mean()
+            remaining = means[fallen[0] :]
+            remaining = remaining - remaining.mean()
             tail = np.exp((window - (np.arange(fallen[0], len(means)) + 0.5) * width) / decays)
             tail -= tail.mean(axis=1, keepdims=True)
-            sizes[k] = tail @ left / (tail**2).sum(axis=1)
-            errors[k] = ((left - sizes[k][:, None] * tail) ** 2).mean(axis=1)
+            sizes[k] = tail @ remaining / (tail**2).sum(axis=1)
+            errors[k] = ((remaining - sizes[k][:, None] * tail) ** 2).mean(axis=1)
         best = int(np.sum(list(errors.values()), axis=0).argmin()) if errors else 0
         for k, size in sizes.items():
             if size[best] > math.sqrt(errors[k][best]):
-                found[k] = (float(size[best]), float(decays[best, 0]))
-    return found
+                result[k] = (float(size[best]), float(decays[best, 0]))
+    return result
 
 
 def fading_tails(
-    undone: Sequence[Undone], paths: Sequence[TurnedPath], left: Sequence[tuple[float, float]], window: float
+    undone: Sequence[Undone], paths: Sequence[TurnedPath], remaining: Sequence[tuple[float, float]], window: float
 ) -> Tails:
     """Tails of the peaks at the half axes; both senses share one: the axis reverses there from the same way.
 
     left: what each peak leaves at the end of its window [m], and the angle in which that falls to 1/e [rad].
     """
     columns, spread = [], []
-    for k, (size, decay) in enumerate(left):
+    for k, (size, decay) in enumerate(remaining):
         if size < TAIL_FLOOR:
             continue
         parts = []
-        for each, path in zip(undone, paths, strict=True):
-            at = each.turned[k % 2] + (math.pi if k > 1 else 0.0)
-            since = path.sense * (each.angle - at) % (2 * math.pi)
-            along = np.abs((np.cos if k % 2 == 0 else np.sin)(each.angle))
+        for value, path in zip(undone, paths, strict=True):
+            at = value.turned[k % 2] + (math.pi if k > 1 else 0.0)
+            since = path.sense * (value.angle - at) % (2 * math.pi)
+            along = np.abs((np.cos if k % 2 == 0 else np.sin)(value.angle))
             parts.append(np.where(since < math.pi, along * np.exp((window - since) / decay), 0.0))
         columns.append(np.concatenate(parts))
         spread.append(TAIL * size)
-    samples = sum(len(each.angle) for each in undone)
+    samples = sum(len(entry.angle) for entry in undone)
     return Tails(np.column_stack(columns) if columns else np.empty((samples, 0)), np.array(spread))
 
 
@@ -124,9 +124,9 @@ def known_tails(
         for order, size in enumerate((TAIL, within, within**2)):
             own = _of_harmonics(k, (1j * k) ** order * waves) / largest
             parts = []
-            for each, path in zip(undone, paths, strict=True):
-                passed = path.sense * (each.angle - each.turned[i]) % (2 * math.pi)
-                along = (np.cos, np.sin)[i](each.angle)
+            for value, path in zip(undone, paths, strict=True):
+                passed = path.sense * (value.angle - value.turned[i]) % (2 * math.pi)
+                along = (np.cos, np.sin)[i](value.angle)
                 parts.append(along * np.interp(passed, theta, own, period=2 * math.pi))
             columns.append(np.concatenate(parts))
             spread.append(size * peak)

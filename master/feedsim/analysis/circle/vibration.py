@@ -35,29 +35,29 @@ class Vibration:
     axis: str = ""
 
 
-def vibrations(circle: CircleUnderTest, found: Fit, paths: Sequence[TurnedPath]) -> tuple[Vibration, ...]:
+def vibrations(circle: CircleUnderTest, fit: Fit, paths: Sequence[TurnedPath]) -> tuple[Vibration, ...]:
     """The strongest vibration of each axis (of the radius, where the axes' positions are not known) that stands out.
 
     paths: all their samples, of whose turns ``found`` is the fitted model. The largest amplitude first.
     """
     best: dict[str, Vibration] = {}
     for k, path in enumerate(paths):
-        for axis, angle, off, free in _signals(circle, found, k, path):
-            each = _strongest(circle, axis, angle, off, free, found.quantile)
-            if each is not None and (axis not in best or each.amplitude > best[axis].amplitude):
-                best[axis] = each
-    return tuple(sorted(best.values(), key=lambda each: -each.amplitude))
+        for axis, angle, off, free in _signals(circle, fit, k, path):
+            vibration = _strongest(circle, axis, angle, off, free, fit.quantile)
+            if vibration is not None and (axis not in best or vibration.amplitude > best[axis].amplitude):
+                best[axis] = vibration
+    return tuple(sorted(best.values(), key=lambda entry: -entry.amplitude))
 
 
 Signal = tuple[str, Array, Array, NDArray[np.bool_]]
 
 
-def _signals(circle: CircleUnderTest, found: Fit, k: int, path: TurnedPath) -> list[Signal]:
+def _signals(circle: CircleUnderTest, fit: Fit, k: int, path: TurnedPath) -> list[Signal]:
     """Axis, angle by which the motion has turned (N,) [rad], deviation (N,) [m], and what counts of it (N,)."""
     if path.phase is None:
-        turned = path.sense * (np.unwrap(found.angle[k]) - found.angle[k][0])
+        turned = path.sense * (np.unwrap(fit.angle[k]) - fit.angle[k][0])
         order = np.argsort(turned)
-        return [("", turned[order], found.residual[k][order], (found.reversal[k] < 0)[order])]
+        return [("", turned[order], fit.residual[k][order], (fit.reversal[k] < 0)[order])]
     phase = path.phase[path.phase < 2 * math.pi]
     first = np.column_stack([np.cos(phase), np.sin(phase)])
     signals = []

@@ -22,7 +22,7 @@ CONTRADICT = 0.5
 
 def answer(diagnosis: Diagnosis) -> str:
     """Why the circle is not round, in a sentence or two: what it means, whether it can be trusted, what to do next."""
-    told = worth_telling(diagnosis)
+    terms = worth_telling(diagnosis)
     G = f"circular deviation G {_um(diagnosis.G)}"
     if diagnosis.apart > CONTRADICT * diagnosis.G:
         return (
@@ -30,10 +30,10 @@ def answer(diagnosis: Diagnosis) -> str:
             "is named. One may have been driven the other way: angles that rise from row to row are read as "
             "counterclockwise, angles that fall as clockwise. Reverse the rows of that turn, or give each by itself."
         )
-    if not told:
+    if not terms:
         return f"{G}: no single cause stands out; what remains is {_um(_rest(diagnosis).size)}."
-    first = f"{G}, {'mostly: ' if told[0].share > 0.5 else 'first: '}{sentence(diagnosis, told[0])}"
-    more = [f"Then {sentence(diagnosis, term)}" for term in told[1:3]]
+    first = f"{G}, {'mostly: ' if terms[0].share > 0.5 else 'first: '}{sentence(diagnosis, terms[0])}"
+    more = [f"Then {sentence(diagnosis, term)}" for term in terms[1:3]]
     return ". ".join([first, *more]) + "." + _trust(diagnosis)
 
 
@@ -45,11 +45,11 @@ def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
 def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     """Causes that somebody can act on, the largest first."""
     able = [term for term in diagnosis.terms if term.shows and term.key not in ("rest", "radius")]
-    found = [term for term in able if term.share >= SHARE_NAMED and term.size >= SHARE_NAMED * diagnosis.G]
+    result = [term for term in able if term.share >= SHARE_NAMED and term.size >= SHARE_NAMED * diagnosis.G]
     besides = [
-        term for term in able if term not in found and term.key != "offset" and term.size >= BESIDES * diagnosis.G
+        term for term in able if term not in result and term.key != "offset" and term.size >= BESIDES * diagnosis.G
     ]
-    return [*sorted(found, key=lambda term: (-term.gain, -term.share)), *sorted(besides, key=lambda term: -term.size)]
+    return [*sorted(result, key=lambda term: (-term.gain, -term.share)), *sorted(besides, key=lambda term: -term.size)]
 
 
 def sentence(diagnosis: Diagnosis, term: Term) -> str:
@@ -129,38 +129,38 @@ def further(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.angles is None:
         return []
     of = {term.key: term for term in diagnosis.terms if not term.axis}
-    found = []
+    result = []
     if abs(diagnosis.angles.angle) > ANGLE:
-        found.append(
+        result.append(
             f"the angles of the record are {math.degrees(diagnosis.angles.angle):.1f} deg off, as the places of the "
             "reversals show; that is taken out"
         )
     if not diagnosis.both:
-        found.append("squareness and servo mismatch are one: a circle in the other direction separates them")
+        result.append("squareness and servo mismatch are one: a circle in the other direction separates them")
     if of["third"].shows:
-        found.append(
+        result.append(
             "squareness and guides that are bent in third order are not fully separated: a circle of half the radius "
             f"does it ({circle.radius * 500:.3g} mm)"
         )
     turned = math.hypot(of["scale"].size, max(of[key].size for key in of if key.startswith("squareness"))) / 2
     if not diagnosis.angles.seen and 4 * diagnosis.angles.deviation * turned > UNCERTAIN:
-        found.append(
+        result.append(
             "no reversal shows, so the angles of the record may be off, and scale mismatch and squareness are not "
             f"fully separated: a slower circle of a smaller radius shows reversals ({circle.radius * 500:.3g} mm, "
             f"{circle.speed * 3e4:.3g} mm/min)"
         )
     slow = SLOW_TURN_RATE * circle.radius
     if circle.speed > 2 * slow:
-        found.append(
+        result.append(
             "the circle is fast: peaks of friction may take a quarter turn, and are then not separated from lost "
             f"motion, scale and servo mismatch: a feed of {slow * 6e4:.2g} mm/min separates them"
         )
     if "centres" in of and of["centres"].shows and of["centres"].size > UNCERTAIN:
-        found.append(
+        result.append(
             "an eccentric pivot and a drift between the turns are one: a second turn in the same direction separates "
             "them"
         )
-    return [f"{text[0].upper()}{text[1:]}." for text in found]
+    return [f"{text[0].upper()}{text[1:]}." for text in result]
 
 
 def _lag(diagnosis: Diagnosis, change: float) -> str:
@@ -205,12 +205,12 @@ def swinging(diagnosis: Diagnosis) -> str:
     """What vibrates between the reversals, in a sentence; "" where nothing stands out."""
     if not diagnosis.vibrations:
         return ""
-    told = [
-        f"{each.axis or 'the radius'} {_um(each.amplitude)} (amplitude) at {each.frequency:.3g} Hz"
-        for each in diagnosis.vibrations
+    reported = [
+        f"{vibration.axis or 'the radius'} {_um(vibration.amplitude)} (amplitude) at {vibration.frequency:.3g} Hz"
+        for vibration in diagnosis.vibrations
     ]
     alone = "; a file of angle and radius does not name the axis" if not diagnosis.vibrations[0].axis else ""
-    return f"Between the reversals swings {', '.join(told)}{alone}."
+    return f"Between the reversals swings {', '.join(reported)}{alone}."
 
 
 def _trust(diagnosis: Diagnosis) -> str:

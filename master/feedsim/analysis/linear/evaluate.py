@@ -201,25 +201,25 @@ def figures(result: LinearResult | LinearSystem) -> dict[str, Figure]:
     """
     if isinstance(result, LinearSystem):
         result = evaluate(result)
-    found = {
+    results = {
         "unstable_poles": Figure(
             float(result.unstable_poles), "1", "growing solutions of the closed system; the other figures presume 0"
         )
     }
     for axis, of_axis in result.axes.items():
-        found |= {f"{axis}.{name}": figure for name, figure in _axis_figures(of_axis).items()}
+        results |= {f"{axis}.{name}": figure for name, figure in _axis_figures(of_axis).items()}
     for drives, compliance in (("as they are", result.compliance), ("without torque", result.structure_compliance)):
         prefix = "tool" if compliance is result.compliance else "tool.free"
         for direction, top in compliance.items():
             name = f"{prefix}.compliance_{direction}"
             what = f"highest maximum of |x_{direction}/F_{direction}| at the tool, drives {drives}"
-            found[name] = Figure(top.value * 1e6 if top else math.nan, "um/N", what)
-            found[f"{name}.frequency"] = Figure(top.frequency if top else math.nan, "Hz", f"frequency of the {what}")
-    return found
+            results[name] = Figure(top.value * 1e6 if top else math.nan, "um/N", what)
+            results[f"{name}.frequency"] = Figure(top.frequency if top else math.nan, "Hz", f"frequency of the {what}")
+    return results
 
 
 def _axis_figures(result: AxisResult) -> dict[str, Figure]:
-    found = {
+    results = {
         "J_tot": Figure(result.J_tot, "kg.m2", "inertia that a slow motor torque accelerates"),
         "n_M.low_deviation": Figure(
             100 * result.low_deviation,
@@ -233,7 +233,7 @@ def _axis_figures(result: AxisResult) -> dict[str, Figure]:
     ):
         for i, pair in enumerate(found_pairs, start=1):
             rise = pair.resonance.value - pair.antiresonance.value
-            found |= {
+            results |= {
                 f"{prefix}.antiresonance_{i}": Figure(
                     pair.antiresonance.frequency, "Hz", f"minimum {i} of |n/M| omega, {system}"
                 ),
@@ -243,10 +243,10 @@ def _axis_figures(result: AxisResult) -> dict[str, Figure]:
                 f"{prefix}.rise_{i}": Figure(rise, "dB", f"from minimum {i} to the maximum of |n/M| omega, {system}"),
             }
     if result.speed is not None:
-        found |= {f"speed.{name}": figure for name, figure in _speed_figures(result.speed).items()}
+        results |= {f"speed.{name}": figure for name, figure in _speed_figures(result.speed).items()}
     if result.position is not None:
-        found |= {f"position.{name}": figure for name, figure in _position_figures(result.position).items()}
-    return found
+        results |= {f"position.{name}": figure for name, figure in _position_figures(result.position).items()}
+    return results
 
 
 def _speed_figures(loop: SpeedLoop) -> dict[str, Figure]:

@@ -36,7 +36,7 @@ def import_(options: Namespace) -> None:
             out=out,
             watch=watch,
         )
-    head = f"{', '.join(each.name for each in result.archives)} -> {out / 'machine.yaml'}"
+    head = f"{', '.join(archive.name for archive in result.archives)} -> {out / 'machine.yaml'}"
     finish(options.quiet, result.findings, head, *result.lines)
 
 

@@ -45,10 +45,10 @@ class _Pool:
         """The number of an array; axis: along which it is shown; cells: numbers of a table, of any sizes."""
         whole = not cells and (axis is None or not (axis.log or axis.symlog))
         content = (BLOCK_ROWS, steps(values)) if whole else (0, np.asarray(values).astype("<f4").tobytes())
-        found = self._known.setdefault(content, len(self.arrays))
-        if found == len(self.arrays):
+        count = self._known.setdefault(content, len(self.arrays))
+        if count == len(self.arrays):
             self.arrays.append((content[0], base64.b64encode(content[1]).decode("ascii")))
-        return found
+        return count
 
 
 def steps(values: Array) -> bytes:

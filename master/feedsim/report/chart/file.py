@@ -51,7 +51,7 @@ def standalone(chart: Chart, stem: str, title: str, caption: str = "", remark: s
 
 def coloured(drawn: str) -> str:
     """An SVG with colours as numbers."""
-    return re.sub(r"var\(--(\w+)\)", lambda found: PAGE_COLOURS[found[1]], drawn)
+    return re.sub(r"var\(--(\w+)\)", lambda match: PAGE_COLOURS[match[1]], drawn)
 
 
 def png(drawn: str) -> bytes:
@@ -68,8 +68,8 @@ def png(drawn: str) -> bytes:
 
 def _fonts() -> list[Path]:
     """Plain and bold, of matplotlib's data: nothing of it is imported."""
-    found = find_spec("matplotlib")
-    assert found is not None
-    assert found.submodule_search_locations is not None
-    folder = Path(found.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf"
+    module_spec = find_spec("matplotlib")
+    assert module_spec is not None
+    assert module_spec.submodule_search_locations is not None
+    folder = Path(module_spec.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf"
     return [folder / "DejaVuSans.ttf", folder / "DejaVuSans-Bold.ttf"]

@@ -199,12 +199,12 @@ class Chart:
     @property
     def legend(self) -> dict[str, Curve]:
         """A curve of each name, in their order."""
-        found: dict[str, Curve] = {}
+        result: dict[str, Curve] = {}
         for panel in self.panels:
             if not isinstance(panel, Grid):
                 for curve in panel.curves:
-                    found.setdefault(curve.name, curve)
-        return {name: curve for name, curve in found.items() if name}
+                    result.setdefault(curve.name, curve)
+        return {name: curve for name, curve in result.items() if name}
 
     def rows(self) -> Iterator[Sequence[Part]]:
         """The panels of each row."""
@@ -243,8 +243,8 @@ def _along(x: Array, y: Array, most: int) -> NDArray[np.intp]:
 
 def spans(values: Sequence[Array]) -> tuple[float, float] | None:
     """Least and largest finite value; None without any."""
-    finite = [each[np.isfinite(each)] for each in values]
-    finite = [each for each in finite if len(each)]
+    finite = [value[np.isfinite(value)] for value in values]
+    finite = [values for values in finite if len(values)]
     if not finite:
         return None
-    return float(min(each.min() for each in finite)), float(max(each.max() for each in finite))
+    return float(min(values.min() for values in finite)), float(max(values.max() for values in finite))

@@ -49,18 +49,18 @@ def ranges(panel: Panel) -> tuple[Range, Range]:
 
 
 def _whole(panel: Panel) -> Range:
-    low, high = spans([_shown(panel.x, each.x) for each in panel.curves]) or (0.0, 1.0)
+    low, high = spans([_shown(panel.x, curve.x) for curve in panel.curves]) or (0.0, 1.0)
     return (low, high) if high > low else (low - 0.5, low + 0.5)
 
 
 def _heights(panel: Panel, across: Range) -> Range:
     axis = panel.y
-    heights = [_seen(each, across) for each in panel.curves]
+    heights = [_seen(curve, across) for curve in panel.curves]
     heights.append(np.array([mark.y for mark in panel.marks if across[0] <= mark.x <= across[1]]))
-    found = spans([_shown(axis, each) for each in heights])
-    if found is None:
+    result = spans([_shown(axis, height) for height in heights])
+    if result is None:
         return (0.1, 10.0) if axis.log else (-1.0, 1.0)
-    low, high = found
+    low, high = result
     if axis.log:
         return low / 1.3, high * 1.3
     if axis.symlog:  # room in the measure of the axis, on either side of zero
@@ -105,7 +105,7 @@ def ticks(axis: Axis, span: Range, most: float) -> Ticks:
         return Ticks(_decades(span, most))
     turns = axis.unit == "°" and high - low > 60
     step = (
-        float(next((each for each in PHASES if (high - low) / each <= most), 3600))
+        float(next((number for number in PHASES if (high - low) / number <= most), 3600))
         if turns
         else round_step((high - low) / most)
     )
@@ -121,7 +121,7 @@ def _both_ways(within: float, span: Range) -> list[tuple[float, str]]:
     low, high = span
     first, last = math.ceil(math.log10(2 * within) - 1e-9), math.floor(math.log10(max(-low, high, within)) + 1e-9)
     decades = [10.0**k for k in range(first, last + 1)]
-    marks = [*(-each for each in reversed(decades)), 0.0, *decades]
+    marks = [*(-decade for decade in reversed(decades)), 0.0, *decades]
     return [(at, tick_text(at)) for at in marks if low <= at <= high]
 
 
@@ -139,7 +139,7 @@ def _decades(span: Range, most: float) -> list[tuple[float, str]]:
 
 def round_step(rough: float) -> float:
     decade: float = 10.0 ** math.floor(math.log10(rough)) if rough > 0 else 1.0
-    return decade * next((each for each in (1, 2, 5) if each * decade >= 0.999 * rough), 10)
+    return decade * next((entry for entry in (1, 2, 5) if entry * decade >= 0.999 * rough), 10)
 
 
 def _marked(span: Range, step: float) -> int:
@@ -149,7 +149,7 @@ def _marked(span: Range, step: float) -> int:
 def _finer(step: float, turns: bool) -> float:
     """The next smaller round step; 0 without one."""
     if turns:
-        return float(max((each for each in PHASES if each < step), default=0))
+        return float(max((number for number in PHASES if number < step), default=0))
     decade: float = 10.0 ** math.floor(math.log10(step) + 1e-9)
     return decade * {1: 0.5, 2: 1, 5: 2}[round(step / decade)]
 
@@ -194,13 +194,13 @@ def apart(found_of: Callable[[int], Ticks], place: Callable[[float], float], mos
         middles = [(min(place(at), end - 3.6 * len(text)), len(text)) for at, text in all_of.marks if text]
         return any(abs(b - a) < 3.5 * (n + m) + 6 for (a, n), (b, m) in pairwise(middles))
 
-    found = found_of(most)
-    while most > 2 and touching(found):
+    result = found_of(most)
+    while most > 2 and touching(result):
         most -= 1
-        found = found_of(most)
+        result = found_of(most)
     for _ in range(3):
-        if touching(found):
-            with_text = [at for at, text in found.marks if text]
+        if touching(result):
+            with_text = [at for at, text in result.marks if text]
             kept = set(with_text[::2])
-            found = replace(found, marks=[(at, text if at in kept else "") for at, text in found.marks])
-    return found
+            result = replace(result, marks=[(at, text if at in kept else "") for at, text in result.marks])
+    return result

@@ -77,8 +77,10 @@ def _aside(chart: Chart) -> float:
 
 def _shared(frames: dict[int, Frame], boxes: list[Box], k: int) -> Frame:
     """The frame of a panel; those below one another begin alike."""
-    left = max(frame.left for j, frame in frames.items() if (boxes[j][0], boxes[j][2]) == (boxes[k][0], boxes[k][2]))
-    return frames[k].beginning(left)
+    remaining = max(
+        frame.left for j, frame in frames.items() if (boxes[j][0], boxes[j][2]) == (boxes[k][0], boxes[k][2])
+    )
+    return frames[k].beginning(remaining)
 
 
 def _legend(chart: Chart) -> tuple[list[str], float]:
@@ -92,20 +94,20 @@ def _legend(chart: Chart) -> tuple[list[str], float]:
                 names.setdefault(band.name, band)
     names.pop("", None)
     parts, x, y = [], 4.0, 14.0
-    for name, each in names.items():
+    for name, value in names.items():
         room = 36 + 6.8 * len(name)
         if x + room > WIDTH and x > 4:
             x, y = 4.0, y + 18
-        parts.append(_sample(each, x, y - 4) + text(x + 27, y, name))
+        parts.append(_sample(value, x, y - 4) + text(x + 27, y, name))
         x += room
     return parts, y + 8 if parts else 0.0
 
 
-def _sample(each: Curve | Band, x: float, y: float) -> str:
+def _sample(curve: Curve | Band, x: float, y: float) -> str:
     """What a name of the legend looks like."""
-    if isinstance(each, Band) or each.filled:
-        deep = BAND if isinstance(each, Band) else FILL
-        return rectangle(x, y - 4, 22, 8, f'fill="{fill(each.colour)}" fill-opacity="{deep}"')
-    if each.dots:
-        return circle(x + 11, y, max(2.4, each.width), f'fill="{fill(each.colour)}"')
-    return line(x, y, x + 22, y, stroke(each, max(1.6, each.width)))
+    if isinstance(curve, Band) or curve.filled:
+        deep = BAND if isinstance(curve, Band) else FILL
+        return rectangle(x, y - 4, 22, 8, f'fill="{fill(curve.colour)}" fill-opacity="{deep}"')
+    if curve.dots:
+        return circle(x + 11, y, max(2.4, curve.width), f'fill="{fill(curve.colour)}"')
+    return line(x, y, x + 22, y, stroke(curve, max(1.6, curve.width)))

@@ -58,21 +58,21 @@ def figures_of(recorded: RecordedCircle, diagnosis: Diagnosis) -> dict[str, Figu
     circle = recorded.circle
     prefix = axis_letters(circle.axes)
     centre = "the fitted centre" if recorded.centred else "the programmed centre"
-    found = {"G": Figure(diagnosis.G * 1e6, "um", f"range of the radial deviation of all turns, about {centre}")}
+    figures = {"G": Figure(diagnosis.G * 1e6, "um", f"range of the radial deviation of all turns, about {centre}")}
     for sense in (1, -1):
         if sense not in diagnosis.senses:
-            return _prefixed(prefix, found | cause_figures(diagnosis))
+            return _prefixed(prefix, figures | cause_figures(diagnosis))
     one = next(turn.path for turn in recorded.turns if turn.path.sense > 0)
     other = next(turn.path for turn in recorded.turns if turn.path.sense < 0)
     curves = [(one.angle, one.deviation), (other.angle, other.deviation)]
-    return _prefixed(prefix, found | both_directions(curves, circle.radius, circle.axes) | cause_figures(diagnosis))
+    return _prefixed(prefix, figures | both_directions(curves, circle.radius, circle.axes) | cause_figures(diagnosis))
 
 
 def _prefixed(prefix: str, figures: Mapping[str, Figure]) -> dict[str, Figure]:
     # Nobody knows here where a position was read: by scales, or at the tool.
     return {
-        f"{prefix}.{name}": Figure(each.value, each.unit, each.meaning.removesuffix(", by the linear scales"))
-        for name, each in figures.items()
+        f"{prefix}.{name}": Figure(figure.value, figure.unit, figure.meaning.removesuffix(", by the linear scales"))
+        for name, figure in figures.items()
     }
 
 
@@ -86,10 +86,10 @@ def report_of(
     peaks = {
         f"peak_{axis}": f"reversal peak, {axis} reverses" for axis in circle.axes if f"{prefix}.peak_{axis}" in figures
     }
-    labels |= dict(sorted(peaks.items(), key=lambda each: -abs(figures[f"{prefix}.{each[0]}"].value)))
+    labels |= dict(sorted(peaks.items(), key=lambda entry: -abs(figures[f"{prefix}.{entry[0]}"].value)))
     labels |= TILES
     own = {key: figures.get(f"{prefix}.{key}") for key in labels}
-    tiles = [Tile(tile_value(each), labels[key], typeset(each.meaning)) for key, each in own.items() if each]
+    tiles = [Tile(tile_value(figure), labels[key], typeset(figure.meaning)) for key, figure in own.items() if figure]
     rows = [
         ("Radius", f"{circle.radius * 1e3:.6g} mm"),
         ("Path speed", f"{circle.speed * 6e4:.5g} mm/min"),
@@ -134,8 +134,8 @@ def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagno
         for turn in turns
     ]
     curves += [
-        circle_plots.turned("model without peaks", SIMULATED, each.angle, each.deviation, "dotted", 1.1)
-        for each in fitted
+        circle_plots.turned("model without peaks", SIMULATED, centred.angle, centred.deviation, "dotted", 1.1)
+        for centred in fitted
     ]
     title = f"Recorded circle in the plane {plane}"
     return Picture(f"circle-{plane}", title, caption, circle_plots.circle_chart(on, curves))

@@ -17,9 +17,9 @@ OFF_PANEL = 1e30  # beyond every panel
 
 def drawn(comparison: Comparison) -> list[Variable]:
     """Variables that are drawn: the worst ones outside, else the one nearest to its limit."""
-    kept = [each for each in comparison.variables if each.curves is not None]
-    outside = [each for each in kept if each.verdict == "different"]
-    ranked = sorted(outside or kept, key=lambda each: (-each.ratio, -each.deviation))
+    kept = [variable for variable in comparison.variables if variable.curves is not None]
+    outside = [variable for variable in kept if variable.verdict == "different"]
+    ranked = sorted(outside or kept, key=lambda variable: (-variable.ratio, -variable.deviation))
     return ranked[: MAX_VARIABLES if outside else 1]
 
 

@@ -93,7 +93,10 @@ def write(
 
 def report_of(comparisons: Sequence[Comparison]) -> Report:
     """Content of the report: of several pairs a table of all, and those that differ first."""
-    counts = {kind: sum(each.verdict == kind for each in comparisons) for kind in ("same", "different", "unusable")}
+    counts = {
+        kind: sum(comparison.verdict == kind for comparison in comparisons)
+        for kind in ("same", "different", "unusable")
+    }
     verdict = next((kind for kind in ("unusable", "different") if counts[kind]), "same")
     one = comparisons[0] if len(comparisons) == 1 else None
     return Report(
@@ -123,7 +126,7 @@ def _answer(comparisons: Sequence[Comparison]) -> list[str]:
     return [
         f"{len(outside)} of {counted(len(compared), 'variable')} leave their tolerance, {one.worst.name} the furthest: "
         f"{one.worst.line}.",
-        *(f"It looks like: {each.text}." for each in one.looks_like),
+        *(f"It looks like: {proposal.text}." for proposal in one.looks_like),
         "The picture shows whether it is a matter of value or of time; which differences are allowed is yours to say "
         "(--tol).",
     ]
@@ -131,12 +134,18 @@ def _answer(comparisons: Sequence[Comparison]) -> list[str]:
 
 def _not_seen(comparisons: Sequence[Comparison]) -> list[str]:
     """That rows of results were not compared, of which nobody knows whether they are the same."""
-    partly = [each for each in comparisons if each.same and each.coverage is not None and each.coverage.share < 1]
+    partly = [
+        comparison
+        for comparison in comparisons
+        if comparison.same and comparison.coverage is not None and comparison.coverage.share < 1
+    ]
     if len(comparisons) == 1:
         return [
-            f"Compared: {each.coverage.text}. The other rows may hold anything." for each in partly if each.coverage
+            f"Compared: {comparison.coverage.text}. The other rows may hold anything."
+            for comparison in partly
+            if comparison.coverage
         ]
-    named = ", ".join(f"{each.result} ({each.heading})" for each in partly[:3])
+    named = ", ".join(f"{comparison.result} ({comparison.heading})" for comparison in partly[:3])
     more = f" and {len(partly) - 3} more" if len(partly) > 3 else ""
     return [f"Of {counted(len(partly), 'result')} not all rows are compared: {named}{more}."] if partly else []
 
@@ -144,11 +153,11 @@ def _not_seen(comparisons: Sequence[Comparison]) -> list[str]:
 def _sections(comparisons: Sequence[Comparison]) -> Iterator[Section]:
     """A section per pair, those that differ first and, up to MOST_PICTURES, with a picture."""
     pictures = 0
-    for number, each in sorted(enumerate(comparisons, 1), key=lambda item: item[1].same):
-        parts: list[Part] = [Paragraph(f"against {each.reference}", "muted")]
-        parts += _single(each, number, draw=not each.same and pictures < MOST_PICTURES, alone=False)
+    for number, comparison in sorted(enumerate(comparisons, 1), key=lambda item: item[1].same):
+        parts: list[Part] = [Paragraph(f"against {comparison.reference}", "muted")]
+        parts += _single(comparison, number, draw=not comparison.same and pictures < MOST_PICTURES, alone=False)
         pictures += any(isinstance(part, Picture) for part in parts)
-        yield Section(each.result, parts, _anchor(number))
+        yield Section(comparison.result, parts, _anchor(number))
 
 
 def _alone(comparison: Comparison) -> Iterator[Part]:
@@ -164,7 +173,7 @@ def _single(comparison: Comparison, number: int, *, draw: bool, alone: bool) -> 
     if not alone or comparison.problem:
         yield Paragraph(minus(comparison.line))
     if not alone:
-        yield from (Paragraph(f"It looks like: {minus(each.text)}.") for each in comparison.looks_like)
+        yield from (Paragraph(f"It looks like: {minus(proposal.text)}.") for proposal in comparison.looks_like)
     yield from (Paragraph(note, "note") for note in comparison.notes)
     if draw and (picture := picture_of(comparison, number)):
         yield picture
@@ -173,17 +182,17 @@ def _single(comparison: Comparison, number: int, *, draw: bool, alone: bool) -> 
 
 
 def _tiles(comparisons: Sequence[Comparison], counts: dict[str, int]) -> list[Tile]:
-    compared = [each for pair in comparisons for each in pair.those("same", "different")]
-    outside = [each for each in compared if each.verdict == "different"]
-    missing = [each for pair in comparisons for each in pair.those("missing")]
+    compared = [variable for pair in comparisons for variable in pair.those("same", "different")]
+    outside = [variable for variable in compared if variable.verdict == "different"]
+    missing = [variable for pair in comparisons for variable in pair.those("missing")]
     tiles = [Tile(f"{len(outside)} of {len(compared)}", "variables outside", "variables that leave their tube")]
-    covers = [each.coverage for each in comparisons if each.coverage is not None]
+    covers = [comparison.coverage for comparison in comparisons if comparison.coverage is not None]
     if covers:
-        least = min(covers, key=lambda each: each.share)
+        least = min(covers, key=lambda coverage: coverage.share)
         tiles.append(Tile(percent(least.share), "rows compared", f"of the result, at least; {least.text}"))
     if missing:
         tiles.append(Tile(str(len(missing)), "variables missing", "columns of the reference that the result lacks"))
-    worst = max(compared, key=lambda each: (each.ratio, each.deviation), default=None)
+    worst = max(compared, key=lambda variable: (variable.ratio, variable.deviation), default=None)
     if worst is not None:
         tiles.append(Tile(worst.name, "worst variable", worst.line))
         tiles.append(Tile(_number(worst.deviation, worst.unit), "off by", worst.line))
@@ -200,11 +209,11 @@ def _number(value: float, unit: str) -> str:
 
 def _pairs(comparisons: Sequence[Comparison]) -> Section:
     rows: list[tuple[Text, ...]] = []
-    for number, each in enumerate(comparisons, 1):
-        worst = each.problem or (f"{each.worst.name}: {each.worst.line}" if each.worst else "")
-        compared = each.coverage.text if each.coverage else "nothing"
-        link = Span(each.result, "link", _anchor(number))
-        rows.append((link, each.reference, _verdict(each.heading), compared, minus(worst)))
+    for number, comparison in enumerate(comparisons, 1):
+        worst = comparison.problem or (f"{comparison.worst.name}: {comparison.worst.line}" if comparison.worst else "")
+        compared = comparison.coverage.text if comparison.coverage else "nothing"
+        link = Span(comparison.result, "link", _anchor(number))
+        rows.append((link, comparison.reference, _verdict(comparison.heading), compared, minus(worst)))
     return Section("All pairs", [Table("lllpp", ("Result", "Reference", "Verdict", "Compared", "Worst"), rows)])
 
 
@@ -213,28 +222,34 @@ def _anchor(number: int) -> str:
 
 
 def _variables(comparison: Comparison) -> Table:
-    ranked = sorted(comparison.variables, key=lambda each: -each.ratio if each.verdict != "same" else 1.0)
+    ranked = sorted(comparison.variables, key=lambda variable: -variable.ratio if variable.verdict != "same" else 1.0)
     heads = (
         "Variable", "Verdict", "Off by", "Allowed", "Unit", "Allowed in time", "Worst at [s]", "Result", "Reference",
         "Rows outside",
     )  # fmt: skip
-    return Table("llrrlrrrrr", heads, [_row(each) for each in ranked])
+    return Table("llrrlrrrrr", heads, [_row(variable) for variable in ranked])
 
 
-def _row(each: Variable) -> tuple[Text, ...]:
-    name: tuple[str | Span, ...] = (code(each.name),)
-    if each.source and each.source != each.name:
-        name += (" ", Span(each.source, "muted"))
-    if each.verdict in ("missing", "unusable"):
-        return name, _verdict(each.verdict), each.reason
-    if each.reason:
-        name += (f"\n{each.reason}",)
+def _row(variable: Variable) -> tuple[Text, ...]:
+    name: tuple[str | Span, ...] = (code(variable.name),)
+    if variable.source and variable.source != variable.name:
+        name += (" ", Span(variable.source, "muted"))
+    if variable.verdict in ("missing", "unusable"):
+        return name, _verdict(variable.verdict), variable.reason
+    if variable.reason:
+        name += (f"\n{variable.reason}",)
     return (
-        name, _verdict(each.verdict), _number(each.deviation, ""), _number(each.allowed, ""), display_unit(each.unit),
-        reach_text(each), f"{each.time:.9g}", minus(powers(f"{each.value:.9g}")),
-        minus(powers(f"{each.expected:.9g}")),
-        f"{each.outside} of {each.rows}",
-    )  # fmt: skip
+        name,
+        _verdict(variable.verdict),
+        _number(variable.deviation, ""),
+        _number(variable.allowed, ""),
+        display_unit(variable.unit),
+        reach_text(variable),
+        f"{variable.time:.9g}",
+        minus(powers(f"{variable.value:.9g}")),
+        minus(powers(f"{variable.expected:.9g}")),
+        f"{variable.outside} of {variable.rows}",
+    )
 
 
 def _verdict(verdict: str) -> Text:
@@ -292,20 +307,22 @@ def to_json(comparisons: Sequence[Comparison]) -> str:
         "verdict": overall(comparisons),
         "comparisons": [
             {
-                "result": each.result,
-                "reference": each.reference,
-                "verdict": each.verdict,
-                "problem": each.problem,
-                "notes": list(each.notes),
-                "looks_like": [asdict(proposal) for proposal in each.looks_like],
-                "start": each.start,
-                "end": each.end,
-                "shift": each.shift,
-                "coverage": None if each.coverage is None else asdict(each.coverage) | {"share": each.coverage.share},
-                "worst": each.worst.name if each.worst is not None else None,
-                "variables": [_variable(variable) for variable in each.variables],
+                "result": comparison.result,
+                "reference": comparison.reference,
+                "verdict": comparison.verdict,
+                "problem": comparison.problem,
+                "notes": list(comparison.notes),
+                "looks_like": [asdict(proposal) for proposal in comparison.looks_like],
+                "start": comparison.start,
+                "end": comparison.end,
+                "shift": comparison.shift,
+                "coverage": None
+                if comparison.coverage is None
+                else asdict(comparison.coverage) | {"share": comparison.coverage.share},
+                "worst": comparison.worst.name if comparison.worst is not None else None,
+                "variables": [_variable(variable) for variable in comparison.variables],
             }
-            for each in comparisons
+            for comparison in comparisons
         ],
     }
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -313,7 +330,7 @@ def to_json(comparisons: Sequence[Comparison]) -> str:
 
 def overall(comparisons: Sequence[Comparison]) -> str:
     """The worst verdict of all."""
-    return max((each for each in comparisons), key=lambda each: each.exit_code).verdict
+    return max((comparison for comparison in comparisons), key=lambda comparison: comparison.exit_code).verdict
 
 
 def _variable(variable: Variable) -> dict[str, Any]:
@@ -336,7 +353,7 @@ def _details(comparison: Comparison, variable: Variable) -> str:
         f"result: {comparison.result}, column {variable.source}",
         f"reference: {comparison.reference}",
     ]
-    lines += [f"looks like: {each.text}" for each in comparison.looks_like if variable.name in each.names]
+    lines += [f"looks like: {proposal.text}" for proposal in comparison.looks_like if variable.name in proposal.names]
     return "\n".join(lines + ([variable.reason] if variable.reason else []))
 
 

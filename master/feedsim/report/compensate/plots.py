@@ -43,7 +43,7 @@ def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) ->
         f"Radius deviation magnified {on.magnification:,.0f} times; rings "
         f"at ±{on.ring:g} µm about the programmed circle."
     )
-    curves = [turned(name, colour, each.angle, each.deviation) for name, colour, each in _both(before, after)]
+    curves = [turned(name, colour, value.angle, value.deviation) for name, colour, value in _both(before, after)]
     return Picture("compensation-contour", title, caption, circle_chart(on, curves, sense=turn.sense))
 
 
@@ -61,7 +61,7 @@ def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) 
     across = Axis("angle from the crossing", "°", span=(-45.0, 45.0))
     for both in (_both(before, after), _both(before, after)[1:]):
         row = [
-            [Curve(name, *_about(each, glitch.crossing), colour) for name, colour, each in both]
+            [Curve(name, *_about(value, glitch.crossing), colour) for name, colour, value in both]
             for glitch in before.glitches
         ]
         low, high = spans([curve.y for curves in row for curve in curves]) or (0.0, 1.0)
@@ -119,9 +119,9 @@ def _reversal(time: Array, n: Array) -> float:
 
 
 def _errors_picture(compensation: Compensation) -> Picture:
-    by_delay = [each for each in compensation.table if each.what == "delay"]
-    others = [each for each in compensation.table if each.what != "delay"]
-    names = list(dict.fromkeys(each.what for each in others))
+    by_delay = [variation for variation in compensation.table if variation.what == "delay"]
+    others = [variation for variation in compensation.table if variation.what != "delay"]
+    names = list(dict.fromkeys(other.what for other in others))
 
     title = "What errors of the compensation cost"
     caption = (
@@ -134,10 +134,10 @@ def _errors_picture(compensation: Compensation) -> Picture:
     rows = {name: float(i) for i, name in enumerate(reversed(names))}
     curves = []
     for offset, low, colour in ((0.19, True, OTHERWISE), (-0.19, False, AFTER)):
-        chosen = [each for each in others if (each.change < 0) == low]
-        x = np.array([value for each in chosen for value in (0.0, each.quality.G * 1e6, math.nan)])
-        y = np.array([value for each in chosen for value in (*(2 * [rows[each.what] + offset]), math.nan)])
-        share = next((each.change for each in chosen), 0.0)
+        chosen = [other for other in others if (other.change < 0) == low]
+        x = np.array([value for variation in chosen for value in (0.0, variation.quality.G * 1e6, math.nan)])
+        y = np.array([value for variation in chosen for value in (*(2 * [rows[variation.what] + offset]), math.nan)])
+        share = next((variation.change for variation in chosen), 0.0)
         curves.append(Curve(minus(f"{share:+.3g} %"), x, y, colour, width=8.0))
     axis = Axis("", names=list(rows), span=(-0.6, len(rows) - 0.4))
     points = [Curve("", np.array(error), np.array(G), AFTER, width=width, dots=width > 2) for width in (1.4, 2.4)]
@@ -149,5 +149,7 @@ def _errors_picture(compensation: Compensation) -> Picture:
 
 
 def _by_change(variations: Sequence[Variation], without_error: float) -> tuple[list[float], list[float]]:
-    points = sorted([(0.0, without_error), *((each.change, each.quality.G * 1e6) for each in variations)])
+    points = sorted(
+        [(0.0, without_error), *((variation.change, variation.quality.G * 1e6) for variation in variations)]
+    )
     return [change for change, _ in points], [G for _, G in points]

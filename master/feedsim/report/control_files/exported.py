@@ -44,7 +44,7 @@ def check_writable(files: Sequence[str], directory: Path | str, inputs: Sequence
 
 def figures_of(written: Written) -> dict[str, Figure]:
     """How many values differ."""
-    done = [each for each in written.changes if each.written]
+    done = [change for change in written.changes if change.written]
     return {
         "values.changed": Figure(float(len(done)), "1", "values of the files that were changed"),
         "values.to_type": Figure(
@@ -56,23 +56,24 @@ def figures_of(written: Written) -> dict[str, Figure]:
 
 def findings(written: Written) -> list[str]:
     """Values to type, and what was not touched."""
-    found: list[str] = []
-    typed = [each for each in written.changes if not each.written]
+    result: list[str] = []
+    typed = [change for change in written.changes if not change.written]
     if typed:
         shown = "; ".join(
-            f"{each.axis} {each.name.number} {each.name.name} {each.new} ({each.reason})" for each in typed[:MOST_NAMED]
+            f"{change.axis} {change.name.number} {change.name.name} {change.new} ({change.reason})"
+            for change in typed[:MOST_NAMED]
         )
         more = f"; and {len(typed) - MOST_NAMED} more on the sheet" if len(typed) > MOST_NAMED else ""
-        found.append(f"{counted(len(typed), 'value')} not written: {shown}{more}")
-    return [*found, *(Note(text) for text in written.notes)]
+        result.append(f"{counted(len(typed), 'value')} not written: {shown}{more}")
+    return [*result, *(Note(text) for text in written.notes)]
 
 
 def answers(written: Written, axes: Mapping[str, str]) -> list[str]:
     """How many values of each axis were changed."""
     said = []
     for axis, theirs in axes.items():
-        own = [each for each in written.changes if each.axis == axis]
-        done = sum(each.written for each in own)
+        own = [change for change in written.changes if change.axis == axis]
+        done = sum(change.written for change in own)
         said.append(f"{axis} ({theirs}): {counted(done, 'value')} changed, {len(own) - done} to type")
     return said
 
@@ -80,10 +81,10 @@ def answers(written: Written, axes: Mapping[str, str]) -> list[str]:
 def change_lines(written: Written) -> list[str]:
     """Every changed value, a line each."""
     return [
-        f"{each.axis} {name.number} {name.name}: {each.old} -> {each.new} {plain_unit(name.unit)}".rstrip()
-        for each in written.changes
-        if each.written
-        for name in (each.name,)
+        f"{change.axis} {name.number} {name.name}: {change.old} -> {change.new} {plain_unit(name.unit)}".rstrip()
+        for change in written.changes
+        if change.written
+        for name in (change.name,)
     ]
 
 
@@ -92,10 +93,10 @@ def sheet(written: Written) -> str:
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")
     rows.writerow(["axis", "number", "name", "old", "new", "unit", "unit confirmed", "written", "reason", "where"])
-    for each in written.changes:
+    for change in written.changes:
         rows.writerow([
-            each.axis, each.name.number, each.name.name, each.old, each.new, each.name.unit,
-            "yes" if each.name.confirmed else "no", "yes" if each.written else "no", each.reason, each.where,
+            change.axis, change.name.number, change.name.name, change.old, change.new, change.name.unit,
+            "yes" if change.name.confirmed else "no", "yes" if change.written else "no", change.reason, change.where,
         ])  # fmt: skip
     return out.getvalue()
 
@@ -119,7 +120,7 @@ def report_of(
         main=[
             _changes(written, True, "Values that were changed", TOUCHED),
             _changes(written, False, "Values to type", "They are not in the files; the last column says why."),
-            sources_section(each.name for each in written.changes),
+            sources_section(change.name for change in written.changes),
         ],
         provenance=provenance_section(
             [("Machine", machine.name), ("Control", archives[0].control)], hashed([("file", path) for path in inputs])
@@ -131,12 +132,19 @@ def report_of(
 def _changes(written: Written, done: bool, title: str, note: str) -> Section | None:
     rows: list[tuple[Text, ...]] = [
         (
-            each.axis, code(each.name.number), each.name.name, minus(each.old) or "–", minus(each.new), each.name.unit,
-            "confirmed" if each.name.confirmed else "not confirmed", each.where or "–", each.reason or "–",
+            change.axis,
+            code(change.name.number),
+            change.name.name,
+            minus(change.old) or "–",
+            minus(change.new),
+            change.name.unit,
+            "confirmed" if change.name.confirmed else "not confirmed",
+            change.where or "–",
+            change.reason or "–",
         )
-        for each in written.changes
-        if each.written == done
-    ]  # fmt: skip
+        for change in written.changes
+        if change.written == done
+    ]
     heads = ("Axis", "Number", "Name", "Old", "New", "Unit", "Unit is", "Where", "Remark")
     return Section(title, [Table("lllrrlllp", heads, rows, note)]) if rows else None
 
@@ -152,10 +160,10 @@ def summary(
         "axes": dict(axes),
         "figures": figures_part(figures_of(written)),
         "changes": [
-            {"axis": each.axis, "parameter": each.name.parameter, "number": each.name.number, "old": each.old,
-             "new": each.new, "unit": each.name.unit, "written": each.written, "reason": each.reason,
-             "where": each.where}
-            for each in written.changes
+            {"axis": change.axis, "parameter": change.name.parameter, "number": change.name.number, "old": change.old,
+             "new": change.new, "unit": change.name.unit, "written": change.written, "reason": change.reason,
+             "where": change.where}
+            for change in written.changes
         ],
         "software": software(),
         "inputs": inputs_part(hashed([("file", path) for path in inputs])),

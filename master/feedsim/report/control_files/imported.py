@@ -36,13 +36,13 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 def doubtful(reading: Reading, made: Imported) -> list[Refused]:
     """Values that were not taken although they may act."""
-    return [each for each in (*reading.refused, *made.refused) if each.weight == "doubt"]
+    return [entry for entry in (*reading.refused, *made.refused) if entry.weight == "doubt"]
 
 
 def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) -> dict[str, Figure]:
     """How much of the files was understood."""
-    read = sum(len(each.entries) for each in archives)
-    odd = sum(each.odd_count for each in archives)
+    read = sum(len(archive.entries) for archive in archives)
+    odd = sum(archive.odd_count for archive in archives)
     return {
         "values.taken": Figure(
             float(len(made.values)), "1", "values that the machine file has from the control's files"
@@ -58,38 +58,38 @@ def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) ->
 
 def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[str]:
     """What is to be known before the machine file is used."""
-    found: list[str] = []
+    result: list[str] = []
     if not made.values:
         whose = "the draft is empty" if made.base is None else "the machine file is as it was"
-        found.append(f"no value was taken; {whose}")
-    found += reading.doubts
+        result.append(f"no value was taken; {whose}")
+    result += reading.doubts
     open_ones = doubtful(reading, made)
     if open_ones:
-        shown = "; ".join(_named(each) for each in open_ones[:MOST_NAMED])
+        shown = "; ".join(_named(open_one) for open_one in open_ones[:MOST_NAMED])
         more = f"; and {len(open_ones) - MOST_NAMED} more in the report" if len(open_ones) > MOST_NAMED else ""
-        found.append(f"{counted(len(open_ones), 'value')} not taken: {shown}{more}")
+        result.append(f"{counted(len(open_ones), 'value')} not taken: {shown}{more}")
     if made.missing:
-        found.append(
+        result.append(
             f"the machine file is a draft: {counted(len(made.missing), 'key')} missing, the first "
             f"{made.missing[0].partition(':')[0]}; the head of the file has them all"
         )
     for archive in archives:
         if archive.odd:
             first = archive.odd[0]
-            found.append(
+            result.append(
                 Note(
                     f"{archive.name}: {counted(archive.odd_count, 'line')} not understood, the first in line "
                     f"{first.line}: {first.reason}"
                 )
             )
         if archive.container:
-            found.append(Note(f"{archive.name} is a container with binary parts: only lines that are whole were read"))
-    return [*found, *(Note(text) for text in reading.notes)]
+            result.append(Note(f"{archive.name} is a container with binary parts: only lines that are whole were read"))
+    return [*result, *(Note(text) for text in reading.notes)]
 
 
 def answers(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[str]:
     """How many values each axis has from the files."""
-    per_axis = {axis: [each for each in made.values if each.axis == axis] for axis in reading.axes}
+    per_axis = {axis: [value for value in made.values if value.axis == axis] for axis in reading.axes}
     said = [
         f"{axis}: {counted(len(own), 'value')} of {_theirs(reading, axis)}"
         + (f", {_leading(own)}" if _leading(own) else "")
@@ -105,14 +105,14 @@ def _theirs(reading: Reading, axis: str) -> str:
 
 def _leading(own: Sequence[Taken]) -> str:
     names = ("drive.K_v", "drive.K_p", "drive.T_n")
-    shown = [each for name in names for each in own if each.parameter == name and each.entry is not None]
-    return ", ".join(f"{each.number} = {each.text}{f' ({unit})' if (unit := plain_unit(each.unit)) else ''}"
-                     for each in shown)  # fmt: skip
+    shown = [taken for name in names for taken in own if taken.parameter == name and taken.entry is not None]
+    return ", ".join(f"{taken.number} = {taken.text}{f' ({unit})' if (unit := plain_unit(taken.unit)) else ''}"
+                     for taken in shown)  # fmt: skip
 
 
-def _named(each: Refused) -> str:
-    axis = f"{each.axis} " if each.axis else ""
-    return f"{axis}{each.name.number} {each.name.name} {each.text[:24]} ({each.reason})".replace("  ", " ")
+def _named(refused: Refused) -> str:
+    axis = f"{refused.axis} " if refused.axis else ""
+    return f"{axis}{refused.name.number} {refused.name.name} {refused.text[:24]} ({refused.reason})".replace("  ", " ")
 
 
 def sheet(reading: Reading, made: Imported) -> str:
@@ -121,9 +121,21 @@ def sheet(reading: Reading, made: Imported) -> str:
     rows = csv.writer(out, lineterminator="\n")
     rows.writerow(["axis", "number", "name", "value", "unit", "ours", "value in the machine file", "taken", "reason",
                    "where"])  # fmt: skip
-    for each in made.values:
-        rows.writerow([each.axis, each.number, each.called, each.text, each.unit, each.parameter, _ours(each), "yes",
-                       "", each.where])  # fmt: skip
+    for value in made.values:
+        rows.writerow(
+            [
+                value.axis,
+                value.number,
+                value.called,
+                value.text,
+                value.unit,
+                value.parameter,
+                _ours(value),
+                "yes",
+                "",
+                value.where,
+            ]
+        )
     for gone in (*reading.refused, *made.refused):
         rows.writerow([gone.axis, gone.name.number, gone.name.name, gone.text, gone.name.unit, gone.name.parameter, "",
                        "no", gone.reason, gone.where])  # fmt: skip
@@ -156,37 +168,37 @@ def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inp
 
 def _sources(reading: Reading, made: Imported) -> Section | None:
     refused = (*reading.refused, *made.refused)
-    return sources_section([*(each.name for each in made.values), *(each.name for each in refused)])
+    return sources_section([*(value.name for value in made.values), *(entry.name for entry in refused)])
 
 
 def _taken(made: Imported) -> Section | None:
     rows: list[tuple[Text, ...]] = [
         (
-            each.axis or "machine", code(each.number), each.called,
-            minus(f"{each.text} {each.unit}".strip()), code(each.parameter),
-            minus(_ours(each)), _before(made, each), each.where or "–",
-            "–" if each.condition else "confirmed" if each.name.confirmed else "not confirmed",
+            value.axis or "machine", code(value.number), value.called,
+            minus(f"{value.text} {value.unit}".strip()), code(value.parameter),
+            minus(_ours(value)), _before(made, value), value.where or "–",
+            "–" if value.condition else "confirmed" if value.name.confirmed else "not confirmed",
         )
-        for each in made.values
+        for value in made.values
     ]  # fmt: skip
     heads = ("Axis", "Number", "Name", "In the control", "Ours", "In the machine file", "Before", "Where", "Unit")
     return Section("Values that were taken", [Table("lllrlrrll", heads, rows)], "taken") if rows else None
 
 
-def _ours(each: Taken) -> str:
+def _ours(taken: Taken) -> str:
     """A value as the machine file has it, rounded, and in a unit that reads well."""
-    value = written(each)
+    value = written(taken)
     if isinstance(value, bool):
         return str(value).lower()
-    if not isinstance(each.value, float):
+    if not isinstance(taken.value, float):
         return str(value)
     unit = value.partition(" ")[2] if isinstance(value, str) else ""
-    usual = scale(unit, np.array([each.value])) if each.value and unit != "1/s" else Scale(1.0, unit)
-    return f"{each.value * usual.factor:.6g} {usual.unit}".rstrip()
+    usual = scale(unit, np.array([taken.value])) if taken.value and unit != "1/s" else Scale(1.0, unit)
+    return f"{taken.value * usual.factor:.6g} {usual.unit}".rstrip()
 
 
-def _before(made: Imported, each: Taken) -> str:
-    value = made.before.get(place_of(each))
+def _before(made: Imported, taken: Taken) -> str:
+    value = made.before.get(place_of(taken))
     if value is None or isinstance(value, dict | list):
         return "–"
     return str(value).lower() if isinstance(value, bool) else minus(str(value))
@@ -194,10 +206,17 @@ def _before(made: Imported, each: Taken) -> str:
 
 def _refused(reading: Reading, made: Imported) -> Section | None:
     rows: list[tuple[Text, ...]] = [
-        (each.axis or "machine", code(each.name.number), each.name.name, minus(each.text), each.reason, each.where)
+        (
+            entry.axis or "machine",
+            code(entry.name.number),
+            entry.name.name,
+            minus(entry.text),
+            entry.reason,
+            entry.where,
+        )
         for weight in ("doubt", "note")
-        for each in (*reading.refused, *made.refused)
-        if each.weight == weight
+        for entry in (*reading.refused, *made.refused)
+        if entry.weight == weight
     ]
     heads = ("Axis", "Number", "Name", "In the control", "Why", "Where")
     return Section("Values that were not taken", [Table("lllrpl", heads, rows)], "not-taken") if rows else None
@@ -208,7 +227,7 @@ def _missing(made: Imported) -> Section | None:
 
 
 def _odd(archives: Sequence[Archive]) -> Section | None:
-    rows = [(f"{archive.name}:{each.line}", each.reason, code(each.text)) for archive, each in _examples(archives)]
+    rows = [(f"{archive.name}:{value.line}", value.reason, code(value.text)) for archive, value in _examples(archives)]
     total = sum(archive.odd_count for archive in archives)
     note = f"The first {len(rows)} of {total}, of each file by turns." if total > len(rows) else ""
     table = Table("lpl", ("Line", "Why", "Text"), rows, note)
@@ -218,8 +237,8 @@ def _odd(archives: Sequence[Archive]) -> Section | None:
 def _examples(archives: Sequence[Archive]) -> Iterator[tuple[Archive, Any]]:
     share = max(1, MOST_ODD // max(1, len(archives)))
     for archive in archives:
-        for each in archive.odd[:share]:
-            yield archive, each
+        for entry in archive.odd[:share]:
+            yield archive, entry
 
 
 def summary(
@@ -233,20 +252,20 @@ def summary(
         "axes": dict(reading.axes),
         "figures": figures_part(figures_of(archives, reading, made)),
         "taken": [
-            {"axis": each.axis, "parameter": each.parameter, "number": each.number, "value": each.value,
-             "unit": each.name.si, "text": each.entry.text if each.entry else None, "where": each.where,
-             "confirmed": None if each.condition else each.name.confirmed, "condition": each.condition}
-            for each in made.values
+            {"axis": taken.axis, "parameter": taken.parameter, "number": taken.number, "value": taken.value,
+             "unit": taken.name.si, "text": taken.entry.text if taken.entry else None, "where": taken.where,
+             "confirmed": None if taken.condition else taken.name.confirmed, "condition": taken.condition}
+            for taken in made.values
         ],
         "not_taken": [
-            {"axis": each.axis, "parameter": each.name.parameter, "number": each.name.number, "text": each.text,
-             "reason": each.reason, "where": each.where, "acts": each.weight == "doubt"}
-            for each in (*reading.refused, *made.refused)
+            {"axis": entry.axis, "parameter": entry.name.parameter, "number": entry.name.number, "text": entry.text,
+             "reason": entry.reason, "where": entry.where, "acts": entry.weight == "doubt"}
+            for entry in (*reading.refused, *made.refused)
         ],
         "missing": list(made.missing),
         "not_understood": [
-            {"file": archive.name, "line": each.line, "text": each.text, "reason": each.reason}
-            for archive, each in _examples(archives)
+            {"file": archive.name, "line": value.line, "text": value.text, "reason": value.reason}
+            for archive, value in _examples(archives)
         ],
         "software": software(),
         "inputs": inputs_part(hashed([("file", path) for path in inputs])),

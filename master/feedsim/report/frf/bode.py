@@ -99,7 +99,7 @@ class Told:
 def bode_chart(
     columns: Sequence[Column],
     ordinate: Ordinate,
-    told: Mapping[str, Told],
+    reported: Mapping[str, Told],
     *,
     phase: bool = True,
     span: tuple[float, float] | None = None,
@@ -118,12 +118,12 @@ def bode_chart(
     magnitude, coherence = [], []
     turns = []
     for column in columns:
-        own = told.get(column.title, Told())
-        curves = [each for curve in column.curves for each in _magnitude(curve, column, ordinate)]
+        own = reported.get(column.title, Told())
+        curves = [entry for curve in column.curves for entry in _magnitude(curve, column, ordinate)]
         axis = Axis(ordinate.label, ordinate.unit, log=not ordinate.decibel, span=_span(low_high, ordinate, floor))
         panel = Panel(column.title, frequency, axis, curves, own.levels, marks=own.marks, linked="f", note=own.note)
         magnitude.append(panel)
-        curves = [each for curve in column.curves for each in _phase(curve, column, ordinate, floor)]
+        curves = [entry for curve in column.curves for entry in _phase(curve, column, ordinate, floor)]
         turns.append(Panel("", frequency, Axis("phase", "°"), curves, own.phase_levels, marks=own.phase_marks,
                            linked="f", height=0.75))  # fmt: skip
         curves = [
@@ -133,7 +133,7 @@ def bode_chart(
         ]
         axis = Axis("coherence", "", span=(-0.04, 1.08))
         coherence.append(Panel("", frequency, axis, curves, linked="f", height=0.5))
-    rows = [magnitude, *([turns] if phase else []), *([coherence] if any(each.curves for each in coherence) else [])]
+    rows = [magnitude, *([turns] if phase else []), *([coherence] if any(panel.curves for panel in coherence) else [])]
     return Chart([panel for row in rows for panel in row], (1.0,) * len(columns))
 
 
@@ -211,7 +211,7 @@ def _from_principal(phase: Array) -> Array:
 
 def reference_of(curves: Sequence[Curve], curve: Curve) -> Curve | None:
     """The closed form that the phase of another curve follows."""
-    closed = next((each for each in curves if each.kind == "closed form"), None)
+    closed = next((curve for curve in curves if curve.kind == "closed form"), None)
     if closed is None or curve.kind == "closed form":
         return None
     return closed
@@ -265,7 +265,7 @@ def _split(curve: Curve, column: Column, y: Array) -> list[chart.Curve]:
 
 
 def _styled(curve: Curve, column: Column, x: Array, y: Array, faint: bool = False) -> chart.Curve:
-    overlaid = [each for each in column.curves if each.kind == "overlaid"]
+    overlaid = [curve for curve in column.curves if curve.kind == "overlaid"]
     if curve.kind == "measured":
         name = f"{curve.label}, low coherence" if faint else curve.label
         return chart.Curve(name, x, y, COLOURS["measured"], width=2.2, dots=True, faint=faint)
@@ -273,10 +273,10 @@ def _styled(curve: Curve, column: Column, x: Array, y: Array, faint: bool = Fals
     return chart.Curve(curve.label, x, y, colour, "dashed" if curve in overlaid else "", 1.4, faint=faint)
 
 
-def _span(found: tuple[float, float] | None, ordinate: Ordinate, floor: float | None) -> tuple[float, float] | None:
-    if found is None:
+def _span(result: tuple[float, float] | None, ordinate: Ordinate, floor: float | None) -> tuple[float, float] | None:
+    if result is None:
         return None
-    low, high = found
+    low, high = result
     if not ordinate.decibel:
         return low / 1.3, high * 1.3
     low = max(low, floor) if floor is not None else low

@@ -164,8 +164,8 @@ def _pictures(
     """
 
     def picture(part: Columns, name: str) -> Picture:
-        shown = [Column(f"{of} {each}", curves) for each, curves in part.items()]
-        marks = {c.title: told(each, c.curves[0]) for each, c in zip(part, shown, strict=True)} if told else {}
+        shown = [Column(f"{of} {text}", curves) for text, curves in part.items()]
+        marks = {c.title: told(text, c.curves[0]) for text, c in zip(part, shown, strict=True)} if told else {}
         chart = bode_chart(shown, ordinate, marks, phase=phase, span=span, floor=floor)
         return Picture(name, title.format(_axes(part)), caption + _kinds(part), chart)
 
@@ -241,9 +241,11 @@ def nearest_to_its_limit(responses: Responses) -> Picture | None:
     loop = responses.result.axes[axis].position
     band = (responses.band[0], min(responses.band[1], 0.5 / responses.machine.cycles.T_pos))
     curves = {axis: curves_of(responses, f"{axis}.position_loop")}
-    found = loop_pictures(curves, {} if loop is None else {axis: loop.margins}, "position", band)
+    pictures = loop_pictures(curves, {} if loop is None else {axis: loop.margins}, "position", band)
     which = ", which has the least gain margin" if len(known) > 1 else ""
-    return next((replace(each, stem=f"{each.stem}-first", title=each.title + which) for each in found), None)
+    return next(
+        (replace(picture, stem=f"{picture.stem}-first", title=picture.title + which) for picture in pictures), None
+    )
 
 
 def curves_of(responses: Responses, name: str) -> list[Curve]:
@@ -258,8 +260,16 @@ def curves_of(responses: Responses, name: str) -> list[Curve]:
         curves.append(Curve("measured", "measured", measured.frequency, measured[name], measured.coherence.get(name)))
     for overlay in responses.overlays:
         if overlay.name == name:
-            found = overlay.response
-            curves.append(Curve("overlaid", overlay.file.name, found.frequency, found[name], found.coherence.get(name)))
+            frequency_response = overlay.response
+            curves.append(
+                Curve(
+                    "overlaid",
+                    overlay.file.name,
+                    frequency_response.frequency,
+                    frequency_response[name],
+                    frequency_response.coherence.get(name),
+                )
+            )
     return [curve for curve in curves if np.any(curve.value)]
 
 
@@ -272,7 +282,7 @@ def most_marked(pairs: Sequence[linear.Pair], band: tuple[float, float]) -> list
 
     chosen = inside[:1]
     for pair in sorted(inside[1:], key=rise, reverse=True):
-        peaks = (each.resonance.frequency for each in chosen)
+        peaks = (pair.resonance.frequency for pair in chosen)
         if len(chosen) <= MOST_PAIRS and all(abs(math.log(pair.resonance.frequency / f)) > LABEL_GAP for f in peaks):
             chosen.append(pair)
     return chosen

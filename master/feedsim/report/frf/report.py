@@ -158,9 +158,15 @@ def _provenance(subject: Subject, responses: Responses) -> Section:
         ("Machine", responses.machine.name),
         ("Closed form", "linear, exact for the sampled system, no friction, no limits"),
         ("Measurement", _measured(campaign) if campaign else "none"),
-        *((each.reference, f"RMS {each.rms:.4g} {display_unit(each.unit)}, peak {each.peak:.4g}, {each.lines} lines, "
-           f"period {each.period:g} s") for each in (campaign.excited if campaign else ())),
-    ]  # fmt: skip
+        *(
+            (
+                entry.reference,
+                f"RMS {entry.rms:.4g} {display_unit(entry.unit)}, peak {entry.peak:.4g}, {entry.lines} lines, "
+                f"period {entry.period:g} s",
+            )
+            for entry in (campaign.excited if campaign else ())
+        ),
+    ]
     archives = sections.archives_table(campaign.units) if campaign else None
     return sections.provenance_section(
         rows, input_files(subject, responses), archives, sections.parameters_section(responses.machine)
@@ -215,8 +221,8 @@ def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dic
         },
         "measurement": _measurement(responses.campaign) if responses.campaign is not None else None,
         "overlays": [
-            {"response": each.name, "file": each.file.name, "unit": each.response.unit(each.name)}
-            for each in responses.overlays
+            {"response": overlay.name, "file": overlay.file.name, "unit": overlay.response.unit(overlay.name)}
+            for overlay in responses.overlays
         ],
         "machine": machine_part(responses.machine),
         "inputs": inputs_part(input_files(subject, responses)),
@@ -241,13 +247,13 @@ def _measurement(campaign: Campaign) -> dict[str, Any]:
         "frequencies": len(campaign.response),
         "responses": {name: {"unit": campaign.response.unit(name)} for name in campaign.response},
         "excited": {
-            each.reference: {
-                "rms": quantity(each.rms, each.unit),
-                "peak": quantity(each.peak, each.unit),
-                "lines": each.lines,
-                "period": quantity(each.period, "s"),
+            entry.reference: {
+                "rms": quantity(entry.rms, entry.unit),
+                "peak": quantity(entry.peak, entry.unit),
+                "lines": entry.lines,
+                "period": quantity(entry.period, "s"),
             }
-            for each in campaign.excited
+            for entry in campaign.excited
         },
         "simulated": quantity(campaign.simulated, "s"),
         "wall_time": quantity(campaign.wall_time, "s"),

@@ -33,31 +33,31 @@ def verdict(responses: Responses) -> str:
     if not loops:
         return "No control loop is closed: the curves are those of the structure alone."
     gains = [
-        (max(each.factor, 1 / each.factor), each.frequency, loop)
+        (max(gain_crossing.factor, 1 / gain_crossing.factor), gain_crossing.frequency, loop)
         for loop, margins in loops.items()
-        for each in (margins.gain_margin, margins.gain_reduction)
-        if 0 < each.factor < math.inf
+        for gain_crossing in (margins.gain_margin, margins.gain_reduction)
+        if 0 < gain_crossing.factor < math.inf
     ]
     phases = [
         (abs(margins.phase_margin.margin), margins.phase_margin.frequency, loop)
         for loop, margins in loops.items()
         if margins.phase
     ]
-    found, thin = [], False
+    results, thin = [], False
     if gains:
         factor, frequency, loop = min(gains)
-        found.append(f"least gain margin {20 * math.log10(factor):.1f} dB ({loop}, {frequency:.3g} Hz)")
+        results.append(f"least gain margin {20 * math.log10(factor):.1f} dB ({loop}, {frequency:.3g} Hz)")
         thin |= factor < GAIN_MARGIN
     if phases:
         phase, frequency, loop = min(phases)
-        found.append(f"least phase margin {phase:.0f} deg ({loop}, {frequency:.3g} Hz)")
+        results.append(f"least phase margin {phase:.0f} deg ({loop}, {frequency:.3g} Hz)")
         thin |= phase < PHASE_MARGIN
     meaning = (
         f"Less than {MARGIN_WORDS}: motions ring there. Lower that loop's gain, or damp what resonates there."
         if thin
         else f"At least {MARGIN_WORDS}: while the axes move, no gain need be lowered."
     )
-    return f"The control loops are stable; {', '.join(found) or 'nothing limits their gains'}. {meaning}"
+    return f"The control loops are stable; {', '.join(results) or 'nothing limits their gains'}. {meaning}"
 
 
 def _loops(responses: Responses) -> Iterator[tuple[str, Margins]]:

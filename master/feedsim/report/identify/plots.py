@@ -47,40 +47,46 @@ Over = Literal["speed", "position"]
 
 def pictures_of(identified: Identified) -> list[Picture]:
     """All pictures that the stages give."""
-    found = identified.found
+    identification = identified.found
     pictures: list[Picture | None] = []
-    if (stage := found.stationary) is not None:
-        pictures += [stribeck_picture(found, stage), plateaus_picture(found, stage, identified.records)]
-    if (dynamic := found.dynamic) is not None:
-        pictures += [loops_picture(found, dynamic, "speed"), loops_picture(found, dynamic, "position")]
-        pictures.append(residuals_picture(found, dynamic))
-    if found.balance is not None:
-        pictures.append(open_loop_picture(found, found.balance))
-    pictures.append(correlation_picture(found.axis, found.correlation))
+    if (stage := identification.stationary) is not None:
+        pictures += [
+            stribeck_picture(identification, stage),
+            plateaus_picture(identification, stage, identified.records),
+        ]
+    if (dynamic := identification.dynamic) is not None:
+        pictures += [
+            loops_picture(identification, dynamic, "speed"),
+            loops_picture(identification, dynamic, "position"),
+        ]
+        pictures.append(residuals_picture(identification, dynamic))
+    if identification.balance is not None:
+        pictures.append(open_loop_picture(identification, identification.balance))
+    pictures.append(correlation_picture(identification.axis, identification.correlation))
     return [picture for picture in pictures if picture is not None]
 
 
-def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture | None:
+def loops_picture(identification: Identification, stage: Dynamic, over: Over) -> Picture | None:
     """Measured and model torque of each move, over speed or over position; None where there is no stretch."""
     shown = _distinct(stage.stretches)
     if not shown:
         return None
     columns = 2 if len(shown) == 4 else min(COLUMNS, len(shown))
-    left = len(stage.stretches) - len(shown)
-    more = f" {counted(left, 'further stretch is', 'further stretches are')} not shown." if left else ""
+    remaining = len(stage.stretches) - len(shown)
+    more = f" {counted(remaining, 'further stretch is', 'further stretches are')} not shown." if remaining else ""
     about = ", about its middle" if over == "position" else ""
     caption = (
-        f"Axis {found.axis}: motor torque less inertia and known load{about}, with the friction model driven by "
-        f"the recorded motion.{more}"
+        f"Axis {identification.axis}: motor torque less inertia and known load{about}, with the friction model driven "
+        f"by the recorded motion.{more}"
     )
     panels = []
     for stretch in shown:
-        x, axis = _abscissa(stretch, found.I_P, over)
+        x, axis = _abscissa(stretch, identification.I_P, over)
         curves = [
             Curve("measured", x, stretch.measured, RECORDED, width=1.9, dots=True, most=2000),
             Curve("model", x, stretch.model, SIMULATED, width=1.2, most=2000),
         ]
-        panels.append(Panel(describe(stretch, found.I_P), axis, TORQUE_AXIS, curves, ZEROS))
+        panels.append(Panel(describe(stretch, identification.I_P), axis, TORQUE_AXIS, curves, ZEROS))
     chart = Chart(panels, (1.0,) * columns)
     return Picture(f"loops-{over}", f"Friction torque over {over}", caption, chart)
 
@@ -92,7 +98,7 @@ def _abscissa(stretch: Stretch, I_P: float, over: Over) -> tuple[Array, Axis]:
     return _position(stretch, scale), Axis("position", unit)
 
 
-def residuals_picture(found: Identification, stage: Dynamic) -> Picture | None:
+def residuals_picture(identification: Identification, stage: Dynamic) -> Picture | None:
     """Measured less model: over time, over speed and over position."""
     stretches = [stretch for stretch in stage.stretches if len(stretch.time)]
     if not stretches:
@@ -101,21 +107,21 @@ def residuals_picture(found: Identification, stage: Dynamic) -> Picture | None:
         "What the friction model leaves over. Dashed: 95 % of the scatter that the fit reckoned with. Structure "
         "over speed or position is what the model does not know."
     )
-    scale, unit = _length(stretches, found.I_P)
+    scale, unit = _length(stretches, identification.I_P)
     few = len(stretches) <= len(COLOURS)
-    names = [describe(each, found.I_P) if few else "stretches" for each in stretches]
+    names = [describe(stretch, identification.I_P) if few else "stretches" for stretch in stretches]
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(stretches))]
     begin, over_time, levels, over_speed, over_position = 0.0, [], [ZERO], [], []
     residual = Axis("residual", "N·m")
     for stretch, name, colour in zip(stretches, names, colours, strict=True):
-        left = stretch.measured - stretch.model
+        remaining = stretch.measured - stretch.model
         time = stretch.time - stretch.time[0] + begin
-        over_time.append(Curve(name, time, left, colour, width=0.9))
+        over_time.append(Curve(name, time, remaining, colour, width=0.9))
         for sign in (1, -1):
             level = sign * NORMAL_95 * stretch.weight
             levels.append(Level(level, ends=(float(time[0]), float(time[-1]))))
-        over_speed.append(Curve(name, stretch.speed, left, colour, width=1.0, dots=True, most=1500))
-        over_position.append(Curve(name, _position(stretch, scale), left, colour, width=1.0, dots=True, most=1500))
+        over_speed.append(Curve(name, stretch.speed, remaining, colour, width=1.0, dots=True, most=1500))
+        over_position.append(Curve(name, _position(stretch, scale), remaining, colour, width=1.0, dots=True, most=1500))
         begin = float(time[-1])
     time_axis = Axis("time, stretches one after another", "s")
     chart = Chart([
@@ -126,19 +132,19 @@ def residuals_picture(found: Identification, stage: Dynamic) -> Picture | None:
     return Picture("residuals", "Residuals", caption, chart)
 
 
-def open_loop_picture(found: Identification, balance: Balance) -> Picture | None:
+def open_loop_picture(identification: Identification, balance: Balance) -> Picture | None:
     """Position and its error over time, before and after, a column per record; None where nothing was tried."""
     drifts = balance.drifts[:MOST_RECORDS]
     if not drifts:
         return None
-    mm = 1e3 * found.I_P
+    mm = 1e3 * identification.I_P
     before, end = (mm * rms for rms in balance.position)
-    left = len(balance.drifts) - len(drifts)
-    more = f" {counted(left, 'further record is', 'further records are')} not shown." if left else ""
+    remaining = len(balance.drifts) - len(drifts)
+    more = f" {counted(remaining, 'further record is', 'further records are')} not shown." if remaining else ""
     fate = "" if balance.applied else " What was tried was not taken."
     caption = (
-        f"Axis {found.axis}: position from the start on, recorded and of a rigid axis that the recorded torque "
-        f"drives against this friction: off by {before:.3g} mm rms before the step, {end:.3g} mm "
+        f"Axis {identification.axis}: position from the start on, recorded and of a rigid axis that the recorded "
+        f"torque drives against this friction: off by {before:.3g} mm rms before the step, {end:.3g} mm "
         f"{'after it' if balance.applied else 'with what it tried'}.{fate}{more}"
     )
     after = "open loop, after" if balance.applied else "open loop, tried"

@@ -46,14 +46,14 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 def files_of(identified: Identified) -> dict[str, Content]:
     """friction.yaml, plateaus.csv, residuals.csv and open_loop.csv, where there are any."""
-    found = identified.found
+    identification = identified.found
     files: dict[str, Content] = {FRICTION_FILE: friction_file.friction_yaml(identified, software())}
-    if found.stationary is not None:
-        files[PLATEAUS] = plateaus_csv(found)
-    if found.dynamic is not None:
-        files[RESIDUALS] = residuals_csv(found)
-    if found.balance is not None and found.balance.drifts:
-        files[OPEN_LOOP] = open_loop_csv(found.balance)
+    if identification.stationary is not None:
+        files[PLATEAUS] = plateaus_csv(identification)
+    if identification.dynamic is not None:
+        files[RESIDUALS] = residuals_csv(identification)
+    if identification.balance is not None and identification.balance.drifts:
+        files[OPEN_LOOP] = open_loop_csv(identification.balance)
     return files
 
 
@@ -65,30 +65,34 @@ def draw(identified: Identified) -> list[Picture]:
 
 def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
     """Content of the report."""
-    found = identified.found
+    identification = identified.found
     machine = f"{identified.subject.machine.name} · " if identified.subject is not None else ""
-    drifts = found.balance is not None and found.balance.drifts
+    drifts = identification.balance is not None and identification.balance.drifts
     tables = ", ".join([PLATEAUS, RESIDUALS, *([OPEN_LOOP] if drifts else [])])
     return Report(
-        f"Friction of axis {found.axis}",
+        f"Friction of axis {identification.axis}",
         f"{machine}identified from {', '.join(identified.traces)} · {identified.date}",
-        answer=answers(found),
+        answer=answers(identification),
         warnings=identified.warnings,
         notes=identified.notes,
         tiles=_tiles(identified),
         next_step=(
             "Run the machine with this friction:\n",
-            code(f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FOLDER}/{FRICTION_FILE}"),
+            code(
+                f"feedsim run SCENARIO.yaml --set machine.axes.{identification.axis}.friction={FOLDER}/{FRICTION_FILE}"
+            ),
         ),
         main=[
-            _use(found),
-            Section("What further moves would determine", [_bullets(found.advice)]) if found.advice else None,
+            _use(identification),
+            Section("What further moves would determine", [_bullets(identification.advice)])
+            if identification.advice
+            else None,
             *pictures,
-            _parameters(found),
-            _stage_1(found),
-            _open_loop(found),
-            _rigid(found),
-            _stretches(found),
+            _parameters(identification),
+            _stage_1(identification),
+            _open_loop(identification),
+            _rigid(identification),
+            _stretches(identification),
         ],
         provenance=_provenance(identified),
         footer=f"{METHOD} Values in full precision: summary.json; the parameters as files take them: {FRICTION_FILE}; "
@@ -96,34 +100,34 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
     )
 
 
-def answers(found: Identification) -> list[str]:
+def answers(identification: Identification) -> list[str]:
     """How well friction is known, what the records leave open, and what to do next."""
     lines = []
-    if (stage := found.stationary) is not None and quantities.is_curve(stage):
-        alone = "" if found.prior else " by stage 1 alone"
+    if (stage := identification.stationary) is not None and quantities.is_curve(stage):
+        alone = "" if identification.prior else " by stage 1 alone"
         lines.append(
             f"Friction over speed is known to +-{100 * quantities.curve_error(stage):.2g} % (95 %){alone}; "
             f"no plateau is further from the curve than {100 * stage.worst_curve:.2g} %."
         )
-    if found.dynamic is not None:
-        lines.append(f"The model leaves {found.dynamic.rms:.3g} N.m rms of the recorded friction torque.")
-    open_ones = [name for name, each in found.estimates.items() if each.status == "undetermined"]
+    if identification.dynamic is not None:
+        lines.append(f"The model leaves {identification.dynamic.rms:.3g} N.m rms of the recorded friction torque.")
+    open_ones = [name for name, estimate in identification.estimates.items() if estimate.status == "undetermined"]
     if open_ones:
         lines.append(
             f"The records do not determine {', '.join(open_ones)}"
-            + ("; which moves would is said below." if found.advice else ".")
+            + ("; which moves would is said below." if identification.advice else ".")
         )
-    elif found.dynamic is None:
+    elif identification.dynamic is None:
         lines.append("Plateaus determine the curve alone: stiffness and damping of the bristles need sines.")
     return lines
 
 
 def _tiles(identified: Identified) -> list[Tile]:
     """Parameters, those first that most is asked of, and behind them how near the model comes."""
-    found = identified.found
+    identification = identified.found
     tiles = []
     for name in LEADING:
-        estimate = found.estimates.get(name)
+        estimate = identification.estimates.get(name)
         if estimate is None or estimate.status not in ("estimated", "given"):
             continue
         factor, unit = quantities.shown_unit(estimate)
@@ -131,12 +135,12 @@ def _tiles(identified: Identified) -> list[Tile]:
         label = f"{name}, {estimate.meaning}" + (f" (±{relative})" if relative else "")
         value = f"{minus(powers(friction_file.value_text(estimate, factor)))} {display_unit(unit)}".strip()
         tiles.append(Tile(value, typeset(label), typeset(estimate.meaning)))
-    return [*tiles, *_errors(found)]
+    return [*tiles, *_errors(identification)]
 
 
-def _errors(found: Identification) -> Iterator[Tile]:
-    if (stage := found.stationary) is not None:
-        alone = "" if found.prior else ", stage 1 alone"
+def _errors(identification: Identification) -> Iterator[Tile]:
+    if (stage := identification.stationary) is not None:
+        alone = "" if identification.prior else ", stage 1 alone"
         if quantities.is_curve(stage):
             text = f"±{100 * quantities.curve_error(stage):.2g} %"
             meaning = f"largest half width of the 95 % band of the Stribeck curve{alone}"
@@ -146,13 +150,13 @@ def _errors(found: Identification) -> Iterator[Tile]:
             yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
         meaning = "largest relative deviation of a plateau's friction from the curve"
         yield Tile(f"{powers(f'{100 * stage.worst_curve:.2g}')} %", f"largest deviation of a plateau{alone}", meaning)
-    if found.dynamic is not None:
+    if identification.dynamic is not None:
         meaning = "friction torque measured less that of the model, over all stretches"
-        yield Tile(f"{found.dynamic.rms:.3g} N·m", "residual of stage 2, rms", meaning)
+        yield Tile(f"{identification.dynamic.rms:.3g} N·m", "residual of stage 2, rms", meaning)
 
 
-def _use(found: Identification) -> Section | None:
-    hint = friction_file.constant_load_hint(found)
+def _use(identification: Identification) -> Section | None:
+    hint = friction_file.constant_load_hint(identification)
     return Section("Constant load", [Paragraph(f"The {typeset(hint)}.")]) if hint else None
 
 
@@ -160,20 +164,20 @@ def _bullets(texts: Sequence[str]) -> Bullets:
     return Bullets([typeset(text) for text in texts])
 
 
-def _parameters(found: Identification) -> Section:
+def _parameters(identification: Identification) -> Section:
     note = (
         "Values count on the motor's side; at the slide with the lead I_P = pitch/(2π), "
-        f"{found.I_P * 1e3:.5g} mm/rad: forces F/I_P, stiffness σ₀/I_P², mass J/I_P². Intervals come from "
+        f"{identification.I_P * 1e3:.5g} mm/rad: forces F/I_P, stiffness σ₀/I_P², mass J/I_P². Intervals come from "
         "the model linearised at the optimum; they know scatter, not a wrong model."
     )
-    rows = [_row(estimate, found.I_P) for estimate in found.estimates.values()]
+    rows = [_row(estimate, identification.I_P) for estimate in identification.estimates.values()]
     return Section("Parameters", [Table("ltrlrrrlt", HEADS, rows, note)], "parameters")
 
 
-def _stage_1(found: Identification) -> Section | None:
+def _stage_1(identification: Identification) -> Section | None:
     """What stage 1 says of itself where the values do not rest on it; else that is among the warnings."""
-    stage = found.stationary
-    if stage is None or found.prior:
+    stage = identification.stationary
+    if stage is None or identification.prior:
         return None
     parts: list[Part] = [
         Paragraph(
@@ -186,15 +190,15 @@ def _stage_1(found: Identification) -> Section | None:
     return Section("Stage 1", parts, "stage-1")
 
 
-def _open_loop(found: Identification) -> Section | None:
+def _open_loop(identification: Identification) -> Section | None:
     """Applied or refused and why; position, torque and parameters before and after."""
-    balance = found.balance
+    balance = identification.balance
     if balance is None:
         return None
     verdict = "Applied: the values above hold it." if balance.applied else f"Not applied: {balance.reason}."
     parts: list[Part] = [Paragraph(typeset(verdict))]
     if balance.drifts:
-        per_slide = (("rad", 1e3 * found.I_P, "mm"), ("N·m", 1 / found.I_P, "N"))
+        per_slide = (("rad", 1e3 * identification.I_P, "mm"), ("N·m", 1 / identification.I_P, "N"))
         rows = [
             _change("Error of the position, rms", balance.position, *per_slide[0]),
             _change("Residual of the torque, rms", balance.torque, *per_slide[1]),
@@ -216,8 +220,8 @@ def _change(name: Text, pair: tuple[float, float], unit: str, factor: float, uni
     return name, *here, unit, *there, unit_there, minus(change)
 
 
-def _rigid(found: Identification) -> Section | None:
-    rows = [_row(estimate, found.I_P) for estimate in found.rigid.values()]
+def _rigid(identification: Identification) -> Section | None:
+    rows = [_row(estimate, identification.I_P) for estimate in identification.rigid.values()]
     note = (
         "M = J dn/dt + σ₂ n + F_C sgn n + M_0, linear least squares over all parts of the records in which the axis "
         "moves: a check of inertia, torque constant and signs. No friction model but the sign of the speed: its F_C "
@@ -239,15 +243,21 @@ def _row(estimate: Estimate, I_P: float) -> tuple[Text, ...]:
     )  # fmt: skip
 
 
-def _stretches(found: Identification) -> Section | None:
-    stage = found.dynamic
+def _stretches(identification: Identification) -> Section | None:
+    stage = identification.dynamic
     if stage is None or not stage.stretches:
         return None
     rows = [
-        (each.record, describe(each, found.I_P), f"{each.time[0]:.3f}", f"{each.time[-1]:.3f}", f"{each.rms:.3g}",
-         f"{each.weight:.3g}")
-        for each in stage.stretches
-    ]  # fmt: skip
+        (
+            stretch.record,
+            describe(stretch, identification.I_P),
+            f"{stretch.time[0]:.3f}",
+            f"{stretch.time[-1]:.3f}",
+            f"{stretch.rms:.3g}",
+            f"{stretch.weight:.3g}",
+        )
+        for stretch in stage.stretches
+    ]
     heads = ("Record", "Move", "Begin [s]", "End [s]", "Residual rms [N·m]", "Scatter reckoned with [N·m]")
     known = ""
     if stage.without_delay:

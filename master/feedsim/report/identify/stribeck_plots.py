@@ -25,14 +25,14 @@ FEW_DECADES = 20  # ratio of speeds below which they are shown on a linear axis
 MOST_RECORDS = 3  # with plateaus, that are shown over time
 
 
-def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
+def stribeck_picture(identification: Identification, stage: Stationary) -> Picture:
     """Friction over speed with its 95 % band, the plateaus of both directions, and how far they are from the curve.
 
     Where stage 1 did not enter the estimates, the curve of the set that is delivered stands beside it.
     """
-    values = {name: each.value for name, each in stage.estimates.items()}
+    values = {name: estimate.value for name, estimate in stage.estimates.items()}
     asymmetry = values["asymmetry"]
-    curve, alone = is_curve(stage), "" if found.prior else " of stage 1 alone"
+    curve, alone = is_curve(stage), "" if identification.prior else " of stage 1 alone"
     delivered = (
         " Identified set: the friction that is delivered, which stage 1 did not enter, with its constant load less "
         "stage 1's."
@@ -43,29 +43,33 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
         + (" of its direction (dashed), which the direction dependence shifts" if asymmetry else "")
         + (f"; shaded: 95 % band of the curve{alone}" if curve else "")
         + f". Largest deviation of a plateau {powers(f'{100 * stage.worst_curve:.2g}')} %."
-        + ("" if found.prior else delivered)
+        + ("" if identification.prior else delivered)
     )
-    return Picture("stribeck", "Stribeck curve", caption, _curves(found, stage))
+    return Picture("stribeck", "Stribeck curve", caption, _curves(identification, stage))
 
 
-def stribeck_title(found: Identification, stage: Stationary) -> str:
+def stribeck_title(identification: Identification, stage: Stationary) -> str:
     """What is shown, and how well the curve is known."""
     known = f"known to ±{100 * curve_error(stage):.2g} % (95 %)"
     if not is_curve(stage):
         known = f"no curve: {counted(speeds_of(stage), 'speed')}"
-    return f"Axis {found.axis}: friction over speed{'' if found.prior else ', stage 1 alone'}, {known}"
+    return (
+        f"Axis {identification.axis}: friction over speed{'' if identification.prior else ', stage 1 alone'}, {known}"
+    )
 
 
-def _curves(found: Identification, stage: Stationary) -> Chart:
+def _curves(identification: Identification, stage: Stationary) -> Chart:
     """Friction over speed with its band and the plateaus, and how far these are from the curve."""
-    values = {name: each.value for name, each in stage.estimates.items()}
+    values = {name: estimate.value for name, estimate in stage.estimates.items()}
     half = NORMAL_95 * stage.sigma
     bands, below_bands = [], []
     if is_curve(stage):
         bands = [Band("95 % band", stage.torque - half, stage.torque + half, stage.speeds, SIMULATED)]
         share = 100 * half / stage.torque
         below_bands = [Band("95 % band", -share, share, stage.speeds, SIMULATED)]
-    curves = [Curve("curve" if found.prior else "stage 1 alone", stage.speeds, stage.torque, SIMULATED, width=1.8)]
+    curves = [
+        Curve("curve" if identification.prior else "stage 1 alone", stage.speeds, stage.torque, SIMULATED, width=1.8)
+    ]
     below = []
     for sign, word in SPEED_DIRECTIONS:
         chosen = sorted((p for p in stage.plateaus if p.speed * sign > 0), key=lambda p: abs(p.speed))
@@ -82,26 +86,26 @@ def _curves(found: Identification, stage: Stationary) -> Chart:
             shown = _of_direction(values, sign, stage.speeds)
             dash: Dash = "dashed" if sign > 0 else "dotted"
             curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, SIMULATED, dash, 0.9))
-    if not found.prior:
-        curves += _delivered(found, stage)
+    if not identification.prior:
+        curves += _delivered(identification, stage)
     axis = Axis(SPEED_AXIS.label, SPEED_AXIS.unit, log=True)
-    above = replace(axis, also=("axis speed", "mm/min", found.I_P * MM_PER_MIN))
-    top = max(float(np.nanmax(each.y)) for each in curves)
-    ordinate = replace(TORQUE_AXIS, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / found.I_P))
+    above = replace(axis, also=("axis speed", "mm/min", identification.I_P * MM_PER_MIN))
+    top = max(float(np.nanmax(curve.y)) for curve in curves)
+    ordinate = replace(TORQUE_AXIS, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / identification.I_P))
     return Chart([
-        Panel(stribeck_title(found, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
+        Panel(stribeck_title(identification, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
         Panel("Deviation from the curve", axis, Axis("deviation", "%"), below, [Level(0.0, colour=SIMULATED, dash="")],
               below_bands, linked="n"),
     ])  # fmt: skip
 
 
-def _delivered(found: Identification, stage: Stationary) -> list[Curve]:
+def _delivered(identification: Identification, stage: Stationary) -> list[Curve]:
     """The set that is delivered, in both directions.
 
     The plateaus have stage 1's constant load taken off, the set has its own: the difference belongs to the curves, else
     a load that asymmetry stands for would look like a misfit.
     """
-    values = {name: each.value for name, each in found.estimates.items()}
+    values = {name: estimate.value for name, estimate in identification.estimates.items()}
     # A load that no stage shows is not in the set; it is taken off the curve in any case.
     values.setdefault("M_0", 0.0)
     first = stage.estimates.get("M_0")
@@ -120,21 +124,21 @@ def _with_bars(name: str, x: Array, y: Array, spread: Array, faint: bool) -> lis
     return [Curve(name, x, y, RECORDED, width=3.0, dots=True, faint=faint), bars]
 
 
-def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
+def plateaus_picture(identification: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
     """The plateaus in torque and speed over time; None where none of the records is at hand."""
     count = {record.name: sum(p.record == record.name for p in stage.plateaus) for record in records}
     shown = sorted((r for r in records if count[r.name]), key=lambda r: -count[r.name])[:MOST_RECORDS]
     if not shown:
         return None
     own = [(record, [p for p in stage.plateaus if p.record == record.name]) for record in shown]
-    left = sum(1 for number in count.values() if number) - len(shown)
-    fate = "is not shown" if left == 1 else "are not shown"
-    more = f" {counted(left, 'more record')} with plateaus {fate}." if left else ""
+    remaining = sum(1 for number in count.values() if number) - len(shown)
+    fate = "is not shown" if remaining == 1 else "are not shown"
+    more = f" {counted(remaining, 'more record')} with plateaus {fate}." if remaining else ""
     caption = (
         "Shaded: stretches at constant speed whose mean torque (line) counts as friction. Speeds of several "
         f"decades are drawn logarithmically in both directions.{more}"
     )
-    return Picture("plateaus", "Plateaus found in the traces", caption, _over_time(own, found.I_P))
+    return Picture("plateaus", "Plateaus found in the traces", caption, _over_time(own, identification.I_P))
 
 
 def _over_time(shown: Sequence[tuple[Record, Sequence[Plateau]]], I_P: float) -> Chart:

@@ -27,20 +27,27 @@ TABLE_COLUMNS = 118  # columns of the terminal's table
 
 def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
     """Content of summary.json; what could not be determined is null."""
-    found = identified.found
+    identification = identified.found
     return {
         "format": FORMAT,
         "warnings": identified.warnings,
-        "advice": list(found.advice),
-        "axis": found.axis,
+        "advice": list(identification.advice),
+        "axis": identification.axis,
         "date": identified.date,
-        "lead": quantity(found.I_P, "m/rad"),
-        "parameters": {name: _estimate(estimate, found.I_P) for name, estimate in found.estimates.items()},
-        "rigid_axis": {name: _estimate(estimate, found.I_P) for name, estimate in found.rigid.items()},
-        "correlation": {"names": list(found.correlation.names), "matrix": _matrix(found.correlation.matrix)},
-        "curve": _curve(found),
-        "pre_sliding": _pre_sliding(found),
-        "open_loop": _open_loop(found),
+        "lead": quantity(identification.I_P, "m/rad"),
+        "parameters": {
+            name: _estimate(estimate, identification.I_P) for name, estimate in identification.estimates.items()
+        },
+        "rigid_axis": {
+            name: _estimate(estimate, identification.I_P) for name, estimate in identification.rigid.items()
+        },
+        "correlation": {
+            "names": list(identification.correlation.names),
+            "matrix": _matrix(identification.correlation.matrix),
+        },
+        "curve": _curve(identification),
+        "pre_sliding": _pre_sliding(identification),
+        "open_loop": _open_loop(identification),
         "settings": dict(identified.settings),
         "machine": machine_part(identified.subject.machine) if identified.subject is not None else None,
         "traces": [
@@ -59,7 +66,7 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
         ],
         "inputs": inputs_part(quantities.input_files(identified)),
         "software": software(),
-        "performance": {step: quantity(taken, "s") for step, taken in found.seconds.items()},
+        "performance": {step: quantity(taken, "s") for step, taken in identification.seconds.items()},
         "files": list(files),
     }
 
@@ -69,27 +76,27 @@ def terminal_lines(identified: Identified, directory: Path | None = None) -> lis
 
     directory: where the result is; None: nowhere yet.
     """
-    found = identified.found
+    identification = identified.found
     place = f" -> {directory / 'report.html'}" if directory is not None else ""
-    lines = [f"axis {found.axis}: {headline(identified)}{place}", *table_lines(identified)]
-    if line := friction_file.open_loop_line(found):
+    lines = [f"axis {identification.axis}: {headline(identified)}{place}", *table_lines(identified)]
+    if line := friction_file.open_loop_line(identification):
         lines.append(f"  open loop: {line}")
     if line := rigid_line(identified):
         lines.append(f"  {line}")
-    lines += [f"  advice: {advice}" for advice in found.advice]
-    if hint := friction_file.constant_load_hint(found):
+    lines += [f"  advice: {advice}" for advice in identification.advice]
+    if hint := friction_file.constant_load_hint(identification):
         lines.append(f"  {hint}")
     if directory is None:
         return lines
-    setting = shlex.quote(f"machine.axes.{found.axis}.friction={directory / FRICTION_FILE}")
+    setting = shlex.quote(f"machine.axes.{identification.axis}.friction={directory / FRICTION_FILE}")
     return [*lines, f"  use: feedsim run SCENARIO.yaml --set {setting}"]
 
 
 def table_lines(identified: Identified) -> list[str]:
     """Parameter, value, 95 % interval, relative, note: a line each, for the terminal."""
-    found = identified.found
+    identification = identified.found
     rows = [("", "value", "95 % interval", "+-", "")]
-    for estimate in found.estimates.values():
+    for estimate in identification.estimates.values():
         factor, unit = quantities.shown_unit(estimate)
         value = f"{friction_file.value_text(estimate, factor)} {unit}".removesuffix(" 1")
         interval, relative = friction_file.interval_text(estimate, factor), friction_file.relative_text(estimate)
@@ -106,8 +113,8 @@ def table_lines(identified: Identified) -> list[str]:
 
 def terminal_warnings(identified: Identified) -> list[str]:
     """Warnings without those that say no more than the reason of a parameter, which the table holds."""
-    estimates = [each for each in identified.found.estimates.values() if each.reason]
-    return [text for text in identified.warnings if not any(_repeats(text, each) for each in estimates)]
+    estimates = [estimate for estimate in identified.found.estimates.values() if estimate.reason]
+    return [text for text in identified.warnings if not any(_repeats(text, estimate) for estimate in estimates)]
 
 
 def _repeats(text: str, estimate: Estimate) -> bool:
@@ -118,36 +125,36 @@ def _repeats(text: str, estimate: Estimate) -> bool:
 
 def headline(identified: Identified) -> str:
     """How well curve and pre-sliding are known, in one line."""
-    found, parts = identified.found, []
-    if (stage := found.stationary) is not None:
-        low, high = (n * found.I_P * MM_PER_MIN for n in stage.range)
-        what = "curve" if found.prior else "curve of stage 1 alone"
+    identification, parts = identified.found, []
+    if (stage := identification.stationary) is not None:
+        low, high = (n * identification.I_P * MM_PER_MIN for n in stage.range)
+        what = "curve" if identification.prior else "curve of stage 1 alone"
         error = f"within {100 * quantities.curve_error(stage):.2g} % (95 %)"
         within = f"{what} {error} from {float(f'{low:.3g}'):g} to {high:.5g} mm/min"
         plateaus = counted(len(stage.plateaus), "plateau")
         no_curve = f"no curve: {counted(quantities.speeds_of(stage), 'speed')}"
         parts.append(f"{within if quantities.is_curve(stage) else no_curve}, {plateaus}")
-    if (dynamic := found.dynamic) is not None:
+    if (dynamic := identification.dynamic) is not None:
         stretches = counted(len(dynamic.stretches), "stretch", "stretches")
         parts.append(f"pre-sliding from {stretches}, residual {dynamic.rms:.2g} N.m rms")
     return "; ".join(parts) or "neither plateaus nor reversals"
 
 
-def plateaus_csv(found: Identification) -> str:
+def plateaus_csv(identification: Identification) -> str:
     """Every plateau: record, begin, end, speed, torque and its standard deviation, rows."""
-    assert found.stationary is not None
+    assert identification.stationary is not None
     lines = ["record,begin [s],end [s],speed [rad/s],torque [N.m],sigma [N.m],rows"]
-    for p in found.stationary.plateaus:
+    for p in identification.stationary.plateaus:
         numbers = shortest(np.array([p.begin, p.end, p.speed, p.torque, p.sigma]))
         lines.append(",".join([quoted(p.record), *numbers, str(p.rows)]))
     return "\n".join(lines) + "\n"
 
 
-def residuals_csv(found: Identification) -> str:
+def residuals_csv(identification: Identification) -> str:
     """Time, measured and model torque of every stretch, one after another; the stretch is numbered from 1."""
-    assert found.dynamic is not None
+    assert identification.dynamic is not None
     lines = ["stretch,record,time [s],angle [rad],speed [rad/s],measured [N.m],model [N.m],residual [N.m]"]
-    for number, stretch in enumerate(found.dynamic.stretches, 1):
+    for number, stretch in enumerate(identification.dynamic.stretches, 1):
         torques = (stretch.measured, stretch.model, stretch.measured - stretch.model)
         lines += _rows(f"{number},{quoted(stretch.record)}", stretch.time, stretch.angle, stretch.speed, *torques)
     return "\n".join(lines) + "\n"
@@ -181,8 +188,8 @@ def _estimate(estimate: Estimate, I_P: float) -> dict[str, Any]:
     }
 
 
-def _curve(found: Identification) -> dict[str, Any] | None:
-    stage = found.stationary
+def _curve(identification: Identification) -> dict[str, Any] | None:
+    stage = identification.stationary
     if stage is None:
         return None
     error = quantities.curve_error(stage) if quantities.is_curve(stage) else math.nan
@@ -190,7 +197,7 @@ def _curve(found: Identification) -> dict[str, Any] | None:
         "error": quantity(error, "1", meaning="largest half width of its 95 % band"),
         "worst_plateau": quantity(stage.worst_curve, "1", meaning="largest relative deviation"),
         "rms": quantity(stage.rms, "N.m", meaning="residual of the plateaus"),
-        "used": found.prior,
+        "used": identification.prior,
         "warnings": list(stage.warnings),
         "plateaus": len(stage.plateaus),
         "distinct_speeds": quantities.speeds_of(stage),
@@ -199,8 +206,8 @@ def _curve(found: Identification) -> dict[str, Any] | None:
     }
 
 
-def _pre_sliding(found: Identification) -> dict[str, Any] | None:
-    stage = found.dynamic
+def _pre_sliding(identification: Identification) -> dict[str, Any] | None:
+    stage = identification.dynamic
     if stage is None:
         return None
     return {
@@ -221,9 +228,9 @@ def _pre_sliding(found: Identification) -> dict[str, Any] | None:
     }
 
 
-def _open_loop(found: Identification) -> dict[str, Any] | None:
+def _open_loop(identification: Identification) -> dict[str, Any] | None:
     """For summary.json; None where the step was not asked for."""
-    balance = found.balance
+    balance = identification.balance
     if balance is None:
         return None
     return {
@@ -234,11 +241,13 @@ def _open_loop(found: Identification) -> dict[str, Any] | None:
         "position": {
             **_pair(balance.position, "rad"),
             "meaning": "rms of recorded less reached angle, with the values before and with those found",
-            "at_slide": _pair((balance.position[0] * found.I_P, balance.position[1] * found.I_P), "m"),
+            "at_slide": _pair(
+                (balance.position[0] * identification.I_P, balance.position[1] * identification.I_P), "m"
+            ),
         },
         "torque": {**_pair(balance.torque, "N.m"), "meaning": "rms of the torque residual"},
         "changes": {name: _pair(pair, "N.m") for name, pair in balance.changes.items()},
-        "load_rates": {record: _estimate(rate, found.I_P) for record, rate in balance.load_rates.items()},
+        "load_rates": {record: _estimate(rate, identification.I_P) for record, rate in balance.load_rates.items()},
     }
 
 
@@ -252,6 +261,6 @@ def _matrix(matrix: Any) -> list[list[float | None]]:
 
 def rigid_line(identified: Identified) -> str:
     """The simple model in one line; empty where there is none."""
-    estimated = [each for each in identified.found.rigid.values() if each.status == "estimated"]
-    parts = [f"{each.name} {friction_file.value_text(each)} {each.unit}" for each in estimated]
+    estimated = [estimate for estimate in identified.found.rigid.values() if estimate.status == "estimated"]
+    parts = [f"{estimate.name} {friction_file.value_text(estimate)} {estimate.unit}" for estimate in estimated]
     return f"rigid axis with simple friction: {', '.join(parts)}" if parts else ""

@@ -73,8 +73,8 @@ def model(structure: Structure, assembly: Assembly) -> Model:
 def _colours(geometry: Geometry) -> dict[str, Array]:
     names = list(dict.fromkeys(geometry.bodies))
     large = [name for name in names if not name.startswith(("screw ", "rotor "))]
-    found = {name: colour for name, colour in zip(large, COLOURS, strict=False)}
-    return {name: rgb(found.get(name, METAL)) for name in names}
+    result = {name: colour for name, colour in zip(large, COLOURS, strict=False)}
+    return {name: rgb(result.get(name, METAL)) for name in names}
 
 
 def rgb(text: str, white: float = SOFT) -> Array:
@@ -119,25 +119,25 @@ def solids(of: Model, moved: Motion | None, phase: float = 1.0) -> list[Faces]:
     assert looks is not None
     shape = np.zeros(of.assembly.mass.shape[0]) if moved is None else moved.shape * phase
     bent = deflection(geometry, shape, of.pieces)
-    found: list[Faces] = []
+    faces: list[Faces] = []
     for i, (first, _) in enumerate(geometry.lines.tolist()):
         corners = _section(looks.sizes[i], bool(looks.is_round[i])) @ looks.frames[i][1:]
         rotations = bent.rotations[i]
         if looks.is_round[i]:  # twist is not to be seen on a round bar, and a screw's is many times its deflection
             rotations = rotations - np.outer(rotations @ looks.frames[i][0], looks.frames[i][0])
         stations = (bent.points[i] + bent.displacements[i])[:, None, :] + turned(corners, rotations)
-        found += tube(stations, of.colours[geometry.bodies[first]])
+        faces += tube(stations, of.colours[geometry.bodies[first]])
     u, phi = node_motion(geometry, shape)
     for body, (node, (low, high)) in looks.blocks.items():
         x, y, z = np.stack([low, high]).T
         base = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
         stations = np.array([np.column_stack([base, np.full(4, depth)]) for depth in z])
         levers = turned((stations - geometry.nodes[node]).reshape(-1, 3), phi[[node]]).reshape(2, 4, 3)
-        found += tube(geometry.nodes[node] + u[node] + levers, of.colours[body])
+        faces += tube(geometry.nodes[node] + u[node] + levers, of.colours[body])
     for feature in looks.features:
         if feature.kind == "motor":
-            found += _rotor(of, feature.point + feature.moved(shape)[0], feature.name)
-    return found
+            faces += _rotor(of, feature.point + feature.moved(shape)[0], feature.name)
+    return faces
 
 
 def turned(vectors: Array, rotations: Array) -> Array:

@@ -197,10 +197,10 @@ def frequency(info: MachineInfo, k: int) -> str:
 
 def triad(axes: Axes, where: View) -> None:
     """The directions of the machine's frame, in the lower left corner."""
-    left, bottom = axes.get_xlim()[0], axes.get_ylim()[0]
+    remaining, bottom = axes.get_xlim()[0], axes.get_ylim()[0]
     length = 0.085 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
     flat = where.flat(np.eye(3)) * length
-    origin = np.array([left, bottom]) - np.minimum(flat.min(axis=0), 0) + 0.25 * length
+    origin = np.array([remaining, bottom]) - np.minimum(flat.min(axis=0), 0) + 0.25 * length
     for letter, arrow in zip("XYZ", flat, strict=True):
         if np.hypot(*arrow) < 0.05 * length:
             continue

@@ -82,7 +82,7 @@ def answers(info: MachineInfo) -> list[str]:
     if elastic := [k for k, f in enumerate(info.modes.frequency.tolist()) if f > 0]:
         k = elastic[0]
         lines.append(f"The lowest elastic mode is at {info.modes.frequency[k]:.2f} Hz: {moves(info, k)}.")
-    shares = [each.friction_slope / each.coupling_limit for each in info.axes if math.isfinite(each.friction_slope)]
+    shares = [axis.friction_slope / axis.coupling_limit for axis in info.axes if math.isfinite(axis.friction_slope)]
     if shares and max(shares) <= USUAL_EXCHANGE.stable_share:
         lines.append("The exchange of plant and friction is stable by far (table Axes)." if max(shares) < FAR_BELOW
                      else "The exchange of plant and friction is stable (table Axes).")  # fmt: skip

@@ -43,30 +43,30 @@ class ModesReport:
     @property
     def figures(self) -> dict[str, Figure]:
         """By name."""
-        found, axis = self.found, self.found.axis
-        fit = found.fit
+        axis_modes, axis = self.found, self.found.axis
+        fit = axis_modes.fit
         figures: dict[str, Figure] = {}
-        for k, (own, measured) in enumerate(found.dips, 1):
+        for k, (own, measured) in enumerate(axis_modes.dips, 1):
             figures[f"{axis}.antiresonance_{k}"] = Figure(own, "Hz", "least response of the motor: of the fit")
             figures[f"{axis}.antiresonance_{k}_measured"] = Figure(
                 measured, "Hz", "least response of the motor: of the measured lines"
             )
-        for k, (own, measured) in enumerate(found.peaks, 1):
+        for k, (own, measured) in enumerate(axis_modes.peaks, 1):
             figures[f"{axis}.resonance_{k}"] = Figure(own, "Hz", "largest response of the motor: of the fit")
             figures[f"{axis}.resonance_{k}_measured"] = Figure(
                 measured, "Hz", "largest response of the motor: of the measured lines"
             )
-        if found.ratios is not None:
+        if axis_modes.ratios is not None:
             meaning = "inertia behind the first mode over that of the motor, (resonance/antiresonance)^2 - 1"
             for key, ratio, of in zip(
-                ("ratio", "ratio_measured"), found.ratios, ("fit", "measured lines"), strict=True
+                ("ratio", "ratio_measured"), axis_modes.ratios, ("fit", "measured lines"), strict=True
             ):
                 figures[f"{axis}.{key}"] = Figure(ratio, "1", f"{meaning}: of the {of}")
-        per = f"(rad/s^2)/({found.measured.input_unit})"
+        per = f"(rad/s^2)/({axis_modes.measured.input_unit})"
         figures[f"{axis}.rigid"] = Figure(abs(fit.rigid[MOTOR]), per, "acceleration of the motor in rigid motion")
         for name, delay in fit.delay.items():
             figures[f"{axis}.{name}_delay"] = Figure(1e3 * delay, "ms", f"delay of the {name} behind the input")
-        for name, (decibel, degrees) in found.left.items():
+        for name, (decibel, degrees) in axis_modes.left.items():
             figures[f"{axis}.{name}_magnitude_left"] = Figure(
                 decibel, "dB", f"{name}: 90 % of the lines are within this of the fit"
             )
@@ -88,44 +88,44 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 def files_of(report: ModesReport) -> dict[str, Content]:
     """Name -> content of the files besides report.html and summary.json."""
-    found = report.found
+    axis_modes = report.found
     columns: dict[str, Complexes] = {}
     units: dict[str, str] = {}
-    for name, values in found.measured.values.items():
-        unit = f"({'m' if found.measured.linear[name] else 'rad'}/s^2)/({found.measured.input_unit})"
-        columns |= {f"{name}": values, f"{name} fit": found.fit.response(name, found.measured.frequency)}
+    for name, values in axis_modes.measured.values.items():
+        unit = f"({'m' if axis_modes.measured.linear[name] else 'rad'}/s^2)/({axis_modes.measured.input_unit})"
+        columns |= {f"{name}": values, f"{name} fit": axis_modes.fit.response(name, axis_modes.measured.frequency)}
         units |= {f"{name}": unit, f"{name} fit": unit}
-    response = FrequencyResponse(found.measured.frequency, columns, units)
+    response = FrequencyResponse(axis_modes.measured.frequency, columns, units)
     return {
-        MODES_FILE: partial(write_modes, modes=found.table),
+        MODES_FILE: partial(write_modes, modes=axis_modes.table),
         RESPONSE_FILE: partial(write_response, response=response),
     }
 
 
 def report_of(report: ModesReport) -> Report:
     """Content of the report."""
-    found = report.found
-    with remarked(f"{report.file.name}, axis {found.axis} of {report.subject.machine.name}"):
-        pictures = [_bode(found)]
+    axis_modes = report.found
+    with remarked(f"{report.file.name}, axis {axis_modes.axis} of {report.subject.machine.name}"):
+        pictures = [_bode(axis_modes)]
     rows: list[tuple[Text, ...]] = [
         (f"{mode.frequency:.4g}", f"{NORMAL_95 * mode.frequency_sigma:.2g}", f"{100 * mode.damping:.3g}",
          f"{100 * NORMAL_95 * mode.damping_sigma:.2g}",
-         *(minus(f"{mode.residues[name] / found.fit.rigid[name]:.3g}") for name in found.fit.outputs))
-        for mode in found.fit.modes
+         *(minus(f"{mode.residues[name] / axis_modes.fit.rigid[name]:.3g}") for name in axis_modes.fit.outputs))
+        for mode in axis_modes.fit.modes
     ]  # fmt: skip
-    heads = ("Frequency [Hz]", "±, 95 %", "Damping [%]", "±, 95 %", *(f"Share of {n}" for n in found.fit.outputs))
+    heads = ("Frequency [Hz]", "±, 95 %", "Damping [%]", "±, 95 %", *(f"Share of {n}" for n in axis_modes.fit.outputs))
     tables: list[Section] = [Section("Modes", [
         Paragraph("Share: residue of the mode over that of the rigid motion; of the motor it is the square of the "
                   "relative mode shape."), Table("r" * len(heads), heads, rows)])]  # fmt: skip
-    if found.fit.predicted:
-        chosen = len(found.fit.modes)
+    if axis_modes.fit.predicted:
+        chosen = len(axis_modes.fit.modes)
         tables.append(Section("Number of modes", [
             Paragraph("Rms of what lines leave, in their standard deviations, that a fit to the other lines predicts."),
             Table("rrl", ("Modes", "Left of unseen lines", ""),
-                  [(str(k), f"{left:.3g}", "taken" if k == chosen else "")
-                   for k, left in found.fit.predicted.items()])]))  # fmt: skip
+                  [(str(k), f"{value:.3g}", "taken" if k == chosen else "")
+                   for k, value in axis_modes.fit.predicted.items()])]))  # fmt: skip
     return Report(
-        f"Modes of {found.axis}",
+        f"Modes of {axis_modes.axis}",
         f"identified from {report.file.name}",
         warnings=report.warnings,
         notes=[note for note in report.subject.notes if note],
@@ -136,27 +136,27 @@ def report_of(report: ModesReport) -> Report:
             if name.endswith(("resonance_1", "ratio"))
         ],
         main=[*pictures, *tables, figures_section(report.figures)],
-        provenance=provenance_section([("Response", report.file.name), ("Estimate", found.measured.method)],
+        provenance=provenance_section([("Response", report.file.name), ("Estimate", axis_modes.measured.method)],
                                       hashed(_files(report))),
         footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES_FILE}.",
                               "docs/identification.md"),
     )  # fmt: skip
 
 
-def _bode(found: AxisModes) -> Picture:
+def _bode(axis_modes: AxisModes) -> Picture:
     """Measured lines, the fit, and the machine's own response."""
-    frequency = found.measured.frequency
+    frequency = axis_modes.measured.frequency
     panels = []
-    scale = abs(found.fit.rigid[MOTOR]) if found.measured.input_unit != "N.m" else 0.0
+    scale = abs(axis_modes.fit.rigid[MOTOR]) if axis_modes.measured.input_unit != "N.m" else 0.0
 
     def curves(name: str, of: Any) -> list[Curve]:
-        own = found.own[name]
+        own = axis_modes.own[name]
         # Over a current, the machine's torque has the scale of the rigid motion.
-        factor = scale / np.abs(found.own[MOTOR][0]) if scale else 1.0
-        sign = np.sign(found.fit.rigid[name]) or 1.0
+        factor = scale / np.abs(axis_modes.own[MOTOR][0]) if scale else 1.0
+        sign = np.sign(axis_modes.fit.rigid[name]) or 1.0
         return [
-            Curve("measured", frequency, of(found.measured.values[name]), RECORDED, dots=True, width=2.0),
-            Curve("fit", frequency, of(found.fit.response(name, frequency)), SIMULATED),
+            Curve("measured", frequency, of(axis_modes.measured.values[name]), RECORDED, dots=True, width=2.0),
+            Curve("fit", frequency, of(axis_modes.fit.response(name, frequency)), SIMULATED),
             Curve("machine", frequency, of(own * factor * sign), OTHERWISE, "dashed"),
         ]
 
@@ -167,12 +167,12 @@ def _bode(found: AxisModes) -> Picture:
         return np.asarray(np.degrees(np.unwrap(np.angle(values))), dtype=np.float64)
 
     axis = Axis("frequency", "Hz", log=True)
-    for name in found.fit.outputs:
+    for name in axis_modes.fit.outputs:
         panels.append(Panel(f"{name}: acceleration over the input", axis, Axis("magnitude", "dB"),
                             curves(name, decibel), linked="f"))  # fmt: skip
         panels.append(Panel(f"{name}: phase", axis, Axis("phase", "°"), curves(name, phase), linked="f", height=0.8))
     caption = "Measured lines, a rigid body with modes and delays, and the machine's structure without delays."
-    return Picture(f"modes-{found.axis}", f"Axis {found.axis}: measured, fitted and of the machine", caption,
+    return Picture(f"modes-{axis_modes.axis}", f"Axis {axis_modes.axis}: measured, fitted and of the machine", caption,
                    Chart(panels))  # fmt: skip
 
 
@@ -182,21 +182,21 @@ def _files(report: ModesReport) -> list[tuple[str, Path]]:
 
 def summary(report: ModesReport, files: Sequence[str]) -> dict[str, Any]:
     """Content of summary.json."""
-    found = report.found
+    axis_modes = report.found
     return {
         "kind": "modes",
         "answer": answers(report),
         "settings": dict(report.settings),
-        "axis": found.axis,
+        "axis": axis_modes.axis,
         "modes": [
             {
                 "frequency": {"value": mode.frequency, "unit": "Hz", "sigma": finite(mode.frequency_sigma)},
                 "damping": {"value": mode.damping, "unit": "1", "sigma": finite(mode.damping_sigma)},
-                "shares": {name: mode.residues[name] / found.fit.rigid[name] for name in found.fit.outputs},
+                "shares": {name: mode.residues[name] / axis_modes.fit.rigid[name] for name in axis_modes.fit.outputs},
             }
-            for mode in found.fit.modes
+            for mode in axis_modes.fit.modes
         ],
-        "predicted": {str(count): left for count, left in found.fit.predicted.items()},
+        "predicted": {str(count): value for count, value in axis_modes.fit.predicted.items()},
         "figures": figures_part(report.figures),
         "software": software(),
         "inputs": inputs_part(hashed(_files(report))),
@@ -206,12 +206,12 @@ def summary(report: ModesReport, files: Sequence[str]) -> dict[str, Any]:
 
 def answers(report: ModesReport) -> list[str]:
     """What was found, and how near it is."""
-    found = report.found
-    modes = ", ".join(f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} %)" for m in found.fit.modes) or "no mode"
-    left = "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} degrees" for name, (db, deg) in found.left.items())
+    axis_modes = report.found
+    modes = ", ".join(f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} %)" for m in axis_modes.fit.modes) or "no mode"
+    remaining = "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} degrees" for name, (db, deg) in axis_modes.left.items())
     return [
-        f"{found.axis}: rigid body with {modes} of damping. 90 % of the lines are met within {left}.",
-        f"Estimate: {found.measured.method}, {len(found.measured.frequency)} lines.",
+        f"{axis_modes.axis}: rigid body with {modes} of damping. 90 % of the lines are met within {remaining}.",
+        f"Estimate: {axis_modes.measured.method}, {len(axis_modes.measured.frequency)} lines.",
         f"{MODES_FILE} is the machine's table with these modes in place of its elastic ones; other axes are rigid in "
         "it.",
     ]

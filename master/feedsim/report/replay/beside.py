@@ -42,10 +42,10 @@ class Beside:
 
 def beside(machine: Machine, estimates: Mapping[str, Mapping[str, Estimate]]) -> list[Beside]:
     """Parameters that the machine file has; estimates: axis -> name -> value."""
-    found = []
+    result = []
     for axis, own in estimates.items():
         known = machine.axes[axis]
-        for name, each in own.items():
+        for name, estimate in own.items():
             drive = known.drive if isinstance(known.drive, Drive) else None
             friction = known.friction if isinstance(known.friction, Friction) else None
             parameter, value = f"drive.{name}", getattr(drive, name, None)
@@ -54,53 +54,60 @@ def beside(machine: Machine, estimates: Mapping[str, Mapping[str, Estimate]]) ->
             if name in OF_THE_AXIS:
                 parameter, value = OF_THE_AXIS[name], getattr(known, OF_THE_AXIS[name])
             if isinstance(value, int | float) and not isinstance(value, bool):
-                found.append(Beside(axis, parameter, float(value), each))
-    return found
+                result.append(Beside(axis, parameter, float(value), estimate))
+    return result
 
 
-def beside_section(machine: Machine, found: list[Beside]) -> Section | None:
+def beside_section(machine: Machine, result: list[Beside]) -> Section | None:
     """All of them, in SI and in the control's words."""
-    if not found:
+    if not result:
         return None
     control = asked(machine)
     names = names_of(control) if control else {}
     rows: list[tuple[Text, ...]] = []
-    for each in found:
-        name = names.get(each.parameter)
+    for entry in result:
+        name = names.get(entry.parameter)
         shown = "–"
         if name is not None:
-            old, new = (minus(f"{name.shown(value):.5g}") for value in (each.present, each.found.value))
+            old, new = (minus(f"{name.shown(value):.5g}") for value in (entry.present, entry.found.value))
             doubt = "" if name.confirmed else " (unit not confirmed)"
             shown = f"{name.number} {name.name}: {old} | {new} {name.unit}{doubt}".rstrip()
         rows.append((
-            each.axis, code(each.parameter.rpartition(".")[2]), minus(f"{each.present:.5g}"),
-            minus(powers(value_text(each.found))), display_unit(each.found.unit),
-            minus(powers(interval_text(each.found))), shown, "differs" if each.differs else "",
+            entry.axis, code(entry.parameter.rpartition(".")[2]), minus(f"{entry.present:.5g}"),
+            minus(powers(value_text(entry.found))), display_unit(entry.found.unit),
+            minus(powers(interval_text(entry.found))), shown, "differs" if entry.differs else "",
         ))  # fmt: skip
     heads = ("Axis", "Parameter", "Machine file", "Identified", "SI unit", "95 % interval", "In the control", "")
     return Section("Beside the machine file", [Table("llrrlrtl", heads, rows, NOTE)], "beside")
 
 
-def beside_part(found: list[Beside]) -> list[dict[str, Any]]:
+def beside_part(result: list[Beside]) -> list[dict[str, Any]]:
     """The same in summary.json, in SI."""
     return [
-        {"axis": each.axis, "parameter": each.parameter, "machine_file": each.present, "identified": each.found.value,
-         "unit": each.found.unit, "status": each.found.status, "differs": each.differs}
-        for each in found
-    ]  # fmt: skip
+        {
+            "axis": entry.axis,
+            "parameter": entry.parameter,
+            "machine_file": entry.present,
+            "identified": entry.found.value,
+            "unit": entry.found.unit,
+            "status": entry.found.status,
+            "differs": entry.differs,
+        }
+        for entry in result
+    ]
 
 
-def beside_lines(machine: Machine, found: list[Beside]) -> list[str]:
+def beside_lines(machine: Machine, result: list[Beside]) -> list[str]:
     """Values that differ, a line each for the terminal."""
     control = asked(machine)
     names = names_of(control) if control else {}
     said = []
-    for each in found:
-        if each.differs:
-            name = names.get(each.parameter)
-            words = f": {name.number} {name.shown(each.present):.5g} -> {name.text(each.found.value)}" if name else ""
+    for entry in result:
+        if entry.differs:
+            name = names.get(entry.parameter)
+            words = f": {name.number} {name.shown(entry.present):.5g} -> {name.text(entry.found.value)}" if name else ""
             said.append(
-                f"  differs: {each.axis}.{each.parameter} is {each.present:.5g} {each.found.unit} in the machine file, "
-                f"{value_text(each.found)} in the record{words}"
+                f"  differs: {entry.axis}.{entry.parameter} is {entry.present:.5g} {entry.found.unit} in the machine "
+                f"file, {value_text(entry.found)} in the record{words}"
             )
     return said

@@ -64,26 +64,26 @@ class DriveReport:
     @property
     def figures(self) -> dict[str, Figure]:
         """Of all axes."""
-        return {name: figure for each in self.comparisons for name, figure in each.figures.items()}
+        return {name: figure for comparison in self.comparisons for name, figure in comparison.figures.items()}
 
     @property
     def notes(self) -> list[str]:
         """What the numbers are worth."""
-        told = self.subject.notes if self.subject is not None else ()
-        return [note for note in dict.fromkeys((*told, *(source.note for source in self.sources))) if note]
+        reported = self.subject.notes if self.subject is not None else ()
+        return [note for note in dict.fromkeys((*reported, *(source.note for source in self.sources))) if note]
 
     @property
     def warnings(self) -> list[str]:
         """What a user should know."""
-        told = dict.fromkeys(text for source in self.sources for text in source.warnings)
-        told |= dict.fromkeys(self.found.clipped)
+        reported = dict.fromkeys(text for source in self.sources for text in source.warnings)
+        reported |= dict.fromkeys(self.found.clipped)
         for axis, lines in self.found.outside.items():
             if lines:
-                told[Note(f"{in_words(axis, lines)}; it was taken out of what was fitted")] = None
+                reported[Note(f"{in_words(axis, lines)}; it was taken out of what was fitted")] = None
         for axis, one in self.found.drives.items():
-            open_ones = [name for name, each in one.estimates.items() if each.status == "undetermined"]
+            open_ones = [name for name, estimate in one.estimates.items() if estimate.status == "undetermined"]
             if open_ones:
-                told[Note(f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit "
+                reported[Note(f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit "
                           "together with the rest, and may be others")] = None  # fmt: skip
             for cycle, likelier in one.other_cycles.items():
                 own = one.machine.cycles.T_pos
@@ -91,12 +91,12 @@ class DriveReport:
                     f"position cycles of {1e3 * own:g} ms (taken) and {1e3 * cycle:g} ms ({spelt('position_cycle')})"
                 )
                 if likelier > DECISIVE:
-                    told[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
+                    reported[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
                 elif likelier > -DECISIVE:
-                    told[Note(f"axis {axis}: {cycles} fit alike")] = None
+                    reported[Note(f"axis {axis}: {cycles} fit alike")] = None
                 else:
-                    told[Note(f"axis {axis}: of {cycles} the record speaks for the former")] = None
-        return list(told)
+                    reported[Note(f"axis {axis}: of {cycles} the record speaks for the former")] = None
+        return list(reported)
 
 
 def check_writable(axes: Sequence[str], directory: Path, inputs: Sequence[Path] = ()) -> None:
@@ -129,8 +129,8 @@ def report_of(report: DriveReport) -> Report:
     """Content of the report."""
     pictures = []
     with remarked(f"{report.name}, identified from {report.sources[0].file.name}"):
-        for each in report.comparisons:
-            pictures += pictures_of(each, report.marks)
+        for comparison in report.comparisons:
+            pictures += pictures_of(comparison, report.marks)
     drives = report.found.drives
     rows = [
         ("Record", report.sources[0].file.name),
@@ -174,13 +174,21 @@ def _beside(report: DriveReport) -> list[Beside]:
 
 def _parameters(axis: str, one: DriveFound) -> Section:
     rows: list[tuple[Text, ...]] = []
-    for name, each in one.estimates.items():
-        interval = minus(powers(interval_text(each)))
-        remark: str = each.status if each.status != "estimated" else ""
-        if each.reason:
-            remark = f"{remark}: {each.reason}"
-        rows.append((code(name), typeset(each.meaning), minus(powers(value_text(each))), display_unit(each.unit),
-                     interval, remark))  # fmt: skip
+    for name, estimate in one.estimates.items():
+        interval = minus(powers(interval_text(estimate)))
+        remark: str = estimate.status if estimate.status != "estimated" else ""
+        if estimate.reason:
+            remark = f"{remark}: {estimate.reason}"
+        rows.append(
+            (
+                code(name),
+                typeset(estimate.meaning),
+                minus(powers(value_text(estimate))),
+                display_unit(estimate.unit),
+                interval,
+                remark,
+            )
+        )
     heads = ("Parameter", "Meaning", "Value", "SI unit", "95 % interval", "Remark")
     return Section(f"Axis {axis}", [Table("ltrlrt", heads, rows)])
 
@@ -200,7 +208,7 @@ def _parts(axis: str, one: DriveFound) -> Section:
 
 def _at_others(mode: ElasticMode) -> list[str]:
     """What a mode does at the scales of other axes, over the rigid motion of its own."""
-    return [f"{each.axis} {each.shape:.2g} (+-{NORMAL_95 * each.sigma:.2g})" for each in mode.beside]
+    return [f"{entry.axis} {entry.shape:.2g} (+-{NORMAL_95 * entry.sigma:.2g})" for entry in mode.beside]
 
 
 def _modes(axis: str, one: DriveFound) -> Section:
@@ -220,15 +228,15 @@ def _modes(axis: str, one: DriveFound) -> Section:
         if mode.beside
     ]
     if one.modes_predicted:
-        left = [(str(count), f"{1e6 * value:.3g}") for count, value in one.modes_predicted.items()]
-        parts.append(Table("rr", ("Modes", "Position left of unseen quarters [µm]"), left))
+        remaining = [(str(count), f"{1e6 * value:.3g}") for count, value in one.modes_predicted.items()]
+        parts.append(Table("rr", ("Modes", "Position left of unseen quarters [µm]"), remaining))
     return Section(f"Elastic modes of {axis}", parts)
 
 
 def _files(report: DriveReport) -> list[tuple[str, Path]]:
-    found = [("record", source.file) for source in report.sources]
-    found += [("mapping", source.mapping) for source in report.sources if source.mapping is not None]
-    return [*found, *(report.subject.files if report.subject is not None else ())]
+    result = [("record", source.file) for source in report.sources]
+    result += [("mapping", source.mapping) for source in report.sources if source.mapping is not None]
+    return [*result, *(report.subject.files if report.subject is not None else ())]
 
 
 def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
@@ -240,9 +248,9 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
         "axes": {
             axis: {
                 "parameters": {
-                    name: {"value": each.value, "unit": each.unit, "sigma": finite(each.sigma), "status": each.status,
-                           "reason": each.reason}
-                    for name, each in one.estimates.items()
+                    name: {"value": estimate.value, "unit": estimate.unit, "sigma": finite(estimate.sigma),
+                           "status": estimate.status, "reason": estimate.reason}
+                    for name, estimate in one.estimates.items()
                 },
                 "parts": {
                     part: {"gain": finite(gain), "taken": part in one.chosen} for part, gain in one.parts.items()
@@ -275,15 +283,15 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
 def answers(report: DriveReport) -> list[str]:
     """How near what was found comes to the record, how far it is to be trusted, and what to do next."""
     lines = []
-    for each in report.comparisons:
-        one = report.found.drives[each.axis]
-        own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
+    for comparison in report.comparisons:
+        one = report.found.drives[comparison.axis]
+        own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
         torque = f", its torque to {own['torque_rms']}" if "torque_rms" in own else ""
-        told = [name for name, found in one.estimates.items() if found.status == "estimated"]
+        reported = [name for name, estimate in one.estimates.items() if estimate.status == "estimated"]
         lines.append(
-            f"{each.axis}: the position of the record is met to {own['position_rms']} rms ({own['share_of_lag']} of "
-            f"the lag){torque}; of motion that a fit has not seen, to {1e6 * one.predicted[0]:.3g} um. The record "
-            f"determines {', '.join(told) or 'no parameter'}."
+            f"{comparison.axis}: the position of the record is met to {own['position_rms']} rms ({own['share_of_lag']} "
+            f"of the lag){torque}; of motion that a fit has not seen, to {1e6 * one.predicted[0]:.3g} um. The record "
+            f"determines {', '.join(reported) or 'no parameter'}."
         )
     lines.append("Replay another record on it before trusting it with other motion.")
     return lines
@@ -292,20 +300,20 @@ def answers(report: DriveReport) -> list[str]:
 def summary_lines(report: DriveReport) -> list[str]:
     """For the terminal: parameters with intervals, and what is left, by axis."""
     lines = []
-    for each in report.comparisons:
-        one = report.found.drives[each.axis]
-        lines.append(f"  axis {each.axis}")
-        for name, found in one.estimates.items():
-            interval = f"{interval_text(found)}" if found.status == "estimated" else found.status
-            lines.append(f"    {name:<10} {value_text(found):>12} {found.unit:<10} {interval}")
-        own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
+    for comparison in report.comparisons:
+        one = report.found.drives[comparison.axis]
+        lines.append(f"  axis {comparison.axis}")
+        for name, estimate in one.estimates.items():
+            interval = f"{interval_text(estimate)}" if estimate.status == "estimated" else estimate.status
+            lines.append(f"    {name:<10} {value_text(estimate):>12} {estimate.unit:<10} {interval}")
+        own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
         torque = f", torque {own['torque_rms']} rms" if "torque_rms" in own else ""
         lines.append(f"    left: position {own['position_rms']} rms{torque}, while it moves;")
         torque = f", {one.predicted[1]:.4g} N.m" if torque else ""
         lines += [
             f"    mode at {mode.frequency:.4g} Hz (+-{NORMAL_95 * mode.sigma[0]:.2g}), "
             f"damping {100 * mode.damping:.2g} %, motor {mode.motor:.2g}, scale {mode.scale:.2g} of the rigid motion"
-            f"{''.join(f', scale of {each}' for each in _at_others(mode))}"
+            f"{''.join(f', scale of {at_other}' for at_other in _at_others(mode))}"
             for mode in one.modes
         ]
         lines.append(

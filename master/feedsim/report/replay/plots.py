@@ -23,21 +23,21 @@ def pictures_of(comparison: Comparison, marks: Sequence[Mark]) -> list[Picture]:
     return [_over_time(comparison, marks), _left(comparison)]
 
 
-def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
-    each = found.each
-    rows = each.rows
-    time = each.record.time[rows]
-    channels = found.channels
-    contour = each.record.deviation is not None
+def _over_time(comparison: Comparison, marks: Sequence[Mark]) -> Picture:
+    axis_record = comparison.each
+    rows = axis_record.rows
+    time = axis_record.record.time[rows]
+    channels = comparison.channels
+    contour = axis_record.record.deviation is not None
     what, ordinate = ("Contour deviation", "deviation") if contour else ("Following error", "setpoint less position")
-    lag = 1e6 * (each.setpoint - each.position)[rows]
-    if each.record.deviation is not None:
-        lag = 1e6 * each.I_P * each.record.deviation[rows]
+    lag = 1e6 * (axis_record.setpoint - axis_record.position)[rows]
+    if axis_record.record.deviation is not None:
+        lag = 1e6 * axis_record.I_P * axis_record.record.deviation[rows]
     within = [mark for mark in marks if time[0] <= mark.time <= time[-1]][:MOST_MARKS]
-    title = f"Axis {found.axis}: the record and its replay"
+    title = f"Axis {comparison.axis}: the record and its replay"
     what_drives = (
         "The recorded torque on the simulated axis, in open loop, from the recorded position and speed on."
-        if found.open_loop
+        if comparison.open_loop
         else "The recorded setpoints through the simulated axis, in closed loop, beside what was recorded."
     )
     dotted = " Dotted: begin of a block of the program, with its name where there is room." if within else ""
@@ -45,7 +45,7 @@ def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
     blocks = [Level(mark.time, upright=True, dash="dotted") for mark in within]
     titled = [replace(level, text=name) for level, name in zip(blocks, names_of(within, time), strict=True)]
     panels = []
-    if not found.open_loop:
+    if not comparison.open_loop:
         simulated = lag - 1e6 * channels["position"].error[rows]
         panels.append(_panel(what, ordinate, "µm", time, simulated=simulated, recorded=lag))
     for name, channel in channels.items():
@@ -59,20 +59,20 @@ def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
         )
     upper = replace(panels[0], levels=[*panels[0].levels, *titled])
     chart = Chart([upper, *(replace(panel, levels=[*panel.levels, *blocks]) for panel in panels[1:])])
-    return Picture(f"replay-{found.axis}", title, caption, chart)
+    return Picture(f"replay-{comparison.axis}", title, caption, chart)
 
 
 def names_of(marks: Sequence[Mark], time: Array) -> list[str]:
     """What stands at the line of each block; "" where the name before it takes the room."""
-    found: list[str] = []
+    result: list[str] = []
     free = -np.inf
     for mark in marks:
         text = (
             mark.text if len(mark.text) <= MAX_NAME_CHARACTERS else mark.text[: MAX_NAME_CHARACTERS - 1].rstrip() + "…"
         )
-        found.append(text if mark.time >= free else "")
-        free = mark.time + np.ptp(time) / MOST_NAMES if found[-1] else free
-    return found
+        result.append(text if mark.time >= free else "")
+        free = mark.time + np.ptp(time) / MOST_NAMES if result[-1] else free
+    return result
 
 
 # Colour and width: the record lies on the simulation, which is wider.
@@ -86,18 +86,18 @@ def _panel(title: str, ordinate: str, unit: str, time: Array, **curves: Array) -
     return Panel(title, axis, Axis(ordinate, unit), own, [Level(0.0, dash="")], linked="t", height=0.9)
 
 
-def _left(found: Comparison) -> Picture:
-    names = [name for name in ("position", "torque") if name in found.channels]
-    title = f"Axis {found.axis}: what the replay leaves"
+def _left(comparison: Comparison) -> Picture:
+    names = [name for name in ("position", "torque") if name in comparison.channels]
+    title = f"Axis {comparison.axis}: what the replay leaves"
     caption = (
         "Simulated less recorded: amplitude spectrum over the window (Hann), and the mean over bins of position "
         "while the axis moves, by direction."
     )
     panels = []
     for name in names:
-        factor, unit = SHOWN_UNITS[found.channels[name].unit]
-        frequency, amplitude = found.spectrum(name)
-        centre, forwards, backwards = found.over_position(name)
+        factor, unit = SHOWN_UNITS[comparison.channels[name].unit]
+        frequency, amplitude = comparison.spectrum(name)
+        centre, forwards, backwards = comparison.over_position(name)
         panels.append(
             Panel(f"What is left of the {name}: spectrum", Axis("frequency", "Hz", log=True),
                   Axis("amplitude", unit, log=True),
@@ -120,4 +120,4 @@ def _left(found: Comparison) -> Picture:
                 [Level(0.0, dash="")],
             )
         )
-    return Picture(f"replay-left-{found.axis}", title, caption, Chart(panels, (1.0, 1.0)))
+    return Picture(f"replay-left-{comparison.axis}", title, caption, Chart(panels, (1.0, 1.0)))

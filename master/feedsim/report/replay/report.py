@@ -50,7 +50,7 @@ class Replayed:
     @property
     def figures(self) -> dict[str, Figure]:
         """Of all axes."""
-        return {name: figure for each in self.comparisons for name, figure in each.figures.items()}
+        return {name: figure for comparison in self.comparisons for name, figure in comparison.figures.items()}
 
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
@@ -62,12 +62,12 @@ def trace_of(comparisons: Sequence[Comparison]) -> Trace:
     """Record and simulation side by side, within the window."""
     rows = comparisons[0].each.rows
     columns, units = {}, {}
-    for each in comparisons:
-        columns[f"{each.axis}.x_s"], units[f"{each.axis}.x_s"] = each.each.setpoint[rows], "m"
+    for comparison in comparisons:
+        columns[f"{comparison.axis}.x_s"], units[f"{comparison.axis}.x_s"] = comparison.each.setpoint[rows], "m"
         names = {"position": "x_a", "torque": "M_a", "speed setpoint": "n_s"}
-        for name, channel in each.channels.items():
+        for name, channel in comparison.channels.items():
             for side, values in (("recorded", channel.recorded), ("simulated", channel.simulated)):
-                column = f"{each.axis}.{names[name]}_{side}"
+                column = f"{comparison.axis}.{names[name]}_{side}"
                 columns[column], units[column] = values[rows], channel.unit
     return Trace(comparisons[0].each.record.time[rows], columns, units)
 
@@ -77,13 +77,13 @@ def report_of(replayed: Replayed) -> Report:
     machine = replayed.subject.machine
     pictures = []
     with remarked(f"{machine.name}. {machine.note}"):
-        for each in replayed.comparisons:
-            pictures += pictures_of(each, replayed.marks)
+        for comparison in replayed.comparisons:
+            pictures += pictures_of(comparison, replayed.marks)
     record = replayed.sources[0].file.name
     rows = [("Record", record), ("Machine", machine.name)]
     return Report(
         f"Replay of {record}",
-        f"{machine.name} · axes {', '.join(each.axis for each in replayed.comparisons)}",
+        f"{machine.name} · axes {', '.join(entry.axis for entry in replayed.comparisons)}",
         warnings=replayed.warnings,
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
         answer=answers(replayed),
@@ -106,12 +106,12 @@ def report_of(replayed: Replayed) -> Report:
 
 
 def _tiles(figures: Mapping[str, Figure]) -> list[Tile]:
-    found = []
+    tiles = []
     for name, figure in figures.items():
         axis, _, key = name.partition(".")
         if key in LEADING:
-            found.append(Tile(tile_value(figure), f"{axis}: {LEADING[key]}", typeset(figure.meaning)))
-    return found
+            tiles.append(Tile(tile_value(figure), f"{axis}: {LEADING[key]}", typeset(figure.meaning)))
+    return tiles
 
 
 def _events(replayed: Replayed) -> Section | None:
@@ -124,15 +124,15 @@ def _events(replayed: Replayed) -> Section | None:
 
 
 def _files(replayed: Replayed) -> list[tuple[str, Path]]:
-    found = [("record", source.file) for source in replayed.sources]
-    found += [("mapping", source.mapping) for source in replayed.sources if source.mapping is not None]
-    return [*found, *replayed.subject.files, ("modes", replayed.subject.machine.modes)]
+    result = [("record", source.file) for source in replayed.sources]
+    result += [("mapping", source.mapping) for source in replayed.sources if source.mapping is not None]
+    return [*result, *replayed.subject.files, ("modes", replayed.subject.machine.modes)]
 
 
 def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     """Content of summary.json."""
-    each = replayed.comparisons[0].each
-    time = each.record.time[each.rows]
+    axis_record = replayed.comparisons[0].each
+    time = axis_record.record.time[axis_record.rows]
     return {
         "kind": "replay",
         "answer": answers(replayed),
@@ -150,15 +150,15 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
 def answers(replayed: Replayed) -> list[str]:
     """What is left, a line per axis."""
     lines = []
-    for each in replayed.comparisons:
-        own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
-        if each.open_loop:
+    for comparison in replayed.comparisons:
+        own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
+        if comparison.open_loop:
             lines.append(
-                f"{each.axis}: in open loop, under the recorded torque, the position is off by {own['position_rms']} "
-                f"rms, {own['position_largest']} at most"
+                f"{comparison.axis}: in open loop, under the recorded torque, the position is off by "
+                f"{own['position_rms']} rms, {own['position_largest']} at most"
             )
             continue
-        text = f"{each.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
+        text = f"{comparison.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
         text += f" ({own['share_of_lag']} of the lag)"
         text += f"; torque {own['torque_rms']} rms" if "torque_rms" in own else "; no torque is recorded"
         if "speed_setpoint_rms" in own:

@@ -22,16 +22,16 @@ NOTE = (
 SIDES = (("approached upwards", SIMULATED), ("approached downwards", OTHERWISE))
 
 
-def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
+def accuracy_picture(prefix: str, accuracy: Accuracy, stem: str) -> Picture:
     """Deviations over the targets: every reading, means, and two standard deviations to either side of them."""
-    x = 1e3 * np.asarray(found.targets)
-    readings, mean, s = 1e6 * found.deviations, 1e6 * found.mean, 1e6 * found.s
+    x = 1e3 * np.asarray(accuracy.targets)
+    readings, mean, s = 1e6 * accuracy.deviations, 1e6 * accuracy.mean, 1e6 * accuracy.s
     runs = readings.shape[2]
     title = f"Positioning accuracy of {prefix}"
     caption = (
         "Deviation of the measured position from its target at the end of each rest, by the linear scale: every "
         "reading, the mean of each side, and the band of two standard deviations about it. "
-        f"A {number(found.figures['A'].value, 3)} µm is from the top of the bands to their bottom."
+        f"A {number(accuracy.figures['A'].value, 3)} µm is from the top of the bands to their bottom."
     )
     bands = [
         Band("", middle - 2 * spread, middle + 2 * spread, x, colour)
@@ -54,12 +54,12 @@ def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
     return Picture(stem, title, caption, Chart([panel]))
 
 
-def accuracy_section(prefix: str, found: Accuracy, place: str = "") -> Section:
+def accuracy_section(prefix: str, accuracy: Accuracy, place: str = "") -> Section:
     """Means, standard deviations, reversal value and repeatability of every target. place: "tool" by the tool point."""
-    columns = (*np.transpose([found.mean, found.s], (1, 0, 2)).reshape(4, -1), found.B, found.R)
+    columns = (*np.transpose([accuracy.mean, accuracy.s], (1, 0, 2)).reshape(4, -1), accuracy.B, accuracy.R)
     rows = [
         (f"{1e3 * target:.6g}", *(minus(f"{1e6 * float(column[i]):.3f}") for column in columns))
-        for i, target in enumerate(found.targets)
+        for i, target in enumerate(accuracy.targets)
     ]
     by = " by the tool point" if place else ""
     anchor = f"accuracy-{prefix}" + (f"-{place}" if place else "")

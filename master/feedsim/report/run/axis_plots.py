@@ -102,7 +102,7 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
             time, beyond = deviation(trace, approach, signal)
             curves.append(Curve(name, (time - approach.end) * 1e3, beyond * 1e6, colour, dash))
     overshoot, settled = _value(figures, "overshoot"), _value(figures, "settling_time")
-    reach += [each for each in (overshoot, _value(figures, "tool.overshoot")) if math.isfinite(each)]
+    reach += [value for value in (overshoot, _value(figures, "tool.overshoot")) if math.isfinite(value)]
     marks = []
     x, y = curves[-1].x, curves[-1].y
     if overshoot > 0:

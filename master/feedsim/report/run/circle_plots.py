@@ -156,17 +156,17 @@ def circle_chart(
 def unrolled(axes: tuple[str, str], curves: Sequence[Curve], marks: Sequence[Mark], levels: Sequence[Level]) -> Panel:
     """Turns over the angle [deg]."""
     over = []
-    for each in curves:
-        angle = np.rad2deg(each.x % (2 * math.pi))
+    for curve in curves:
+        angle = np.rad2deg(curve.x % (2 * math.pi))
         order = np.argsort(angle, kind="stable")
-        over.append(Curve(each.name, angle[order], each.y[order], each.colour, each.dash, each.width))
+        over.append(Curve(curve.name, angle[order], curve.y[order], curve.colour, curve.dash, curve.width))
     return Panel(
         "Over the angle",
         Axis(f"angle from {axes[0]}+", "°", span=(0.0, 360.0)),
         Axis("radius deviation", "µm"),
         over,
         [Level(0.0, dash=""), *levels],
-        marks=[Mark(math.degrees(each.x % (2 * math.pi)), each.y, "", each.colour) for each in marks],
+        marks=[Mark(math.degrees(mark.x % (2 * math.pi)), mark.y, "", mark.colour) for mark in marks],
         linked="angle",
     )
 

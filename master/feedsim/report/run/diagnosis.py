@@ -77,12 +77,12 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "vibrations": [
             {
-                "axis": each.axis,
-                "frequency": quantity(each.frequency, "Hz"),
-                "amplitude": quantity(each.amplitude, "m"),
-                "half_interval": finite(each.half),
+                "axis": vibration.axis,
+                "frequency": quantity(vibration.frequency, "Hz"),
+                "amplitude": quantity(vibration.amplitude, "m"),
+                "half_interval": finite(vibration.half),
             }
-            for each in diagnosis.vibrations
+            for vibration in diagnosis.vibrations
         ],
         **_of_records(diagnosis),
         "path_lag": None if diagnosis.lag is None else quantity(diagnosis.lag, "m"),

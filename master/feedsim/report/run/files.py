@@ -219,7 +219,7 @@ def summary(
 
 def _circles(run: JudgedRun, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
     """The turns that figures are of: who lays them over others needs no scenario."""
-    found = [task for task in tasks(run.scenario, run.program) if task.prefix in causes] if causes else []
+    result = [task for task in tasks(run.scenario, run.program) if task.prefix in causes] if causes else []
     return {
         task.prefix: [
             {
@@ -232,7 +232,7 @@ def _circles(run: JudgedRun, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
             }
             for turn in task.turns
         ]
-        for task in found
+        for task in result
         if isinstance(task, CircleTask)
     }
 

@@ -98,17 +98,17 @@ def _followed(pose: PoseUse) -> list[Part]:
         for axis in pose.grid
     )
     text = Paragraph(f"The plant follows the pose ({cells}): its modes are those of the cell that the axes stand in.")
-    found = pose.crossings
-    if found is None:
+    result = pose.crossings
+    if result is None:
         return [text]
     rows = [
-        ("Crossings", f"{found.count}"),
-        ("Kinetic energy lost in all", f"{found.kinetic_lost:.3g} J"),
-        ("Elastic energy lost in all (negative: gained)", f"{found.elastic_lost:.3g} J"),
-        ("Largest jump of an axis position", f"{found.jump_x_a * 1e9:.2g} nm"),
-        ("Largest jump of an axis position that was taken back", f"{found.held * 1e9:.3g} nm"),
-        ("Largest jump of a motor speed", f"{found.jump_n_a:.2g} rad/s"),
-        ("Largest jump of the tool", f"{found.jump_tool * 1e9:.3g} nm"),
+        ("Crossings", f"{result.count}"),
+        ("Kinetic energy lost in all", f"{result.kinetic_lost:.3g} J"),
+        ("Elastic energy lost in all (negative: gained)", f"{result.elastic_lost:.3g} J"),
+        ("Largest jump of an axis position", f"{result.jump_x_a * 1e9:.2g} nm"),
+        ("Largest jump of an axis position that was taken back", f"{result.held * 1e9:.3g} nm"),
+        ("Largest jump of a motor speed", f"{result.jump_n_a:.2g} rad/s"),
+        ("Largest jump of the tool", f"{result.jump_tool * 1e9:.3g} nm"),
     ]
     return [text, pairs_table([(name, minus(value)) for name, value in rows])]
 

@@ -137,23 +137,23 @@ def accuracy_sections(run: JudgedRun) -> list[Section]:
     """Every positioning cycle, by the scale and by the tool point."""
     asked = [task for task in tasks(run.scenario, run.program) if isinstance(task, AccuracyTask)]
     return [
-        accuracy_section(task.prefix, found, place.rstrip("."))
+        accuracy_section(task.prefix, accuracy, place.rstrip("."))
         for task in asked
-        for place, found in task.found(run.trace).items()
+        for place, accuracy in task.found(run.trace).items()
     ]
 
 
 def answers(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[str]:
     """What circles, stops and positioning cycles are, why, and what to do: a line each."""
-    found = [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
+    result = [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
     for task in tasks(run.scenario, run.program):
         own = {
             name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
         }
         if own and not isinstance(task, CircleTask):
             words = stop_words(own, task.band) if isinstance(task, PositioningTask) else accuracy_words(own)
-            found.append(f"{task.prefix}: {words}")
-    return [*filter(None, map(sheet.verdict_line, sheet.sheets_of(run))), *found]
+            result.append(f"{task.prefix}: {words}")
+    return [*filter(None, map(sheet.verdict_line, sheet.sheets_of(run))), *result]
 
 
 def tiles(figures: Mapping[str, Figure], limits: Mapping[str, float] | None = None) -> list[Tile]:
@@ -183,7 +183,7 @@ def lead(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
     for task in tasks(run.scenario, run.program)[:1]:
         if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
             panel = next(
-                (each for each in chart.panels if isinstance(each, Panel) and each.title == OVERSHOOT_TITLE), None
+                (panel for panel in chart.panels if isinstance(panel, Panel) and panel.title == OVERSHOOT_TITLE), None
             )
             if panel is not None:
                 title = f"Axis {task.approach.axis} about its target"
@@ -300,11 +300,11 @@ def real_time_factor(run: JudgedRun) -> float | None:
 
 def summary_line(run: JudgedRun, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
-    found = [f"{name} {figures[name]}" for name in leading(figures)]
+    result = [f"{name} {figures[name]}" for name in leading(figures)]
     factor = real_time_factor(run)
     digits = ".0f" if factor is not None and factor >= 10 else ".2g"
     speed = f" ({factor:{digits}} x real time)" if factor is not None else ""
-    return ", ".join([*found, f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}"])
+    return ", ".join([*result, f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}"])
 
 
 def leading(figures: Mapping[str, Figure]) -> list[str]:

@@ -95,19 +95,19 @@ class Filled:
     @property
     def verdict(self) -> str:
         """Of all figures with a limit: fail if one fails, else not decided if one is, else pass; "" without limits."""
-        found = {result.verdict for result in self.results} - {NO_LIMIT_TEXT}
-        return next((each for each in (FAILS, OPEN, PASSES) if each in found), "")
+        outcome = {result.verdict for result in self.results} - {NO_LIMIT_TEXT}
+        return next((name for name in (FAILS, OPEN, PASSES) if name in outcome), "")
 
 
 def sheets_of(run: Run) -> list[Filled]:
     """The sheets that the scenario asks for, one per evaluation with the key `sheet`."""
-    found: list[Filled] = []
+    result: list[Filled] = []
     for item, task in zip(run.scenario.evaluate, tasks(run.scenario, run.program), strict=True):
         if isinstance(item, PositioningAccuracy) and item.sheet is not None and isinstance(task, AccuracyTask):
-            found.append(_positioning(run, task, item.sheet))
+            result.append(_positioning(run, task, item.sheet))
         elif isinstance(item, CircleTest) and item.sheet is not None and isinstance(task, CircleTask):
-            found.append(_circle(run, task, item.sheet))
-    return found
+            result.append(_circle(run, task, item.sheet))
+    return result
 
 
 def in_workbook(scenario: Scenario) -> bool:
@@ -152,19 +152,19 @@ def judged(value: float, limit: float, uncertainty: float) -> str:
 def _results(
     figures: Mapping[str, Figure], symbols: Mapping[str, str], sheet: Sheet, known: Sequence[str]
 ) -> list[Result]:
-    found = []
+    results = []
     for name in known:
         if (figure := figures.get(name)) is None:
             continue
         limit = 1e6 * sheet.limits.get(name, math.nan)
         verdict = judged(figure.value, limit, 1e6 * sheet.uncertainty)
         meaning = figure.meaning.replace(" (ISO 230-2)", "").replace("ISO 230-4 ", "")
-        found.append(Result(symbols[name], meaning, figure.value, limit, verdict))
-    return found
+        results.append(Result(symbols[name], meaning, figure.value, limit, verdict))
+    return results
 
 
 def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
-    found, visits = task.found(run.trace)[""], task.visits
+    accuracy, visits = task.found(run.trace)[""], task.visits
     prefix = task.prefix
     rests = [visit.end - visit.begin for visit in visits.visits]
     conditions = [
@@ -176,20 +176,20 @@ def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
         ("Rest at a target", f"{min(rests):.3g} s; read at its end"),
         *_given(sheet),
     ]
-    readings = 1e6 * found.deviations
+    readings = 1e6 * accuracy.deviations
     heads = ("Target [mm]", "Approach", *(f"{k + 1}" for k in range(visits.runs)), "x\u0305 [µm]", "s [µm]", "B [µm]")
     numbers: list[Sequence[float | str]] = []
     csv_rows = []
     for i, target in enumerate(visits.targets):
         for side, arrow in enumerate("↑↓"):
             own = readings[side, i]
-            B = float(1e6 * found.B[i]) if side == 0 else math.nan
-            numbers.append((float(1e3 * target), arrow, *map(float, own), float(1e6 * found.mean[side, i]),
-                            float(1e6 * found.s[side, i]), B))  # fmt: skip
+            B = float(1e6 * accuracy.B[i]) if side == 0 else math.nan
+            numbers.append((float(1e3 * target), arrow, *map(float, own), float(1e6 * accuracy.mean[side, i]),
+                            float(1e6 * accuracy.s[side, i]), B))  # fmt: skip
             csv_rows += [("deviation", f"{1e3 * target:.9g}", "", arrow, str(k + 1), f"{value:.6f}", "um")
                      for k, value in enumerate(own)]  # fmt: skip
-    results = _results(found.figures, STANDARD_SYMBOLS, sheet, OF_POSITIONING)
-    picture = accuracy_picture(prefix, found, f"sheet-{prefix.replace('#', '-')}")
+    results = _results(accuracy.figures, STANDARD_SYMBOLS, sheet, OF_POSITIONING)
+    picture = accuracy_picture(prefix, accuracy, f"sheet-{prefix.replace('#', '-')}")
     return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, 1e6 * sheet.uncertainty, heads, numbers, results,
                   picture, csv_rows)  # fmt: skip
 
@@ -206,13 +206,13 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
         ("Plane", f"{first}-{second}"),
         ("Nominal path", f"diameter {2e3 * turn.radius:.6g} mm, feed {feed:.5g} mm/min"),
         ("Centre", ", ".join(f"{axis} {1e3 * at:.6g} mm" for axis, at in zip(turn.axes, turn.centre, strict=True))),
-        ("Direction", " and ".join(SENSE_WORDS[each.sense] for each in task.turns)),
+        ("Direction", " and ".join(SENSE_WORDS[turn.sense] for turn in task.turns)),
         ("Position by", "linear scales"),
         *_given(sheet),
     ]
-    names = [SENSE_WORDS[each.sense] for each in task.turns]
+    names = [SENSE_WORDS[turn.sense] for turn in task.turns]
     grid = np.arange(0.0, 360.0, EVERY)
-    curves = [_deviation(run.trace, each, grid) for each in task.turns]
+    curves = [_deviation(run.trace, turn, grid) for turn in task.turns]
     numbers = [(float(angle), *(float(curve[k]) for curve in curves)) for k, angle in enumerate(grid)]
     csv_rows = [("radial deviation", "", f"{angle:g}", name, "", f"{curve[k]:.6f}", "um")
             for name, curve in zip(names, curves, strict=True) for k, angle in enumerate(grid)]  # fmt: skip
@@ -226,10 +226,10 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
 
 def _deviation(trace: Trace, turn: Turn, grid: np.ndarray) -> np.ndarray:
     """Radial deviation [um] at angles [deg] from the first axis."""
-    found = contour(trace, turn)
-    angle = np.rad2deg(found.angle) % 360.0
+    result = contour(trace, turn)
+    angle = np.rad2deg(result.angle) % 360.0
     order = np.argsort(angle, kind="stable")
-    return np.asarray(np.interp(grid, angle[order], 1e6 * found.deviation[order], period=360.0))
+    return np.asarray(np.interp(grid, angle[order], 1e6 * result.deviation[order], period=360.0))
 
 
 def _common(run: Run) -> list[tuple[str, str]]:
@@ -253,8 +253,10 @@ def table(sheets: Sequence[Filled]) -> str:
         name = f"{sheet.title} ({sheet.standard})"
         writer.writerows([name, "condition", what, "", "", "", "", how, "", "", ""] for what, how in sheet.conditions)
         writer.writerows([name, "reading", *row, "", ""] for row in sheet.readings)
-        for each in sheet.results:
-            limit = "" if math.isnan(each.limit) else f"{each.limit:.9g}"
-            verdict = "" if each.verdict == NO_LIMIT_TEXT else each.verdict
-            writer.writerow([name, "figure", each.symbol, "", "", "", "", f"{each.value:.6f}", "um", limit, verdict])
+        for result in sheet.results:
+            limit = "" if math.isnan(result.limit) else f"{result.limit:.9g}"
+            verdict = "" if result.verdict == NO_LIMIT_TEXT else result.verdict
+            writer.writerow(
+                [name, "figure", result.symbol, "", "", "", "", f"{result.value:.6f}", "um", limit, verdict]
+            )
     return text.getvalue()

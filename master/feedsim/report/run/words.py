@@ -75,11 +75,11 @@ def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Te
 
 def moved_words(trace: Trace) -> list[str]:
     """Of a run without figures: how far each axis has moved and was behind, and that nothing is evaluated."""
-    found = []
+    result = []
     travels = {name.partition(".")[0]: float(np.ptp(y)) for name, y in trace.columns.items() if name.endswith(".x_a")}
     for axis, travel in travels.items():
         if travel > STIRRED * max(travels.values()):
             lag = trace.columns.get(f"{axis}.x_e")
             behind = "" if lag is None else f", following error up to {1e6 * float(np.abs(lag).max()):.3g} um"
-            found.append(f"{axis} moves within {1e3 * travel:.4g} mm{behind}.")
-    return [*found, "The scenario has nothing that is evaluated (a stop, a circle, a positioning cycle): no figures."]
+            result.append(f"{axis} moves within {1e3 * travel:.4g} mm{behind}.")
+    return [*result, "The scenario has nothing that is evaluated (a stop, a circle, a positioning cycle): no figures."]

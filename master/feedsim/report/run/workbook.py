@@ -87,11 +87,11 @@ def _fill(book: Any, page: Any, sheet: Filled, rule: str) -> None:
         line(sheet.verdict.upper(), style=verdict)
     row += 1
     line("Symbol", "Meaning", "Value [µm]", "Limit [µm]", "U (k = 2) [µm]", "Verdict", style=head)
-    for each in sheet.results:
-        page.write_string(row, 0, each.symbol)
-        page.write_string(row, 1, each.meaning, wrapped)
-        page.write_string(row, 5, each.verdict)
-        for column, value in ((2, each.value), (3, each.limit), (4, sheet.uncertainty)):
+    for result in sheet.results:
+        page.write_string(row, 0, result.symbol)
+        page.write_string(row, 1, result.meaning, wrapped)
+        page.write_string(row, 5, result.verdict)
+        for column, value in ((2, result.value), (3, result.limit), (4, sheet.uncertainty)):
             if math.isfinite(value):
                 page.write_number(row, column, value, figure)
         row += 1

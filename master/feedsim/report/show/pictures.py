@@ -61,23 +61,23 @@ def looks_of(sources: Sequence[Source]) -> list[tuple[str, Dash]]:
     kinds: tuple[Dash, ...] = ("", "dashed", "dotted")
     records = [not source.figures and not source.parameters for source in sources]
     names = [SIMULATED, *FURTHER_COLOURS] if any(records) else [BEFORE, SIMULATED, *FURTHER_COLOURS]
-    found: list[tuple[str, Dash]] = []
+    result: list[tuple[str, Dash]] = []
     for k, recorded in enumerate(records):
-        number = sum(each == recorded for each in records[:k])
+        number = sum(record == recorded for record in records[:k])
         own = [RECORDED] if recorded else names
-        found.append((own[number % len(own)], kinds[number // len(own) % len(kinds)]))
-    return found
+        result.append((own[number % len(own)], kinds[number // len(own) % len(kinds)]))
+    return result
 
 
 def pictures_of(sources: Sequence[Source]) -> list[Picture]:
     """A picture per question that at least one source answers."""
-    found = [picture for prefix in _prefixes(sources) if (picture := contour_picture(sources, prefix)) is not None]
+    pictures = [picture for prefix in _prefixes(sources) if (picture := contour_picture(sources, prefix)) is not None]
     more = [
         stop_picture(sources, stops(sources)),
         *(_over_time(sources, *question) for question in QUESTIONS),
         spectrum_picture(sources),
     ]
-    return found + [picture for picture in more if picture is not None]
+    return pictures + [picture for picture in more if picture is not None]
 
 
 def _prefixes(sources: Sequence[Source]) -> list[str]:
@@ -90,10 +90,10 @@ def contours(source: Source, turns: Sequence[Turn]) -> list[_Curve]:
     columns = {name: curve for name in names if (curve := source.curve(name, "m")) is not None}
     trace = Trace(source.time, columns)
     try:
-        found = [contour(trace, turn) for turn in turns]
+        result = [contour(trace, turn) for turn in turns]
     except InputError as error:
         raise InputError(f"{source.path}: {error}") from None
-    return [_Curve(each.angle, each.deviation) for each in found]
+    return [_Curve(entry.angle, entry.deviation) for entry in result]
 
 
 def contour_picture(sources: Sequence[Source], prefix: str) -> Picture | None:
@@ -139,15 +139,15 @@ def _curves(sources: Sequence[Source], own: Sequence[_Own]) -> list[Curve]:
 def _over_time(
     sources: Sequence[Source], stem: str, title: str, signal: str, factor: float, ordinate: Axis
 ) -> Picture | None:
-    found: dict[str, list[_Own]] = {}
+    result: dict[str, list[_Own]] = {}
     for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
         curves = (
             (k, source, source.curve(f"{axis}.{signal}", COMPARED_SIGNALS[signal])) for k, source in enumerate(sources)
         )
-        found[axis] = [(k, source.t, factor * y) for k, source, y in curves if y is not None]
-    sizes = {axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0) for axis, curves in found.items()}
+        result[axis] = [(k, source.t, factor * y) for k, source, y in curves if y is not None]
+    sizes = {axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0) for axis, curves in result.items()}
     panels = [
-        Panel(f"Axis {axis}", ABSCISSA, ordinate, _curves(sources, found[axis]), [Level(0.0, dash="")], linked="t")
+        Panel(f"Axis {axis}", ABSCISSA, ordinate, _curves(sources, result[axis]), [Level(0.0, dash="")], linked="t")
         for axis in _moved(sizes)
     ]
     caption = f"Over the time of the first source, from its first row on. {LEFT_OUT}"
@@ -160,8 +160,8 @@ def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]])
     for axis, number in stops_of(stops):
         own: list[_Own] = []
         most, said = LEAST_REACH, []
-        for k, (source, found) in enumerate(zip(sources, stops, strict=True)):
-            if (seen := stop_seen(source, found, axis, number)) is None:
+        for k, (source, approaches) in enumerate(zip(sources, stops, strict=True)):
+            if (seen := stop_seen(source, approaches, axis, number)) is None:
                 continue
             approach = seen.approach
             time, beyond = deviation(seen.trace, approach, f"{axis}.x_a")
@@ -186,14 +186,14 @@ def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]])
 
 def stops_of(stops: Sequence[Sequence[Approach]]) -> list[tuple[str, int]]:
     """Axis and number of every stop that any source has."""
-    names = dict.fromkeys(approach.axis for found in stops for approach in found)
-    most = {axis: max(sum(each.axis == axis for each in found) for found in stops) for axis in names}
+    names = dict.fromkeys(approach.axis for stop in stops for approach in stop)
+    most = {axis: max(sum(approach.axis == axis for approach in stop) for stop in stops) for axis in names}
     return [(axis, number) for axis in names for number in range(most[axis])]
 
 
-def stop_seen(source: Source, found: Sequence[Approach], axis: str, number: int) -> Stop | None:
+def stop_seen(source: Source, approaches: Sequence[Approach], axis: str, number: int) -> Stop | None:
     """A stop of a source; None where it has not recorded it whole."""
-    own = [each for each in found if each.axis == axis]
+    own = [approach for approach in approaches if approach.axis == axis]
     position = source.curve(f"{axis}.x_a", "m")
     if number >= len(own) or position is None or not source.t[0] <= own[number].start < own[number].end < source.t[-1]:
         return None
@@ -204,14 +204,14 @@ def spectrum_picture(sources: Sequence[Source]) -> Picture | None:
     """Amplitude spectra of following error and torque of every axis, over the whole of each source."""
     panels = []
     for signal, words, factor, unit in SPECTRA:
-        found: dict[str, list[_Own]] = {}
+        result: dict[str, list[_Own]] = {}
         for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
             curves = [(k, _spectrum(source, f"{axis}.{signal}", factor)) for k, source in enumerate(sources)]
-            found[axis] = [(k, *curve) for k, curve in curves if curve is not None]
-        tops = {axis: max((float(a.max()) for *_, a in curves), default=0.0) for axis, curves in found.items()}
+            result[axis] = [(k, *curve) for k, curve in curves if curve is not None]
+        tops = {axis: max((float(a.max()) for *_, a in curves), default=0.0) for axis, curves in result.items()}
         for axis in _moved(tops):
             y = Axis("amplitude", unit, log=True, span=(DOWN * tops[axis], 2 * tops[axis]))
-            panels.append(Panel(f"Axis {axis}: {words}", FREQUENCY, y, _curves(sources, found[axis]), linked="f"))
+            panels.append(Panel(f"Axis {axis}: {words}", FREQUENCY, y, _curves(sources, result[axis]), linked="f"))
     caption = (
         f"Amplitude spectra over the whole of each source: Hann windows of {STRETCH:g} s, half over each other, "
         "averaged by power. A steady vibration stands there with its amplitude; what only rings now and then stands "

@@ -48,12 +48,12 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 def files_of(sources: Sequence[Source]) -> list[Path]:
     """Files that are read."""
-    found = []
+    paths = []
     for source in sources:
-        found += [source.recording.path]
+        paths += [source.recording.path]
         if source.figures:
-            found += [source.recording.path.with_name(OF_RESULT)]
-    return found
+            paths += [source.recording.path.with_name(OF_RESULT)]
+    return paths
 
 
 def lines(sources: Sequence[Source]) -> list[str]:
@@ -85,10 +85,10 @@ def answers(sources: Sequence[Source]) -> list[str]:
 
 def _changes(sources: Sequence[Source]) -> list[str]:
     """The leading figures from source to source, a sentence for each prefix; those that are alike are named last."""
-    found = _leading(sources)
+    leading = _leading(sources)
     said = []
-    for prefix in dict.fromkeys(name.partition(".")[0] for name in found):
-        own = {name: values for name, values in found.items() if name.partition(".")[0] == prefix}
+    for prefix in dict.fromkeys(name.partition(".")[0] for name in leading):
+        own = {name: values for name, values in leading.items() if name.partition(".")[0] == prefix}
         same = [_words(name) for name, values in own.items() if _alike(values)]
         changed = [f"{_words(name)} {_beside(values)}" for name, values in own.items() if not _alike(values)]
         text = ", ".join(changed)
@@ -138,7 +138,7 @@ def _three(value: tuple[float, str]) -> tuple[str, str]:
 
 def _words(name: str) -> str:
     key = name.partition(".")[2]
-    what = next(each for each in LEADING_FIGURES if key == each or (each.endswith("_") and key.startswith(each)))
+    what = next(name for name in LEADING_FIGURES if key == name or (name.endswith("_") and key.startswith(name)))
     return LEADING_FIGURES[what].format(key.removeprefix(what))
 
 
@@ -166,8 +166,8 @@ def _leading(sources: Sequence[Source]) -> dict[str, Values]:
     axes = {axis for source in sources for axis in source.axes}
     for name in dict.fromkeys(name for source in sources for name in source.figures):
         key = name.partition(".")[2]
-        for k, each in enumerate(LEADING_FIGURES):
-            if key == each or (each.endswith("_") and key.startswith(each) and key.removeprefix(each) in axes):
+        for k, text in enumerate(LEADING_FIGURES):
+            if key == text or (text.endswith("_") and key.startswith(text) and key.removeprefix(text) in axes):
                 places[name] = k
     order = sorted(places, key=lambda name: (name.partition(".")[0], places[name]))
     common = [name for name in order if all(name in source.figures for source in sources if source.figures)]
@@ -177,13 +177,13 @@ def _leading(sources: Sequence[Source]) -> dict[str, Values]:
 
 def _tiles(sources: Sequence[Source]) -> list[Tile]:
     """The leading figures before and after, those that have changed most first; none but of two sources."""
-    found = _leading(sources)
+    leading = _leading(sources)
     if len(sources) != 2:
         return []
-    order = sorted(found, key=lambda name: _alike(found[name]))
+    order = sorted(leading, key=lambda name: _alike(leading[name]))
     return [
         Tile(
-            minus(_beside(found[name]).partition(" (")[0].replace("->", "→").replace("um", "µm")),
+            minus(_beside(leading[name]).partition(" (")[0].replace("->", "→").replace("um", "µm")),
             f"{name.partition('.')[0]}: {_words(name)}",
             f"{name}, {sources[0].name} → {sources[1].name}",
         )
@@ -239,11 +239,11 @@ def _alignment(sources: Sequence[Source]) -> Section | None:
 
 def _stops(sources: Sequence[Source]) -> Section | None:
     """Every stop of an axis: overshoot and settling time of every source."""
-    found = stops(sources)
+    approaches = stops(sources)
     rows = []
-    for axis, number in stops_of(found):
-        seen = [stop_seen(source, own, axis, number) for source, own in zip(sources, found, strict=True)]
-        cells = [cell for each in seen for cell in _stop(each)]
+    for axis, number in stops_of(approaches):
+        seen = [stop_seen(source, own, axis, number) for source, own in zip(sources, approaches, strict=True)]
+        cells = [cell for stop in seen for cell in _stop(stop)]
         rows.append((f"{axis}, stop {number + 1}", *cells))
     if not rows:
         return None

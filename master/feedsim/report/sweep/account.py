@@ -143,29 +143,29 @@ class Account:
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
         """The parameters, with a value for every row of the table."""
-        found = []
+        result = []
         for column, parameter in zip(self.design.values.T, self.study.parameters, strict=True):
             values = column[self.runs]
             words = tuple(choice.label for choice in parameter.choices) if parameter.worded else ()
             unit = Scale(1.0, "") if words else scale(parameter.unit, values)
             column = values * unit.factor
-            found.append(
+            result.append(
                 Input(
                     name=parameter.name, scale=unit, values=column, drawn=self.drawn, parameter=parameter, words=words
                 )
             )
-        return tuple(found)
+        return tuple(result)
 
     @cached_property
     def outputs(self) -> tuple[Output, ...]:
         """The figures, in the order of the table."""
-        found = []
+        result = []
         for name in self.table.figures:
             values = np.asarray(self.table[name], dtype=np.float64)
             unit = scale(self.table.unit(name), values)
             nominal = self._nominal(name) * unit.factor
-            found.append(Output(name=name, scale=unit, values=values * unit.factor, drawn=self.drawn, nominal=nominal))
-        return tuple(found)
+            result.append(Output(name=name, scale=unit, values=values * unit.factor, drawn=self.drawn, nominal=nominal))
+        return tuple(result)
 
     def _nominal(self, name: str) -> float:
         known = self.record.get("nominal")
@@ -199,8 +199,8 @@ class Account:
     @property
     def processes(self) -> int | None:
         """Number of processes that made the runs; None where it is not known."""
-        told = self.record.get("processes")
-        return told if isinstance(told, int) and told > 0 else None
+        reported = self.record.get("processes")
+        return reported if isinstance(reported, int) and reported > 0 else None
 
     @property
     def efficiency(self) -> float | None:
@@ -211,23 +211,23 @@ class Account:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Of the study, of the runs (with their number), and of what the statistics leave out."""
-        found = [*self.study.warnings, *(str(each) for each in self.record.get("warnings", ()))]
+        result = [*self.study.warnings, *(str(entry) for entry in self.record.get("warnings", ()))]
         if self.table.partial:
-            found.append(f"The study is not finished: {len(self.table)} of {self.design.runs} runs are done.")
+            result.append(f"The study is not finished: {len(self.table)} of {self.design.runs} runs are done.")
         if self.failed:
-            found.append(
+            result.append(
                 f"{self.failed} of {len(self.table)} runs failed and have no figures; statistics are of the others."
             )
-        for each in self.outputs:
-            missing = int((self.ok & ~np.isfinite(each.values)).sum())
+        for output in self.outputs:
+            missing = int((self.ok & ~np.isfinite(output.values)).sum())
             if missing:
-                found.append(f"{each.name} could not be determined in {missing} of {int(self.ok.sum())} runs.")
-        told = kinds(str(text) for text in self.table["warnings"] if text)
-        for example, count in told.values():
+                result.append(f"{output.name} could not be determined in {missing} of {int(self.ok.sum())} runs.")
+        reported = kinds(str(text) for text in self.table["warnings"] if text)
+        for example, count in reported.values():
             head = f"{count} of {len(self.table)} runs"
             wrong = example.startswith(WRONG)
-            found.append(Wrong(f"{head}: {example[len(WRONG) :]}") if wrong else f"{head} warn: {example}")
-        return tuple(dict.fromkeys([*found, *self.sensitivities.warnings]))
+            result.append(Wrong(f"{head}: {example[len(WRONG) :]}") if wrong else f"{head} warn: {example}")
+        return tuple(dict.fromkeys([*result, *self.sensitivities.warnings]))
 
     @cached_property
     def best(self) -> tuple[Output, int] | None:
@@ -235,7 +235,7 @@ class Account:
         if self.study.goal is None:
             return None
         way, name = self.study.goal
-        output = next((each for each in self.outputs if each.name == name), None)
+        output = next((output for output in self.outputs if output.name == name), None)
         if output is None or not np.isfinite(output.values).any():
             return None
         return output, int((np.nanargmin if way == "smallest" else np.nanargmax)(output.values))
@@ -250,12 +250,12 @@ class Account:
         return "; ".join(map(self._place, failure.where))
 
     def _place(self, where: Where) -> str:
-        each = self.inputs[where.parameter]
-        shown = (", " if where.by_level else " to ").join(each.text(each.scale.factor * v) for v in where.values)
-        text = f"{each.name} {shown} {each.scale.shown_unit}".rstrip()
+        entry = self.inputs[where.parameter]
+        shown = (", " if where.by_level else " to ").join(entry.text(entry.scale.factor * v) for v in where.values)
+        text = f"{entry.name} {shown} {entry.scale.shown_unit}".rstrip()
         text += f" ({where.failed} of {where.there} runs there)"
         if where.medians is not None:
-            failed, done = (number(each.scale.factor * value) for value in where.medians)
+            failed, done = (number(entry.scale.factor * value) for value in where.medians)
             text += f", median {failed}, where runs are done {done}"
         return text
 
@@ -329,11 +329,11 @@ class Measure:
 
 def measures(account: Account) -> Mapping[str, Measure]:
     """Measure of every figure; where too many runs failed for Sobol indices, rank correlations stand in."""
-    found = account.sensitivities
+    results = account.sensitivities
     grid = account.study.sampling.method == "grid"
     result: dict[str, Measure] = {}
-    for name, trend in found.trends.items():
-        sobol = found.sobol.get(name)
+    for name, trend in results.trends.items():
+        sobol = results.sobol.get(name)
         if sobol is not None and not sobol.reason:
             result[name] = Measure(name, TOTAL, sobol.total, sobol.total_interval, sobol.first, sobol.first_interval)
         elif grid:

@@ -25,11 +25,11 @@ GOLDEN = 0.6180339887498949  # spreads points evenly beside a level
 def of_account(account: Account, output: Output, measure: Measure, stem: str) -> list[Picture]:
     """Both pictures, as far as there is something to show."""
     random = account.study.sampling.method != "grid"
-    found = (
+    result = (
         distribution_picture(output, account.inputs, measure, stem, random),
         scatter_picture(output, account.inputs, measure, stem, _best_row(account, output)),
     )
-    return [picture for picture in found if picture is not None]
+    return [picture for picture in result if picture is not None]
 
 
 def distribution_picture(
@@ -121,11 +121,11 @@ def _bar(name: str, rows: Array, values: Array, interval: Array | None, colour: 
         return []
     values, gaps = np.nan_to_num(values), np.full(len(rows), np.nan)
     along = np.column_stack([rows, rows, gaps]).ravel()
-    found = [Curve(name, np.column_stack([0 * values, values, gaps]).ravel(), along, colour, width=8.0)]
+    curves = [Curve(name, np.column_stack([0 * values, values, gaps]).ravel(), along, colour, width=8.0)]
     if interval is not None:
         ends = np.column_stack([interval, gaps]).ravel()
-        found.append(Curve("", ends, along, INK, width=1.2))
-    return found
+        curves.append(Curve("", ends, along, INK, width=1.2))
+    return curves
 
 
 def _moving(measure: Measure, left_out: int) -> str:
@@ -150,55 +150,55 @@ def scatter_picture(
     best: the row that is looked for, which is marked.
     """
     shown = [inputs[k] for k in measure.telling()[:MOST_PANELS] or range(len(inputs))[:MOST_PANELS]]
-    shown = [each for each in shown if len(np.unique(each.values)) > 1]
+    shown = [entry for entry in shown if len(np.unique(entry.values)) > 1]
     if not len(output.known) or not shown:
         return None
     missing = len(output.known) < len(output.sample)
     left_out = len(inputs) - len(shown)
     caption = "A point per run, a stroke at the foot one without a value" if missing else "A point per run"
     caption += "; the line is the running median"
-    caption += ", the marks the medians of each value" if any(len(each.levels) for each in shown) else ""
+    caption += ", the marks the medians of each value" if any(len(entry.levels) for entry in shown) else ""
     caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
     caption += " The ring is the run that is looked for." if best is not None else ""
-    chart = Chart([_panel(output, each, best) for each in shown], (1.0,) * min(PANELS, len(shown)))
+    chart = Chart([_panel(output, entry, best) for entry in shown], (1.0,) * min(PANELS, len(shown)))
     return Picture(f"scatter-{stem}", f"{output.name} over the parameters", caption, chart, worded=True)
 
 
-def _panel(output: Output, each: Input, best: int | None = None) -> Panel:
+def _panel(output: Output, entry: Input, best: int | None = None) -> Panel:
     """A figure over a parameter, a point per run, and at the foot a stroke per run without a value."""
     known = np.isfinite(output.sample)
-    x, y = each.sample[known].astype(float), output.sample[known]
-    without = each.sample[~known].astype(float)  # failed, or not determined
+    x, y = entry.sample[known].astype(float), output.sample[known]
+    without = entry.sample[~known].astype(float)  # failed, or not determined
     curves, marks = [], []
-    if len(each.levels):
-        at = np.searchsorted(each.levels, x)
+    if len(entry.levels):
+        at = np.searchsorted(entry.levels, x)
         curves.append(Curve("a run", at + _beside(len(at)), y, BLUE, width=1.4, dots=True, most=3000))
         marks = [
             Mark(float(k), float(np.median(y[at == k])), "", VERMILLION)
-            for k in range(len(each.levels))
+            for k in range(len(entry.levels))
             if np.any(at == k)
         ]
-        without = np.searchsorted(each.levels, without) + _beside(len(without))
+        without = np.searchsorted(entry.levels, without) + _beside(len(without))
         axis = Axis(
-            each.name,
-            each.scale.shown_unit,
-            names=[each.text(value) for value in each.levels],
-            span=(-0.6, len(each.levels) - 0.4),
+            entry.name,
+            entry.scale.shown_unit,
+            names=[entry.text(value) for value in entry.levels],
+            span=(-0.6, len(entry.levels) - 0.4),
         )
     else:
         curves.append(Curve("a run", x, y, BLUE, width=1.4, dots=True, most=3000))
         median = running_median(x, y)
         if len(median[0]):
             curves.append(Curve("running median", *median, VERMILLION, width=1.8))
-        axis = Axis(each.name, each.scale.shown_unit, log=each.logarithmic)
+        axis = Axis(entry.name, entry.scale.shown_unit, log=entry.logarithmic)
     if best is not None:
-        value = float(each.values[best])
-        place = float(np.searchsorted(each.levels, value)) if len(each.levels) else value
+        value = float(entry.values[best])
+        place = float(np.searchsorted(entry.levels, value)) if len(entry.levels) else value
         marks.append(Mark(place, float(output.values[best]), "", INK, hollow=True))
     low, reach = float(y.min()), float(np.ptp(y)) or 0.1 * abs(float(y.min())) or 1.0
     feet = (low - 0.07 * reach, low - 0.02 * reach)
     levels = [Level(at, upright=True, colour=VERMILLION, dash="", ends=feet) for at in without[:MOST_FEET].tolist()]
-    return Panel(each.name, axis, Axis(output.name, output.scale.shown_unit), curves, levels, marks=marks, height=1.1,
+    return Panel(entry.name, axis, Axis(output.name, output.scale.shown_unit), curves, levels, marks=marks, height=1.1,
                  note=f"{int((~known).sum())} without a value" if not known.all() else "")  # fmt: skip
 
 
@@ -219,15 +219,15 @@ def running_median(x: Array, y: Array) -> tuple[Array, Array]:
 
 def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
     """The figure over a grid of one or two parameters; None for other designs."""
-    inputs = [each for each in account.inputs if len(np.unique(each.values)) > 1]
+    inputs = [entry for entry in account.inputs if len(np.unique(entry.values)) > 1]
     if account.study.sampling.method != "grid" or not 1 <= len(inputs) <= 2 or not len(output.known):
         return None
-    title = f"{output.name} over {' and '.join(each.name for each in inputs)}"
+    title = f"{output.name} over {' and '.join(entry.name for entry in inputs)}"
     if len(inputs) == 1:
         chart = _lines(output, inputs[0], [("", inputs[0].values, output.values, BLUE)])
         return Picture(f"grid-{stem}", title, "A point per run.", chart, worded=True)
     first, second = inputs
-    few = [each for each in inputs if each.words and len(np.unique(each.values)) <= len(LINES)]
+    few = [entry for entry in inputs if entry.words and len(np.unique(entry.values)) <= len(LINES)]
     if few:  # words have no order that a map could show: a line each
         lines = few[-1]
         along = second if lines is first else first

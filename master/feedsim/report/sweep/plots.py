@@ -19,26 +19,26 @@ MOST_ROWS, MOST_COLUMNS = 30, 20  # of the overview
 
 def varying(account: Account) -> list[Output]:
     """Figures that are not the same in all runs."""
-    return [each for each in account.outputs if len(each.known) and not is_constant(each.known)]
+    return [output for output in account.outputs if len(output.known) and not is_constant(output.known)]
 
 
 def drawn(account: Account) -> list[Output]:
     """Figures that are drawn one by one: those that differ from run to run, the leading ones first."""
     known = varying(account)
-    leading = [each for each in known if is_leading(each.name, HEADER)]
-    return [*leading, *(each for each in known if each not in leading)][:MOST_FIGURES]
+    leading = [output for output in known if is_leading(output.name, HEADER)]
+    return [*leading, *(output for output in known if output not in leading)][:MOST_FIGURES]
 
 
 def pictures_of(account: Account) -> tuple[list[Picture], list[Picture]]:
     """Pictures of the whole study, and those of single figures."""
     overview = overview_picture(account)
-    found = measures(account)
+    result = measures(account)
     single: list[Picture] = []
     taken: set[str] = set()
     for output in drawn(account):
         stem = _stem(output.name, taken)
         over_grid = grid_picture(account, output, stem)
-        single += [over_grid] if over_grid is not None else of_account(account, output, found[output.name], stem)
+        single += [over_grid] if over_grid is not None else of_account(account, output, result[output.name], stem)
     return [overview] if overview is not None else [], single
 
 
@@ -55,20 +55,20 @@ def _stem(name: str, taken: set[str]) -> str:
 
 def overview_picture(account: Account) -> Picture | None:
     """The matrix in colours and numbers; None where there is nothing to compare."""
-    found = [each for each in measures(account).values() if each.known]
-    found = [each for each in found if each.kind == found[0].kind][:MOST_ROWS]
-    if not found or len(account.inputs) < 2:
+    result = [measure for measure in measures(account).values() if measure.known]
+    result = [measure for measure in result if measure.kind == result[0].kind][:MOST_ROWS]
+    if not result or len(account.inputs) < 2:
         return None
-    ranks = sorted(range(len(account.inputs)), key=lambda k: -max(each.size(k) for each in found))
+    ranks = sorted(range(len(account.inputs)), key=lambda k: -max(measure.size(k) for measure in result))
     columns = sorted(ranks[:MOST_COLUMNS])
     left_out = len(account.inputs) - len(columns)
     more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
-    values = np.array([[float(measure.values[k]) for k in columns] for measure in found])
-    bold = np.array([[measure.told(k) for k in columns] for measure in found])
-    if found[0].kind == TOTAL:
+    values = np.array([[float(measure.values[k]) for k in columns] for measure in result])
+    bold = np.array([[measure.told(k) for k in columns] for measure in result])
+    if result[0].kind == TOTAL:
         values = np.where(np.abs(values) < NOTHING, np.nan, values)
-    names, figures = [account.inputs[k].name for k in columns], [each.figure for each in found]
-    span = (-1.0, 1.0) if found[0].kind == RANK else (0.0, 1.0)
+    names, figures = [account.inputs[k].name for k in columns], [measure.figure for measure in result]
+    span = (-1.0, 1.0) if result[0].kind == RANK else (0.0, 1.0)
     chart = Chart([Grid("", names, figures, values, span, 2, bold)])
     title = "Which parameter moves which figure"
-    return Picture("sensitivities", title, found[0].caption + more, chart, worded=True)
+    return Picture("sensitivities", title, result[0].caption + more, chart, worded=True)

@@ -130,7 +130,7 @@ def _range_tiles(account: Account) -> Iterator[Tile]:
     """Of a study without a goal: least and greatest value of the figure that it asks about, or of the first one."""
     if account.best is not None or not (outputs := drawn(account)):
         return
-    output = next((each for each in outputs if each.name == account.study.explain), outputs[0])
+    output = next((output for output in outputs if output.name == account.study.explain), outputs[0])
     unit = output.scale.shown_unit
     for key, what in (("min", "smallest"), ("max", "largest")):
         yield Tile(f"{three(output.statistics[key])} {unit}".rstrip(), f"{what} {output.name}", f"{what} of all runs")
@@ -146,9 +146,9 @@ def _tiles(account: Account) -> Iterator[Tile]:
 
 def _goal_tiles(account: Account) -> Iterator[Tile]:
     """The best value, what the scenario has without changes, and what lies between them."""
-    if (found := account.best) is None:
+    if (result := account.best) is None:
         return
-    output, row = found
+    output, row = result
     unit, value = output.scale.shown_unit, float(output.values[row])
     way = account.study.goal[0] if account.study.goal else ""
     yield Tile(f"{three(value)} {unit}".rstrip(), f"{way} {output.name}, run {account.runs[row]}", "the run looked for")
@@ -168,43 +168,43 @@ def goal_words(account: Account) -> list[str]:
     if account.study.goal is None:
         return []
     way, name = account.study.goal
-    if (found := account.best) is None:
+    if (result := account.best) is None:
         return [f"{way.capitalize()} {name}: no run has this figure."]
-    output, row = found
+    output, row = result
     unit = output.scale.shown_unit
-    at = ", ".join(f"{each.name} {each.text(float(each.values[row]))} {each.scale.shown_unit}".rstrip()
-                   for each in account.inputs)  # fmt: skip
+    at = ", ".join(f"{entry.name} {entry.text(float(entry.values[row]))} {entry.scale.shown_unit}".rstrip()
+                   for entry in account.inputs)  # fmt: skip
     nominal = f"; the scenario unchanged has {three(output.nominal)} {unit}".rstrip()
     own = nominal if math.isfinite(output.nominal) else ""
-    edge = [each.name for each in account.inputs if _at_edge(each, row)]
+    edge = [entry.name for entry in account.inputs if _at_edge(entry, row)]
     more = f". It lies at the end of what was tried of {' and '.join(edge)}: try further" if edge else ""
     return [f"{way.capitalize()} {name}: {three(float(output.values[row]))} {unit}".rstrip()
             + f" in run {account.runs[row]}, with {at}{own}{more}."]  # fmt: skip
 
 
-def _at_edge(each: Input, row: int) -> bool:
+def _at_edge(entry: Input, row: int) -> bool:
     """Whether a run has the least or the greatest of a parameter's values, to a hundredth of their range."""
-    if each.words or (reach := float(np.ptp(each.values))) == 0:
+    if entry.words or (reach := float(np.ptp(entry.values))) == 0:
         return False
-    value = float(each.values[row])
-    return min(value - float(each.values.min()), float(each.values.max()) - value) <= EDGE * reach
+    value = float(entry.values[row])
+    return min(value - float(entry.values.min()), float(entry.values.max()) - value) <= EDGE * reach
 
 
 def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Picture | None:
     """The picture that belongs to the study's question: its figure over the parameters, or what moves it."""
     asked = account.study.explain or (account.study.goal[1] if account.study.goal else "")
     titles = (f"{asked} over the parameters", f"Distribution of {asked}")
-    own = [each for each in (*single, *whole) if asked and each.title in titles]
+    own = [picture for picture in (*single, *whole) if asked and picture.title in titles]
     begin = "distribution-" if account.study.explain else "scatter-"
-    first = next((each for each in own if each.stem.startswith(begin)), next(iter(own), None))
+    first = next((picture for picture in own if picture.stem.startswith(begin)), next(iter(own), None))
     return first.first_rows(LEAD_ROWS) if first is not None else None
 
 
 def _next(account: Account) -> Text:
     study = account.study
-    if (found := account.best) is not None:
+    if (result := account.best) is not None:
         return "The command that makes this run by itself:\n", code(f"feedsim sweep {typed(study.file)} --row "
-                                                                    f"{account.runs[found[1]]}")  # fmt: skip
+                                                                    f"{account.runs[result[1]]}")  # fmt: skip
     if not (outputs := drawn(account)):
         return ""
     name = study.explain or outputs[0].name
@@ -213,16 +213,16 @@ def _next(account: Account) -> Text:
 
 def answers(account: Account) -> list[str]:
     """The answer to the study's question; how far the leading figures scatter, and what moves them most."""
-    found, grid = measures(account), account.study.sampling.method == "grid"
+    result, grid = measures(account), account.study.sampling.method == "grid"
     lines = goal_words(account)
     asked = account.study.explain
-    shown = sorted(drawn(account), key=lambda each: each.name != asked)
+    shown = sorted(drawn(account), key=lambda output: output.name != asked)
     for output in shown[:MOST_ANSWERS]:
-        told, unit = output.statistics, output.scale.shown_unit
-        low, high = (three(told[key]) for key in (("min", "max") if grid else ("q5", "q95")))
+        reported, unit = output.statistics, output.scale.shown_unit
+        low, high = (three(reported[key]) for key in (("min", "max") if grid else ("q5", "q95")))
         spread = f"{low} to {high} {unit}".rstrip() + (" over the grid" if grid else " in nine of ten runs")
-        middle = "" if grid else f"{three(told['q50'])} {unit}".rstrip() + " in the median, "
-        lines.append(f"{output.name}: {middle}{spread}; {_strongest(account, found[output.name])}.")
+        middle = "" if grid else f"{three(reported['q50'])} {unit}".rstrip() + " in the median, "
+        lines.append(f"{output.name}: {middle}{spread}; {_strongest(account, result[output.name])}.")
     return lines
 
 
@@ -242,17 +242,17 @@ def _strongest(account: Account, measure: Measure) -> str:
 
 def _speed(account: Account) -> Iterator[tuple[str, str]]:
     """How fast the runs were made."""
-    rows, told = len(account.table), []
+    rows, reported = len(account.table), []
     if (wall := account.wall_time) is not None:
-        told.append(f"{rows / wall:.3g} runs per second")
+        reported.append(f"{rows / wall:.3g} runs per second")
     if rows:
-        told.append(f"{1e3 * account.busy / rows:.3g} ms per run")
+        reported.append(f"{1e3 * account.busy / rows:.3g} ms per run")
     if (processes := account.processes) is not None:
-        told.append(counted(processes, "process", "processes"))
+        reported.append(counted(processes, "process", "processes"))
     if (efficiency := account.efficiency) is not None:
-        told.append(f"{100 * efficiency:.0f} % of their time went into runs")
-    if told:
-        yield "Speed", ", ".join(told)
+        reported.append(f"{100 * efficiency:.0f} % of their time went into runs")
+    if reported:
+        yield "Speed", ", ".join(reported)
 
 
 def _not_drawn(account: Account) -> Paragraph | None:
@@ -263,33 +263,33 @@ def _not_drawn(account: Account) -> Paragraph | None:
 
 def _statistics(account: Account) -> Section | None:
     grid = account.study.sampling.method == "grid"
-    nominal = any(math.isfinite(each.nominal) for each in account.outputs)
+    nominal = any(math.isfinite(output.nominal) for output in account.outputs)
     rows: list[tuple[Text, ...]] = []
-    for each in account.outputs:
-        statistics = each.statistics
-        cells = [three(each.nominal)] if nominal else []
+    for entry in account.outputs:
+        statistics = entry.statistics
+        cells = [three(entry.nominal)] if nominal else []
         mean, std = statistics["mean"], statistics["std"]
-        cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(each.known), 1)))]
+        cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(entry.known), 1)))]
         cells.append(number(std, 4 if grid else 3))
         for share in QUANTILES:
-            value, ends = statistics[f"q{share}"], each.quantile_intervals[f"q{share}"]
+            value, ends = statistics[f"q{share}"], entry.quantile_intervals[f"q{share}"]
             cells.append(number(value) if grid else with_interval(value, ends))
-        cells += [number(statistics["min"]), number(statistics["max"]), str(len(each.known))]
-        rows.append((code(each.name), each.scale.shown_unit, *cells))
+        cells += [number(statistics["min"]), number(statistics["max"]), str(len(entry.known))]
+        rows.append((code(entry.name), entry.scale.shown_unit, *cells))
     heads = ("Figure", "Unit", *(("Nominal",) if nominal else ()),
              "Mean", "Std", "5 %", "50 %", "95 %", "Min", "Max", "Runs")  # fmt: skip
-    told = {
+    reported = {
         "grid": "On a grid the numbers describe the grid, no probability.",
         "sensitivity": "Here and in the pictures these are the runs of the samples A and B, which are independent; the "
         "others serve the Sobol indices.",
     }.get(account.study.sampling.method, "They are as good as the distributions of the parameters.")
     if not grid:
-        told += (
+        reported += (
             " In brackets the 95 % interval of a quantile, between two of the sorted values; none where the runs are "
             "too few."
         )
-    told += " Nominal: the scenario without changes." if nominal else ""
-    table = Table("ll" + "r" * (len(heads) - 2), heads, rows, f"Over the runs that have the figure. {told}")
+    reported += " Nominal: the scenario without changes." if nominal else ""
+    table = Table("ll" + "r" * (len(heads) - 2), heads, rows, f"Over the runs that have the figure. {reported}")
     return Section("Figures of all runs", [table], "figures") if rows else None
 
 
@@ -311,56 +311,56 @@ def rounded(value: float, doubt: float) -> str:
 
 def _sensitivities(account: Account) -> Section | None:
     """A table per drawn figure of what moves it; None where there is nothing."""
-    found = account.sensitivities
+    result = account.sensitivities
     parts: list[Part] = []
     for output in drawn(account):
-        sobol, trend = found.sobol.get(output.name), found.trends[output.name]
+        sobol, trend = result.sobol.get(output.name), result.trends[output.name]
         if sobol is not None and not sobol.reason:
-            body: list[Part] = [_sobol(found.parameters, sobol, trend)]
+            body: list[Part] = [_sobol(result.parameters, sobol, trend)]
         else:  # the cheap measures need no whole base points
             body = [Paragraph(f"No Sobol indices: {sobol.reason}.")] if sobol is not None else []
-            body.append(_trends(found.parameters, trend))
+            body.append(_trends(result.parameters, trend))
         parts.append(Section(output.name, body))
-    note = f"{SOBOL_NOTE} {TREND_NOTE}" if found.sobol else f"{TREND_NOTE} {SHARE_NOTE}"
+    note = f"{SOBOL_NOTE} {TREND_NOTE}" if result.sobol else f"{TREND_NOTE} {SHARE_NOTE}"
     return Section("What moves the figures", [Paragraph(note, "muted"), *parts], "sensitivities") if parts else None
 
 
-def _sobol(names: tuple[str, ...], found: Indices, trend: Trends) -> Table:
-    order = sorted(range(len(names)), key=lambda k: (-found.total[k], k))
+def _sobol(names: tuple[str, ...], indices: Indices, trend: Trends) -> Table:
+    order = sorted(range(len(names)), key=lambda k: (-indices.total[k], k))
     rows = [
-        (names[k], _two(found.first[k]), _span(found.first_interval[k]), _two(found.total[k]),
-         _span(found.total_interval[k]), _two(trend.rank_correlation[k]), _two(trend.regression[k]))
+        (names[k], _two(indices.first[k]), _span(indices.first_interval[k]), _two(indices.total[k]),
+         _span(indices.total_interval[k]), _two(trend.rank_correlation[k]), _two(trend.regression[k]))
         for k in order
     ]  # fmt: skip
-    rows.append(("all", _two(found.first.sum()), "", _two(found.total.sum()), "", "", ""))
+    rows.append(("all", _two(indices.first.sum()), "", _two(indices.total.sum()), "", "", ""))
     heads = ("Parameter", "First order", "95 %", "Total", "95 %", "Rank correlation", "Regression")
-    points = f"{found.used} base points" + (f", {found.left_out} left out" if found.left_out else "")
+    points = f"{indices.used} base points" + (f", {indices.left_out} left out" if indices.left_out else "")
     return Table("lrrrrrr", heads, rows, f"{points}. Of the samples A and B: {_fit(trend)}")
 
 
-def _trends(names: tuple[str, ...], found: Trends) -> Part:
-    if found.reason:
-        return Paragraph(f"No measures: {found.reason}.")
-    order = sorted(range(len(names)), key=lambda k: (-_size(found, k), k))
-    columns = (found.rank_correlation, found.regression, found.share)
+def _trends(names: tuple[str, ...], trends: Trends) -> Part:
+    if trends.reason:
+        return Paragraph(f"No measures: {trends.reason}.")
+    order = sorted(range(len(names)), key=lambda k: (-_size(trends, k), k))
+    columns = (trends.rank_correlation, trends.regression, trends.share)
     rows = [(names[k], *(_two(column[k]) for column in columns)) for k in order]
-    return Table("lrrr", ("Parameter", "Rank correlation", "Regression", "Share"), rows, _fit(found))
+    return Table("lrrr", ("Parameter", "Rank correlation", "Regression", "Share"), rows, _fit(trends))
 
 
-def _fit(found: Trends) -> str:
+def _fit(trends: Trends) -> str:
     """What the cheap measures are worth."""
-    if found.reason:
-        return f"no rank correlations: {found.reason}."
+    if trends.reason:
+        return f"no rank correlations: {trends.reason}."
     explained = (
-        f"the regression explains {100 * found.explained:.3g} % of the scatter (R²)"
-        if math.isfinite(found.explained)
+        f"the regression explains {100 * trends.explained:.3g} % of the scatter (R²)"
+        if math.isfinite(trends.explained)
         else "no regression"
     )
-    return f"{found.used} runs; {explained}; rank correlations up to ±{number(found.noise, 2)} can be chance."
+    return f"{trends.used} runs; {explained}; rank correlations up to ±{number(trends.noise, 2)} can be chance."
 
 
-def _size(found: Trends, k: int) -> float:
-    sizes = [abs(each[k]) for each in (found.share, found.rank_correlation) if math.isfinite(each[k])]
+def _size(trends: Trends, k: int) -> float:
+    sizes = [abs(values[k]) for values in (trends.share, trends.rank_correlation) if math.isfinite(values[k])]
     return float(sizes[0]) if sizes else 0.0
 
 
@@ -374,12 +374,12 @@ def _span(interval: Array) -> str:
 
 def _failures(account: Account) -> Section | None:
     rows = []
-    for each in account.failures[:MOST_FAILURES]:
-        numbers = ", ".join(str(run) for run in each.runs[:MOST_RUNS])
-        more = f" and {len(each.runs) - MOST_RUNS} more" if len(each.runs) > MOST_RUNS else ""
-        rows.append((str(len(each.runs)), each.message, account.where(each), numbers + more))
-    left = len(account.failures) - MOST_FAILURES
-    note = FAILURES_NOTE + (f" {left} more kinds of messages in the table." if left > 0 else "")
+    for failure in account.failures[:MOST_FAILURES]:
+        numbers = ", ".join(str(run) for run in failure.runs[:MOST_RUNS])
+        more = f" and {len(failure.runs) - MOST_RUNS} more" if len(failure.runs) > MOST_RUNS else ""
+        rows.append((str(len(failure.runs)), failure.message, account.where(failure), numbers + more))
+    remaining = len(account.failures) - MOST_FAILURES
+    note = FAILURES_NOTE + (f" {remaining} more kinds of messages in the table." if remaining > 0 else "")
     table = Table("rpll", ("Runs", "Message (of the first)", "Where", "Numbers"), rows, note)
     return Section("Failed runs", [table], "failed") if rows else None
 
@@ -387,34 +387,38 @@ def _failures(account: Account) -> Section | None:
 def _parameters(account: Account) -> Section:
     """What was varied: keys, distributions with their numbers, and what was drawn."""
     rows: list[tuple[Text, ...]] = []
-    for each in account.inputs:
-        if each.words:
-            span = ", ".join(each.words)
+    for entry in account.inputs:
+        if entry.words:
+            span = ", ".join(entry.words)
         else:
-            span = f"{number(each.values.min())} to {number(each.values.max())}" if len(each.values) else ""
-        keys = tuple(part for key in each.parameter.keys for part in ("\n", code(key)))[1:]
-        rows.append((each.name, keys, law(each), minus(span), each.scale.shown_unit))
+            span = f"{number(entry.values.min())} to {number(entry.values.max())}" if len(entry.values) else ""
+        keys = tuple(part for key in entry.parameter.keys for part in ("\n", code(key)))[1:]
+        rows.append((entry.name, keys, law(entry), minus(span), entry.scale.shown_unit))
     heads = ("Parameter", "Key", "Distribution", "Drawn", "Unit")
     return Section("Parameters", [Table("lllll", heads, rows)], "parameters")
 
 
-def law(each: Input) -> str:
+def law(entry: Input) -> str:
     """What a parameter is distributed like: "factor, normal, mean 1, deviation 0.07, from 0.85, to 1.2"."""
-    found = each.parameter.distribution
-    told = ["factor"] if each.parameter.factor else []
-    if found is None:
-        return ", ".join([*told, f"one of {len(each.parameter.choices)} values"])
-    middle = sum(found.support) / 2 if found.mode is None else found.mode
-    mode = middle if found.kind == "triangular" else None
-    told.append(found.kind)
+    result = entry.parameter.distribution
+    reported = ["factor"] if entry.parameter.factor else []
+    if result is None:
+        return ", ".join([*reported, f"one of {len(entry.parameter.choices)} values"])
+    middle = sum(result.support) / 2 if result.mode is None else result.mode
+    mode = middle if result.kind == "triangular" else None
+    reported.append(result.kind)
     for word, value in (
-        ("mean", found.mean), ("deviation", found.deviation), ("from", found.low), ("mode", mode), ("to", found.high)
-    ):  # fmt: skip
+        ("mean", result.mean),
+        ("deviation", result.deviation),
+        ("from", result.low),
+        ("mode", mode),
+        ("to", result.high),
+    ):
         if value is not None and math.isfinite(value):
-            told.append(f"{word} {number(value * each.scale.factor)}")
-    if found.count is not None:
-        told.append(f"{found.count} values")
-    return ", ".join(told)
+            reported.append(f"{word} {number(value * entry.scale.factor)}")
+    if result.count is not None:
+        reported.append(f"{result.count} values")
+    return ", ".join(reported)
 
 
 def _provenance(account: Account) -> Section:

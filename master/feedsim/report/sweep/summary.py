@@ -30,7 +30,7 @@ def summary(account: Account, files: Sequence[str], answer: Sequence[str] = ()) 
 
     answer: the lines that the report begins with.
     """
-    study, scenario, found = account.study, account.study.base.scenario, account.sensitivities
+    study, scenario, result = account.study, account.study.base.scenario, account.sensitivities
     return {
         "format": FORMAT,
         "answer": list(answer),
@@ -47,28 +47,33 @@ def summary(account: Account, files: Sequence[str], answer: Sequence[str] = ()) 
         "machine": {"name": scenario.machine.name, "note": scenario.machine.note},
         "runs": {"asked": account.design.runs, "done": len(account.table), "failed": account.failed},
         "parameters": {
-            each.name: {"keys": list(each.parameter.keys), "unit": each.parameter.unit, "words": list(each.words)}
-            for each in account.inputs
+            entry.name: {"keys": list(entry.parameter.keys), "unit": entry.parameter.unit, "words": list(entry.words)}
+            for entry in account.inputs
         },
         "figures": {
-            each.name: {
-                "unit": account.table.unit(each.name),
-                "runs": len(each.known),
-                "missing": int((account.ok & ~np.isfinite(each.values)).sum()),
-                "nominal": finite(each.nominal / each.scale.factor),
-                **{key: finite(value / each.scale.factor) for key, value in each.statistics.items()},
+            output.name: {
+                "unit": account.table.unit(output.name),
+                "runs": len(output.known),
+                "missing": int((account.ok & ~np.isfinite(output.values)).sum()),
+                "nominal": finite(output.nominal / output.scale.factor),
+                **{key: finite(value / output.scale.factor) for key, value in output.statistics.items()},
                 **{
-                    f"{key}_interval": _interval(np.asarray(ends) / each.scale.factor)
-                    for key, ends in each.quantile_intervals.items()
+                    f"{key}_interval": _interval(np.asarray(ends) / output.scale.factor)
+                    for key, ends in output.quantile_intervals.items()
                 },
             }
-            for each in account.outputs
+            for output in account.outputs
         },
-        "sobol_indices": {name: _indices(found.parameters, each) for name, each in found.sobol.items()},
-        "trends": {name: _trends(found.parameters, each) for name, each in found.trends.items()},
+        "sobol_indices": {name: _indices(result.parameters, indices) for name, indices in result.sobol.items()},
+        "trends": {name: _trends(result.parameters, trend) for name, trend in result.trends.items()},
         "failures": [
-            {"message": each.message, "count": len(each.runs), "runs": list(each.runs), "where": account.where(each)}
-            for each in account.failures
+            {
+                "message": failure.message,
+                "count": len(failure.runs),
+                "runs": list(failure.runs),
+                "where": account.where(failure),
+            }
+            for failure in account.failures
         ],
         "inputs": inputs_part(study_files(account)),
         "software": software(),
@@ -82,36 +87,36 @@ def summary(account: Account, files: Sequence[str], answer: Sequence[str] = ()) 
     }
 
 
-def _indices(names: Sequence[str], found: Indices) -> dict[str, Any]:
+def _indices(names: Sequence[str], indices: Indices) -> dict[str, Any]:
     return {
-        "reason": found.reason,
-        "points": found.used,
-        "left_out": found.left_out,
+        "reason": indices.reason,
+        "points": indices.used,
+        "left_out": indices.left_out,
         "confidence": CONFIDENCE,
         "parameters": {
             name: {
-                "first": finite(found.first[k]),
-                "first_interval": _interval(found.first_interval[k]),
-                "total": finite(found.total[k]),
-                "total_interval": _interval(found.total_interval[k]),
+                "first": finite(indices.first[k]),
+                "first_interval": _interval(indices.first_interval[k]),
+                "total": finite(indices.total[k]),
+                "total_interval": _interval(indices.total_interval[k]),
             }
             for k, name in enumerate(names)
         },
     }
 
 
-def _trends(names: Sequence[str], found: Trends) -> dict[str, Any]:
+def _trends(names: Sequence[str], trends: Trends) -> dict[str, Any]:
     return {
-        "reason": found.reason,
-        "runs": found.used,
-        "left_out": found.left_out,
-        "explained": finite(found.explained),
-        "noise": finite(found.noise),
+        "reason": trends.reason,
+        "runs": trends.used,
+        "left_out": trends.left_out,
+        "explained": finite(trends.explained),
+        "noise": finite(trends.noise),
         "parameters": {
             name: {
-                "rank_correlation": finite(found.rank_correlation[k]),
-                "regression": finite(found.regression[k]),
-                "share": finite(found.share[k]),
+                "rank_correlation": finite(trends.rank_correlation[k]),
+                "regression": finite(trends.regression[k]),
+                "share": finite(trends.share[k]),
             }
             for k, name in enumerate(names)
         },

@@ -27,14 +27,14 @@ PARALLEL = 1e-6
 
 def contradictions(structure: GeometryStructure) -> Faults:
     """Place and message of everything in a structure that cannot be or cannot go together."""
-    found = [*_materials(structure), *_motions(structure)]
+    result = [*_materials(structure), *_motions(structure)]
     for name, body in structure.bodies.items():
-        found += _body(structure, name, body)
+        result += _body(structure, name, body)
     for name in structure.axes:
-        found += _drive(structure, name)
-    found += _tool(structure)
-    yield from found
-    if not found:  # what can be asked only of names that are known
+        result += _drive(structure, name)
+    result += _tool(structure)
+    yield from result
+    if not result:  # what can be asked only of names that are known
         yield from _loose_nodes(structure)
         for name in structure.axes:
             yield from _along_screw(structure, name)
@@ -146,14 +146,14 @@ def _known(
     structure: GeometryStructure, body: str, texts: Sequence[str], place: Place
 ) -> tuple[tuple[Node, ...], list[tuple[Place, str]]]:
     """Nodes of a body that are named, and what is wrong with the names."""
-    found: list[Node] = []
+    result: list[Node] = []
     faults: list[tuple[Place, str]] = []
     for text in texts:
         try:
-            found += nodes(structure, body, text)
+            result += nodes(structure, body, text)
         except InputError as error:
             faults.append((place, str(error)))
-    return tuple(found), faults
+    return tuple(result), faults
 
 
 def _length(structure: GeometryStructure, place: Place, first: Node, second: Node) -> Faults:
@@ -224,17 +224,17 @@ def _frame(structure: GeometryStructure, place: Place, body: str, axis: str = ""
 def _held(structure: GeometryStructure, hold: _Hold) -> Faults:
     """Names are known; nodes of one mean move alike, and as the point does that they hold."""
     try:
-        found = held(structure, hold.texts)
+        result = held(structure, hold.texts)
     except InputError as error:
         yield hold.place, str(error)
         return
-    ways = {body: _ways(structure, body) for body in found.bodies}
-    body = found.bodies[0]
+    ways = {body: _ways(structure, body) for body in result.bodies}
+    body = result.bodies[0]
     if other := [name for name in ways if ways[name] != ways[body]]:
         yield hold.place, f"{_moving(structure, body)}, {_moving(structure, other[0])}; nodes of a mean must move alike"
     elif hold.axis is not None and (hold.axis in ways[body]) != hold.moves:
         yield hold.place, f"{_moving(structure, body)}; it {'must' if hold.moves else 'must not'} move with {hold.axis}"
-    elif found.rail is None and hold.frame in structure.bodies and ways[body] != _ways(structure, hold.frame):
+    elif result.rail is None and hold.frame in structure.bodies and ways[body] != _ways(structure, hold.frame):
         both = f"{_moving(structure, body)}, {_moving(structure, hold.frame)}"
         yield hold.place, f"{both}; what holds a point must move as the body does in whose frame the point is given"
 
@@ -307,10 +307,10 @@ def _along_screw(structure: GeometryStructure, name: str) -> Faults:
 
 
 def _origin(structure: GeometryStructure, body: str, pose: Mapping[str, float]) -> list[float]:
-    found = list(structure.bodies[body].origin)
+    values = list(structure.bodies[body].origin)
     for axis in structure.bodies[body].moves_with:
-        found = [a + pose[axis] * b for a, b in zip(found, structure.axes[axis].direction, strict=True)]
-    return found
+        values = [a + pose[axis] * b for a, b in zip(values, structure.axes[axis].direction, strict=True)]
+    return values
 
 
 def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:

@@ -47,10 +47,10 @@ def node(structure: GeometryStructure, text: str) -> Node:
     """The node that "column.top" or "bed.rail.3" means. InputError: there is none."""
     body, _, inner = text.partition(".")
     _body(structure, body)
-    found = nodes(structure, body, inner)
-    if len(found) > 1:
-        raise InputError(f"{text!r} is a line of {len(found)} nodes; one of them is needed, such as {text}.0")
-    return found[0]
+    result = nodes(structure, body, inner)
+    if len(result) > 1:
+        raise InputError(f"{text!r} is a line of {len(result)} nodes; one of them is needed, such as {text}.0")
+    return result[0]
 
 
 def nodes(structure: GeometryStructure, body: str, text: str) -> tuple[Node, ...]:
@@ -89,10 +89,10 @@ def held(structure: GeometryStructure, texts: Sequence[str]) -> Held:
         raise InputError(f"'rail {rails[0]}' stands alone, not in a list")
     if rails:
         return Held((), rail(structure, rails[0]))
-    found = tuple(node(structure, text) for text in texts)
-    if twice := [item for item in found if found.count(item) > 1]:
+    result = tuple(node(structure, text) for text in texts)
+    if twice := [item for item in result if result.count(item) > 1]:
         raise InputError(f"{twice[0]} is listed twice")
-    return Held(found, None)
+    return Held(result, None)
 
 
 def position(structure: GeometryStructure, item: Node) -> tuple[float, ...]:

@@ -47,14 +47,14 @@ def numbers(
     count = entry.count
     if grid and whole and count is None:
         count = max(2, round(values["to"] - values["from"]) + 1)
-    found = Distribution(
+    result = Distribution(
         kind, values.get("from"), values.get("to"), values.get("mean"), values.get("deviation"), values.get("mode"),
         count,
     )  # fmt: skip
-    problems = _contradictions(found)
+    problems = _contradictions(result)
     if whole and not problems:
-        problems = _not_whole(found)
-    return (None, problems) if problems else (found, [])
+        problems = _not_whole(result)
+    return (None, problems) if problems else (result, [])
 
 
 def _for_the_study(kind: Kind, count: int | None, grid: bool, whole: bool) -> list[Problem]:
@@ -71,53 +71,59 @@ def _for_the_study(kind: Kind, count: int | None, grid: bool, whole: bool) -> li
     return []
 
 
-def _contradictions(found: Distribution) -> list[Problem]:
-    low, high, mean, deviation = found.low, found.high, found.mean, found.deviation
+def _contradictions(distribution: Distribution) -> list[Problem]:
+    low, high, mean, deviation = distribution.low, distribution.high, distribution.mean, distribution.deviation
     problems: list[Problem] = []
     if low is not None and high is not None and not low < high:
         problems.append((("to",), f"{high:.9g} is not more than from, {low:.9g} (in SI)"))
-    elif low is not None and low <= 0 and (found.kind == "loguniform" or (found.kind == "lognormal" and low < 0)):
-        least = "more than" if found.kind == "loguniform" else "at least"
-        problems.append((("from",), f"{low:.9g}; of a {found.kind} distribution {least} 0"))
-    elif found.mode is not None and low is not None and high is not None and not low <= found.mode <= high:
-        problems.append((("mode",), f"{found.mode:.9g} is not between from and to (in SI)"))
+    elif (
+        low is not None
+        and low <= 0
+        and (distribution.kind == "loguniform" or (distribution.kind == "lognormal" and low < 0))
+    ):
+        least = "more than" if distribution.kind == "loguniform" else "at least"
+        problems.append((("from",), f"{low:.9g}; of a {distribution.kind} distribution {least} 0"))
+    elif (
+        distribution.mode is not None and low is not None and high is not None and not low <= distribution.mode <= high
+    ):
+        problems.append((("mode",), f"{distribution.mode:.9g} is not between from and to (in SI)"))
     if mean is None or deviation is None:
         return problems
     if deviation <= 0:
         problems.append((("deviation",), f"{deviation:.9g} is outside the allowed range: more than 0"))
-    elif found.kind == "lognormal" and mean <= 0:
+    elif distribution.kind == "lognormal" and mean <= 0:
         problems.append((("mean",), f"{mean:.9g}; that of a lognormal distribution is more than 0"))
     elif low is not None and low > mean + FARTHEST * deviation:
         problems.append((("from",), "more than 8 deviations above the mean: nothing is left of the distribution"))
     elif high is not None and high < mean - FARTHEST * deviation:
         problems.append((("to",), "more than 8 deviations below the mean: nothing is left of the distribution"))
-    elif found.kind == "lognormal" and high is not None and high <= 0:
+    elif distribution.kind == "lognormal" and high is not None and high <= 0:
         problems.append((("to",), "nothing is left of the distribution: a lognormal one is above 0"))
     return problems
 
 
-def _not_whole(found: Distribution) -> list[Problem]:
-    assert found.low is not None
-    assert found.high is not None
-    for key, value in (("from", found.low), ("to", found.high)):
+def _not_whole(distribution: Distribution) -> list[Problem]:
+    assert distribution.low is not None
+    assert distribution.high is not None
+    for key, value in (("from", distribution.low), ("to", distribution.high)):
         if not value.is_integer():
             return [((key,), f"{value:.9g} is no whole number")]
-    if found.count is not None and (found.high - found.low) % (found.count - 1):
-        between = f"{found.low:.0f} to {found.high:.0f}"
-        return [(("count",), f"{found.count} even steps from {between} are no whole numbers")]
+    if distribution.count is not None and (distribution.high - distribution.low) % (distribution.count - 1):
+        between = f"{distribution.low:.0f} to {distribution.high:.0f}"
+        return [(("count",), f"{distribution.count} even steps from {between} are no whole numbers")]
     return []
 
 
-def outside(found: Distribution, low: float, high: float) -> float:
+def outside(distribution: Distribution, low: float, high: float) -> float:
     """Probability that a normal or lognormal distribution, as it is cut, is below `low` or above `high`.
 
     0 for distributions of other kinds: their limits themselves are checked.
     """
-    if found.mean is None or found.deviation is None:
+    if distribution.mean is None or distribution.deviation is None:
         return 0.0
-    lognormal = found.kind == "lognormal"
-    deviation = sqrt(log1p((found.deviation / found.mean) ** 2)) if lognormal else found.deviation
-    mean = log(found.mean) - deviation**2 / 2 if lognormal else found.mean
+    lognormal = distribution.kind == "lognormal"
+    deviation = sqrt(log1p((distribution.deviation / distribution.mean) ** 2)) if lognormal else distribution.deviation
+    mean = log(distribution.mean) - deviation**2 / 2 if lognormal else distribution.mean
 
     def distance(value: float) -> float:
         """From the mean, in deviations times the root of two."""
@@ -131,7 +137,7 @@ def outside(found: Distribution, low: float, high: float) -> float:
     def above(value: float) -> float:
         return erfc(distance(value)) / 2
 
-    least, most = found.support
+    least, most = distribution.support
     all_of_it = 1 - below(least) - above(most)
     out = max(0.0, below(low) - below(least)) + max(0.0, above(high) - above(most))
     return min(1.0, out / all_of_it) if all_of_it > 0 else 0.0

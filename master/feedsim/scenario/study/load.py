@@ -50,9 +50,9 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
     if base is not None and entry is not None:
         reader = Reader(source, base, entry.sampling.method == "grid")
         for name, given in entry.parameters.items():
-            found = reader.read(name, given)
-            if found is not None:
-                parameters[name] = found
+            parameter = reader.read(name, given)
+            if parameter is not None:
+                parameters[name] = parameter
         files += reader.files
         faults += [*reader.faults, *_overlaps(source, reader)]
         faults += _pattern_faults(source, entry, base, parameters)
@@ -120,7 +120,7 @@ def _middle(base: Base, parameters: tuple[Parameter, ...]) -> list[str]:
 
 def _overlaps(source: Source, reader: Reader) -> list[str]:
     """Parameters that set the same place, or a place inside one that another replaces later."""
-    found = []
+    result = []
     for (one, first), (two, second) in combinations(reader.targets.items(), 2):
         for a, b in ((a.place, b.place) for a in first for b in second):
             inner, outer = (a, b) if len(a) > len(b) else (b, a)
@@ -137,9 +137,9 @@ def _overlaps(source: Source, reader: Reader) -> list[str]:
                 message = f"{two} multiplies {dotted(b)}, which {one} replaces with all of {dotted(a)}"
             else:
                 continue
-            found.append(describe(source, who, message))
+            result.append(describe(source, who, message))
             break
-    return found
+    return result
 
 
 def _sampling(
@@ -215,7 +215,7 @@ def _pattern_faults(source: Source, entry: StudyFile, base: Base, parameters: Ma
     ] + [
         describe(source, place, f"{name!r} is not among `figures`: {', '.join(entry.figures)}")
         for place, name in asked
-        if place[0] != "figures" and entry.figures and not any(fnmatchcase(name, each) for each in entry.figures)
+        if place[0] != "figures" and entry.figures and not any(fnmatchcase(name, figure) for figure in entry.figures)
     ]
 
 
@@ -229,7 +229,7 @@ def _goal(entry: StudyFile) -> tuple[str, str] | None:
 
 def _all_beginnings(base: Base, parameters: Iterable[Parameter]) -> set[str] | None:
     """What comes before the first dot of the figures, with all choices of the parameters; None: not known."""
-    found = _beginnings(base.scenario)
+    beginnings = _beginnings(base.scenario)
     for parameter in parameters:
         if not parameter.worded or not _decides(parameter.keys):
             continue
@@ -240,8 +240,8 @@ def _all_beginnings(base: Base, parameters: Iterable[Parameter]) -> set[str] | N
                 changed = _beginnings(base.with_changes(changes_of((parameter,), (float(i),))))
             except InputError:
                 return None
-            found = None if found is None or changed is None else found | changed
-    return found
+            beginnings = None if beginnings is None or changed is None else beginnings | changed
+    return beginnings
 
 
 def _decides(keys: Iterable[str]) -> bool:
@@ -252,15 +252,15 @@ def _decides(keys: Iterable[str]) -> bool:
 def _beginnings(scenario: Scenario) -> set[str] | None:
     planes: list[Sequence[str]] = [motion.plane for motion in scenario.motions if isinstance(motion, Circle)]
     recorded = any(isinstance(motion, MeasuredSetpoints) for motion in scenario.motions)
-    found = set[str]()
+    result = set[str]()
     for item in scenario.evaluate:
         if isinstance(item, Positioning):
-            found.add(item.axis)
+            result.add(item.axis)
         elif recorded:
             return None
         else:
-            found |= {("" if all(len(axis) == 1 for axis in plane) else "-").join(plane) for plane in planes}
-    return found
+            result |= {("" if all(len(axis) == 1 for axis in plane) else "-").join(plane) for plane in planes}
+    return result
 
 
 def _may_match(pattern: str, beginning: str) -> bool:

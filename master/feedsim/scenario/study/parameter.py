@@ -51,13 +51,13 @@ class Reader:
         """The parameter; None where something is wrong with it."""
         before = len(self.faults)
         try:
-            found = self._read(name, entry)
+            parameter = self._read(name, entry)
         except _Told:
             return None
         except InputError as error:
             self.faults += error.problems
             return None
-        return found if len(self.faults) == before else None
+        return parameter if len(self.faults) == before else None
 
     def _read(self, name: str, entry: ParameterEntry) -> Parameter:
         targets = self.targets[name] = list(self._reached(name, entry))
@@ -85,10 +85,10 @@ class Reader:
             here = self._at(name, "key", *([i] if len(entry.keys) > 1 else []))
             where = f"{self.source.mark(here).where}: {dotted(here)}"
             scratch = self.base.settled.source.copy()
-            found = list(changes.places(scratch, Scenario, key, Mark(where, Path())))
-            if not found:
+            result = list(changes.places(scratch, Scenario, key, Mark(where, Path())))
+            if not result:
                 raise InputError(f"{where}: {key} reaches nothing in {self.base.draft.path}")
-            for place in found:
+            for place in result:
                 if place not in seen:
                     seen.add(place)
                     parent = shape.expected(Scenario, scratch.data, place[:-1])
@@ -101,16 +101,16 @@ class Reader:
 
     def _common_unit(self, name: str, targets: list[Target]) -> str:
         """SI unit that all targets share."""
-        found = ["1" if target.quantity is None else target.quantity.unit for target in targets]
-        for target, unit in zip(targets, found, strict=True):
-            if units.unit(unit).dimension != units.unit(found[0]).dimension or target.whole != targets[0].whole:
+        result = ["1" if target.quantity is None else target.quantity.unit for target in targets]
+        for target, unit in zip(targets, result, strict=True):
+            if units.unit(unit).dimension != units.unit(result[0]).dimension or target.whole != targets[0].whole:
                 first, other = dotted(targets[0].place), dotted(target.place)
                 kinds = [
                     "a whole number" if t.whole else units.article(t.quantity.kind) if t.quantity else "no number"
                     for t in (targets[0], target)
                 ]
                 raise self._fault(name, ("key",), f"{first} is {kinds[0]}, {other} is {kinds[1]}")
-        return found[0]
+        return result[0]
 
     def _distribution(self, name: str, entry: ParameterEntry, quantity: Quantity, whole: bool) -> Distribution:
         def read(key: str, value: Any) -> float:
@@ -131,11 +131,11 @@ class Reader:
                     self.faults += error.problems
         if len(values) < sum(value is not None for value in written.values()):
             raise _Told
-        found, problems = numbers(entry, values, self.grid, whole)
+        distribution, problems = numbers(entry, values, self.grid, whole)
         self.faults += [describe(self.source, self._at(name, *key), message) for key, message in problems]
-        if found is None:
+        if distribution is None:
             raise _Told
-        return found
+        return distribution
 
     def _factor(self, name: str, entry: ParameterEntry, targets: list[Target]) -> Parameter:
         origins = []
@@ -217,19 +217,23 @@ class Reader:
         self.files += [file for target in targets for file in data_files(draft.source, target.place)]
         return at(draft.source.data, targets[0].place)
 
-    def _check_range(self, name: str, entry: ParameterEntry, target: Target, found: Distribution, times: float) -> None:
-        for key, bound, written in (("from", found.low, entry.low), ("to", found.high, entry.high)):
+    def _check_range(
+        self, name: str, entry: ParameterEntry, target: Target, distribution: Distribution, times: float
+    ) -> None:
+        for key, bound, written in (("from", distribution.low, entry.low), ("to", distribution.high, entry.high)):
             if bound is not None and target.quantity is not None:
                 self._check_one(name, (key,), target, bound, times, f"{written}")
             elif bound is not None and not _fits(target, int(bound), self.base.settled.source):
                 self._explain(name, (key,), [Change(dotted(target.place), f"{bound:.0f}", int(bound))])
         if target.quantity is not None and times != 0.0:
-            self._doubt_range(name, target, target.quantity, found, times)
+            self._doubt_range(name, target, target.quantity, distribution, times)
 
-    def _doubt_range(self, name: str, target: Target, quantity: Quantity, found: Distribution, times: float) -> None:
+    def _doubt_range(
+        self, name: str, target: Target, quantity: Quantity, distribution: Distribution, times: float
+    ) -> None:
         """Warn of a distribution that is not cut and leads out of the allowed range."""
         low, high = sorted((max(quantity.minimum, quantity.above) / times, quantity.maximum / times))
-        share = outside(found, low, high)
+        share = outside(distribution, low, high)
         if share >= RARE:
             self.warnings.append(
                 describe(
@@ -254,8 +258,8 @@ class Reader:
         try:
             self.base.with_changes(made)
         except InputError as error:
-            told = [problem.partition(": ")[2] for problem in error.problems]
-            self.faults += [describe(self.source, self._at(name, *key), problem) for problem in told]
+            reported = [problem.partition(": ")[2] for problem in error.problems]
+            self.faults += [describe(self.source, self._at(name, *key), problem) for problem in reported]
 
     def _no_numbers(self, name: str, entry: ParameterEntry) -> None:
         given = {

@@ -99,13 +99,13 @@ class Parameter:
     @property
     def middle(self) -> float:
         """A value from the middle, as a design has it."""
-        found = self.distribution
-        if found is None:
+        result = self.distribution
+        if result is None:
             number = self.choices[len(self.choices) // 2].number
             return float(len(self.choices) // 2) if self.worded or number is None else number
-        low, high = found.support
-        if found.mean is not None:
-            return min(max(found.mean, low), high)
+        low, high = result.support
+        if result.mean is not None:
+            return min(max(result.mean, low), high)
         return low + (high - low) // 2 if self.whole else low + (high - low) / 2
 
     @property

@@ -114,11 +114,11 @@ class Mesh:
         shifts: Floats = np.array([origins[carrier] for carrier in self.carriers])
         return self.local + shifts
 
-    def grip(self, point: Floats, held: Held, positions: Floats) -> Grip:
+    def grip(self, point: Floats, fixed: Held, positions: Floats) -> Grip:
         """How nodes hold a point of the machine's frame, nodes being at `positions`."""
-        if held.rail is not None:
-            return self.riding(point, self.rail(held.rail), positions)
-        numbers = [self.number(node) for node in held.nodes]
+        if fixed.rail is not None:
+            return self.riding(point, self.rail(fixed.rail), positions)
+        numbers = [self.number(node) for node in fixed.nodes]
         return rigid(point, positions[numbers], self.first_dof[numbers])
 
     def riding(self, point: Floats, numbers: range, positions: Floats) -> Grip:

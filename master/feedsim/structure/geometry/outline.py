@@ -98,8 +98,8 @@ def _sections(structure: GeometryStructure) -> Iterator[tuple[tuple[float, float
             if group.section is not None and group.count is not None:
                 yield from [looks[group.section]] * (group.count - 1)
         for beams in body.beams:
-            each = len(nodes(structure, name, beams.through[0]))
-            yield from [looks[beams.section]] * (each * (len(beams.through) - 1))
+            entry = len(nodes(structure, name, beams.through[0]))
+            yield from [looks[beams.section]] * (entry * (len(beams.through) - 1))
     for axis in structure.axes.values():
         screw = axis.drive.screw
         yield from [((screw.diameter, screw.diameter), True)] * (screw.nodes - 1)

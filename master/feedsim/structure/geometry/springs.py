@@ -88,21 +88,21 @@ def _along_and_across(along: Floats, axial: float, radial: float) -> Iterator[tu
 def ports(mesh: Mesh, origins: Mapping[str, Floats], positions: Floats) -> dict[str, Floats]:
     """Port -> (N,) vector b: n_A rotor against stator, x_A scale, tcp_X, tcp_Y, tcp_Z tool against workpiece."""
     structure, size = mesh.structure, mesh.size
-    found: dict[str, Floats] = {}
+    result: dict[str, Floats] = {}
     for name, axis in structure.axes.items():
         carrier = mesh.number(node(structure, axis.drive.stator.node))
         housing = rigid(positions[carrier], positions[[carrier]], [int(mesh.first_dof[carrier])])
         rotor = Row(np.array([mesh.rotor(name)]), np.ones(1))
-        found[f"n_{name}"] = (rotor - housing.rotation(np.array(axis.direction))).dense(size)
+        result[f"n_{name}"] = (rotor - housing.rotation(np.array(axis.direction))).dense(size)
     for name, axis in structure.axes.items():
         point, along = origins[axis.scale.body] + axis.scale.at, np.array(axis.direction)
         moving, against = (
             mesh.grip(point, held(structure, texts), positions) for texts in (axis.scale.moving, axis.scale.against)
         )
-        found[f"x_{name}"] = (moving.displacement(along) - against.displacement(along)).dense(size)
+        result[f"x_{name}"] = (moving.displacement(along) - against.displacement(along)).dense(size)
     tool = structure.tool
     point = origins[tool.body] + tool.at
     mine, other = (mesh.grip(point, held(structure, texts), positions) for texts in (tool.held_by, tool.against))
     for letter, direction in zip("XYZ", FRAME, strict=True):
-        found[f"tcp_{letter}"] = (mine.displacement(direction) - other.displacement(direction)).dense(size)
-    return found
+        result[f"tcp_{letter}"] = (mine.displacement(direction) - other.displacement(direction)).dense(size)
+    return result

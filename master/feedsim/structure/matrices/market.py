@@ -90,15 +90,15 @@ def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
             f"{file}: {what} matrix is {field} {symmetry} by its first line; 'real symmetric' or 'real general' "
             "is expected"
         )
-    told = 3 * sizes[2] if form == "coordinate" else rows * (rows + 1) // 2 if symmetry == "symmetric" else rows**2
+    reported = 3 * sizes[2] if form == "coordinate" else rows * (rows + 1) // 2 if symmetry == "symmetric" else rows**2
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)  # text that is no number
         try:
             numbers = np.fromstring(parts[2].decode("ascii"), dtype=np.float64, sep=" ")
         except DeprecationWarning:
             raise ValueError("it holds text that is no number") from None
-    if numbers.size != told:
-        raise ValueError(f"it holds {numbers.size} numbers behind its size, which declares {told}")
+    if numbers.size != reported:
+        raise ValueError(f"it holds {numbers.size} numbers behind its size, which declares {reported}")
     if form == "coordinate":
         places = numbers.reshape(-1, 3)[:, :2]
         if not np.all((places == np.floor(places)) & (places >= 1) & (places <= rows)):

@@ -236,9 +236,9 @@ class _Finder:
         if word not in SPELLINGS:
             raise InputError(f"{where}: column 'direction': {row['direction']!r} is none of {', '.join(FREEDOM_NAMES)}")
         direction = SPELLINGS[word]
-        found = self.index.get((node, direction))
-        if found is not None:
-            return found
+        count = self.index.get((node, direction))
+        if count is not None:
+            return count
         known = [FREEDOM_NAMES[d] for d in range(len(FREEDOM_NAMES)) if (node, d) in self.index]
         has = f"it has {', '.join(known)}; " if known else ""
         in_mesh = self.raw.points is not None and node in self.raw.points.ids

@@ -10,6 +10,7 @@ HEIGHT, ROUND, GAP = 235.0, 520.0, 18.0  # of a panel without what is below, of 
 ROW, CELL_WITH_NUMBER, CELL_WITH_NAME = 24.0, 30.0, 12.0  # of a grid: height; least widths
 SCALE_STEPS, SCALE_STEP = 12, 10.0  # of a grid without numbers: colours of its scale, and the width of each
 SLANTED = 4.8  # that a letter of a slanted name takes across
+LINE_PITCH = 1.15  # from line to line of words, in heights of a letter
 LETTER = 6.3  # of words over curves
 BLOCK = 4  # how finely a panel is looked at for room
 LEADER = 24.0  # distance of a label from its point from which a line leads to it

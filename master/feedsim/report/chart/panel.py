@@ -15,6 +15,7 @@ from feedsim.report.chart.layout import (
     FILL,
     LEADER,
     LEFT,
+    LINE_PITCH,
     SECOND,
     TICK_HEIGHT,
     TICK_WIDTH,
@@ -153,10 +154,8 @@ def _upright(words: str, x: float, inner: Box, most: float, *, right: bool = Fal
     lines = [part for part in (words[:cut], words[cut + 1 :]) if part]
     size = max(8.0, min(12.0, 12 * most / (6.4 * max(map(len, lines), default=1))))
     look = 'text-anchor="middle"' + (f' font-size="{size:.1f}"' if size < 12 else "")
-    return "".join(
-        turned(x + size * (k + 1 - len(lines) if right else k - (len(lines) - 1) / 6), top + tall / 2, part, -90, look)
-        for k, part in enumerate(lines)
-    )
+    pitch, first = LINE_PITCH * size, 1 - len(lines) if right else (1 - len(lines)) / 6
+    return "".join(turned(x + pitch * (k + first), top + tall / 2, part, -90, look) for k, part in enumerate(lines))
 
 
 def _band(band: Band, span: Range, across: Scaled, up: Scaled, bottom: float) -> str:

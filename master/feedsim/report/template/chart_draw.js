@@ -2,7 +2,7 @@
 // one drawing serves light, dark and paper. chart_use.js has what a reader does with them.
 const SPACE = "http://www.w3.org/2000/svg";
 const {
-  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, FINER_UNITS, GAP, HEIGHT, LEADER, LEFT, LETTER, MAX_DIGITS, MIN_TICKS,
+  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, FINER_UNITS, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
   NARROWEST, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP,
 } = LAYOUT; // feedsim.report.chart.layout
 const NARROW = 640, COLUMN = 250;
@@ -282,7 +282,7 @@ function upright(text, x, inner, most, parent, right = false) {
   const cut = 6.4 * text.length > inner.height && spaces.length ? spaces.reduce((best, each) => Math.abs(each - middle) < Math.abs(best - middle) ? each : best) : text.length;
   const lines = [text.slice(0, cut), text.slice(cut + 1)].filter(Boolean), longest = Math.max(...lines.map(each => each.length));
   const size = Math.max(8, Math.min(12, 12 * most / (6.4 * longest)));
-  lines.forEach((line, k) => make("text", { transform: `translate(${x + size * (right ? k + 1 - lines.length : k - (lines.length - 1) / 6)} ${inner.y + inner.height / 2}) rotate(-90)`,
+  lines.forEach((line, k) => make("text", { transform: `translate(${x + LINE_PITCH * size * (right ? k + 1 - lines.length : k - (lines.length - 1) / 6)} ${inner.y + inner.height / 2}) rotate(-90)`,
     "text-anchor": "middle", fill: colour("ink"), ...(size < 12 ? { "font-size": size.toFixed(1) } : {}) }, parent, line));
 }
 

@@ -251,7 +251,7 @@ compensation-study: fmus $(VENV)/.run ## what friction compensations take off on
 	$(PY) benchmarks/compensation_study.py
 
 band-coverage: fmus $(VENV)/.run ## whether bands from sets identified at 5 % noise hold the truth (some ten minutes; docs/uncertainty.md)
-	$(PY) benchmarks/coverage.py --kinds pulse_characteristic,model
+	$(PY) benchmarks/coverage.py
 
 identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/identification.md)
 	$(PY) benchmarks/identification.py

@@ -15,13 +15,14 @@ from command_helpers import feedsim
 from feedsim import analysis, cosim
 from feedsim.cli import main
 from feedsim.judge import judged
+from feedsim.linear.judgement import judge
 from feedsim.linear.system import LinearSystem
 from feedsim.report.changes import changes_part, changes_section
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.structure import checked_modes
 from feedsim.tune import Proposal, of_circle, of_run
 from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain
-from feedsim.tune.proposals import GAIN_MARGIN, PHASE_MARGIN, changed
+from feedsim.tune.proposals import GAIN_MARGIN, PHASE_MARGIN, changed, least_margins
 
 PROJECT = Path(__file__).resolve().parents[2]
 CIRCLE = PROJECT / "scenarios" / "xz_circle.yaml"
@@ -106,6 +107,11 @@ def test_a_slow_integral_part(fmus: Path) -> None:
     assert first.margins is not None
     assert first.margins[1][0] >= GAIN_MARGIN
     assert first.margins[1][1] >= PHASE_MARGIN
+    # It is the shortest one but for 15 %: a shorter one lacks a margin.
+    machine = load(CIRCLE).machine
+    shorter = changed(machine, "Z", {"T_n": 0.85 * first.proposed})
+    gain, phase = least_margins(judge(shorter, checked_modes(machine)), "Z")
+    assert gain < GAIN_MARGIN or phase < PHASE_MARGIN
 
 
 def test_a_circle_alone_gives_directions(fmus: Path) -> None:

@@ -54,7 +54,8 @@ def packages(extra: str) -> Iterator[str]:
             for name in inner[1].split(","):
                 yield from packages(name)
         else:
-            yield re.split(r"[\[>=]", text)[0]
+            name = re.split(r"[\[>=]", text)[0]
+            yield {"pillow": "PIL"}.get(name, name)
 
 
 def python(code: str, packages: list[str], *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -17,7 +17,7 @@ from feedsim.errors import InputError
 # Extra of pyproject.toml -> the modules that it brings, smaller extras first.
 _RUN = ("fmpy", "scipy", "ruckig")
 EXTRAS = {
-    "run": _RUN, "figures": (*_RUN, "matplotlib", "resvg_py"), "sweep": (*_RUN, "distributed"), "uff": (*_RUN, "pyuff"),
+    "run": _RUN, "figures": (*_RUN, "PIL", "resvg_py"), "sweep": (*_RUN, "distributed"), "uff": (*_RUN, "pyuff"),
     "xlsx": (*_RUN, "xlsxwriter"),
     "parquet": ("pyarrow",), "pandas": ("pandas",),
 }  # fmt: skip

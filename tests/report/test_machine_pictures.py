@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -41,7 +40,8 @@ def ready(folder: Path) -> tuple[Structure, Built, Model]:
 
 
 def pixels(png: Path) -> NDArray[np.float64]:
-    return np.asarray(imread(png), dtype=np.float64)[..., :3]
+    with Image.open(png) as image:
+        return np.asarray(image.convert("RGB"), dtype=np.float64) / 255
 
 
 def painted(image: NDArray[np.float64]) -> float:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import gc
-import logging
 import os
 import signal
 import sys
@@ -130,8 +129,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from feedsim.extras import ask, missing
     from feedsim.outputs import replacing
 
-    # Where no home folder can be written to, matplotlib writes at length that its cache is a temporary one.
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     _end_cleanly_on_signals()
     try:
         drawn = ["figures"] if getattr(options, "figures", ()) else []

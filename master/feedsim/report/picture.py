@@ -11,8 +11,10 @@ from feedsim.errors import InputError, OutputError
 from feedsim.report.chart import Chart
 from feedsim.report.chart.file import png, standalone
 from feedsim.report.chart.svg import svg
-from feedsim.report.style import REMARK, Drawn, standalone_drawing
+from feedsim.report.style import REMARK
 
+# An SVG above this size [bytes] is put into the page as PNG instead.
+LARGEST_SVG = 400_000
 # Files that a drawing is written as.
 PICTURE_FORMATS = ("png", "svg")
 
@@ -28,7 +30,7 @@ class Picture:
     stem: str
     title: str
     caption: str
-    shows: Chart | Callable[[], Drawn]
+    shows: Chart | Callable[[], str]
     worded: bool = False
     remark: str = field(default_factory=lambda: REMARK.get())
 
@@ -38,27 +40,24 @@ class Picture:
         return self.shows if isinstance(self.shows, Chart) else None
 
     @cached_property
-    def drawn(self) -> Drawn:
-        """The drawing of what is no chart."""
-        assert not isinstance(self.shows, Chart)
-        return self.shows()
-
-    @cached_property
     def svg(self) -> str:
         """The drawing as text of an SVG within a page."""
-        return self.drawn.svg if self.chart is None else svg(self.chart, self.stem, self.title)
+        return svg(self.shows, self.stem, self.title) if isinstance(self.shows, Chart) else self.shows()
 
     @property
+    def is_light(self) -> bool:
+        """Whether a page holds the SVG; one above LARGEST_SVG it holds as PNG."""
+        return len(self.svg) <= LARGEST_SVG
+
+    @cached_property
     def png(self) -> bytes:
         """The drawing as PNG."""
-        return self.drawn.png if self.chart is None else png(self._file)
+        return png(self._file)
 
     @property
     def _file(self) -> str:
         """The drawing as text of an SVG that is a file of its own."""
-        if self.chart is None:
-            return standalone_drawing(self.svg)
-        return standalone(self.chart, self.stem, self.title, self.caption if self.worded else "", self.remark)
+        return standalone(self.svg, self.title, self.caption if self.worded else "", self.remark)
 
     def first_rows(self, most: int) -> Picture:
         """The picture itself, or one of its first rows of panels where it has more than `most`."""

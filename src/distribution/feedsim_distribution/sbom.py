@@ -38,7 +38,7 @@ def describe() -> bytes:
 
 
 def _components() -> list[dict[str, Any]]:
-    """The headers, which the C sources hold, then the locked packages, which are installed beside feedsim."""
+    """Headers in the C sources, the font of pictures, then the locked packages, which are installed beside feedsim."""
     result: list[dict[str, Any]] = [
         {
             "type": "library",
@@ -47,7 +47,15 @@ def _components() -> list[dict[str, Any]]:
             "version": "2.0.4",
             "scope": "required",
             "licenses": [{"license": {"id": "BSD-2-Clause"}}],
-        }
+        },
+        {
+            "type": "data",
+            "bom-ref": "dejavu-sans@2.37",
+            "name": "DejaVu Sans (part)",
+            "version": "2.37",
+            "scope": "required",
+            "licenses": [{"license": {"id": "Bitstream-Vera"}}],
+        },
     ]
     lock = (PROJECT / "requirements.lock").read_text(encoding="utf-8")
     for name, version, hashes in _PINNED.findall(lock):

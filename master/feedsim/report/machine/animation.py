@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import io
-from typing import Any
 
 import numpy as np
 
+from feedsim.report.chart.file import png, standalone
 from feedsim.report.machine.model import Model, motion
-from feedsim.report.machine.pictures import draw_mode, mode_heading, mode_panels, remark
-from feedsim.report.style import drawing
+from feedsim.report.machine.pictures import mode_drawing, mode_title
 from feedsim.structure.build import Built
 from feedsim.structure.info import MachineInfo
 
 FRAMES = 24
 PERIOD = 1.6  # s
-DPI = 90
+PIXELS = 1.09  # of a frame for one of the drawing
 COLOURS = 128
 
 
@@ -26,22 +25,9 @@ def mode_gif(info: MachineInfo, built: Built, of: Model, k: int, scale: float = 
     moved = motion(built, of, k, scale)
     phases = np.sin(2 * np.pi * np.arange(FRAMES) / FRAMES).round(12).tolist()
     drawn: dict[float, Image.Image] = {}
-    with drawing(11.6, 5.8) as figure:
-        figure.set_dpi(DPI)
-        mode_heading(figure, info, of, k)
-        remark(figure, info)
-        panels = list(mode_panels(figure, of, moved))
-        canvas: Any = figure.canvas  # of drawing(): Agg's
-        for phase in dict.fromkeys(phases):  # each is passed twice
-            before = [set(axes.get_children()) for axes, _ in panels]
-            for axes, where in panels:
-                draw_mode(axes, where, of, moved, phase)
-            canvas.draw()
-            figure.set_layout_engine("none")  # the layout of the first frame is that of all
-            drawn[phase] = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-            for (axes, _), kept in zip(panels, before, strict=True):
-                for artist in set(axes.get_children()) - kept:
-                    artist.remove()
+    for phase in dict.fromkeys(phases):  # each is passed twice
+        frame = standalone(mode_drawing(info, of, k, moved, phase), mode_title(info, k))
+        drawn[phase] = Image.open(io.BytesIO(png(frame, PIXELS))).convert("RGB")
     palette = drawn[max(drawn)].quantize(COLOURS)
     frames = [drawn[phase].quantize(palette=palette, dither=Image.Dither.NONE) for phase in phases]
     out = io.BytesIO()

@@ -1,4 +1,4 @@
-"""Report: what is written, that it is self-contained, deterministic, and whole or not at all."""
+"""Report: what is written, that it is self-contained and deterministic, and what the terminal says."""
 
 from __future__ import annotations
 
@@ -21,25 +21,20 @@ import pytest
 
 from feedsim.analysis import Figure, evaluate
 from feedsim.cli.terminal import finish, warn
-from feedsim.errors import OutputError
 from feedsim.findings import Note, Wrong
 from feedsim.motions import Arc, Dwell, Move
-from feedsim.outputs import replacing
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.embedded import embedded
-from feedsim.report.content import Report, Tile
-from feedsim.report.page import html, script
-from feedsim.report.provenance import archives, input_files
-from feedsim.report.results import write_report
+from feedsim.report.content import Tile
+from feedsim.report.page import script
 from feedsim.report.run.files import summary
-from feedsim.report.run.report import HEADER, real_time_factor, report_of, tile
+from feedsim.report.run.report import HEADER, real_time_factor, tile
 from feedsim.report.run.words import moved_words
 from feedsim.report.style import PAGE_COLOURS
-from feedsim.scenario import load
-from feedsim.trace import Trace, read_csv
-from report_helpers import FakeRun, Page, circle_run, contents, positioning_run, run_of, small_run
-from scenario_helpers import MACHINE, scenario
+from feedsim.trace import read_csv
+from report_helpers import Page, circle_run, contents, positioning_run, run_of
+from scenario_helpers import scenario
 
 # -- what is written --------------------------------------------------------------------------------------------------
 
@@ -230,82 +225,6 @@ def test_motions_have_their_path_and_a_note_on_their_start(tmp_path: Path) -> No
     assert circle == "R 15 mm, 1080° (3 full turns)"
 
 
-# -- where the numbers come from --------------------------------------------------------------------------------------
-
-
-def test_each_archive_stands_once() -> None:
-    units = {
-        "plant": {"guid": "p", "version": "1"},
-        "controller_X": {"guid": "c", "version": "1"},
-        "controller_Z": {"guid": "c", "version": "1"},
-        "friction_X": {"guid": "f", "version": "1"},
-        "friction_Z": {"guid": "other", "version": "1"},
-    }
-    found = [(a.name, a.guid, a.instances) for a in archives(units)]
-    assert found == [
-        ("plant", "p", ("plant",)),
-        ("controller", "c", ("controller_X", "controller_Z")),
-        ("friction", "f", ("friction_X",)),
-        ("friction", "other", ("friction_Z",)),
-    ]
-
-
-def test_coupling_is_one_table_with_the_share(tmp_path: Path) -> None:
-    coupling = {"Z.residual": -2e-5, "Z.residual_peak": 3e-5, "Z.friction_work": 80.0, "X.residual": 0.0}
-    report.write(replace(positioning_run(), coupling=coupling), {}, tmp_path)
-    words = " ".join(Page((tmp_path / "report.html").read_text(encoding="utf-8")).words)
-    assert "Z 80 −2×10⁻⁵ 2.5×10⁻⁷" in words
-    assert "X – 0 –" in words
-
-
-def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
-    (tmp_path / "positions.csv").write_text("time [s],Z.x_s [mm]\n0,0\n1,0\n", encoding="utf-8")
-    (tmp_path / "soft.yaml").write_text("interval: 1 ms\n", encoding="utf-8")
-    (tmp_path / "test.yaml").write_text(
-        f"name: t\nmachine: {MACHINE}\nset: {{machine.axes.Z.friction.W: 0.1 rad}}\n"
-        "motions: [{kind: setpoints, file: positions.csv, columns: {Z: Z.x_s}, relative: true}]\n"
-        "recording: soft.yaml\n",
-        encoding="utf-8",
-    )
-    described = load(tmp_path / "test.yaml", ["machine.axes.Z.friction.gamma=0.5"])
-    content = summary(FakeRun(described, positioning_run().program, positioning_run().trace), {}, ())
-    paths = {
-        "scenario": tmp_path / "test.yaml",
-        "machine": MACHINE / "machine.yaml",
-        "recording": tmp_path / "soft.yaml",
-        "modes": MACHINE / "modes.csv",
-        "recorded setpoints": tmp_path / "positions.csv",
-    }
-    found = {item["role"]: (item["name"], item["sha256"]) for item in content["inputs"]}
-    assert found == {r: (p.name, hashlib.sha256(p.read_bytes()).hexdigest()) for r, p in paths.items()}
-    assert content["scenario"]["set"] == ["machine.axes.Z.friction.W=0.1 rad"]
-    assert content["scenario"]["overrides"] == ["machine.axes.Z.friction.gamma=0.5"]
-    assert str(tmp_path) not in json.dumps(content)
-    (tmp_path / "positions.csv").unlink()
-    assert [f.sha256 for f in input_files(described) if f.name == "positions.csv"] == [None]
-    page = html(report_of(FakeRun(described, positioning_run().program, positioning_run().trace), {}, []))
-    assert "machine.axes.Z.friction.W=0.1 rad" in page
-    assert str(tmp_path) not in page
-
-
-def test_parameters_of_every_axis_are_in_si_under_the_names_of_the_units() -> None:
-    run = small_run()
-    axes = summary(run, {}, ())["machine"]["axes"]
-    assert list(axes) == ["X", "Y", "Z"]
-    for name, axis in run.scenario.machine.axes.items():
-        assert axes[name]["pitch"] == {"value": axis.pitch, "unit": "m"}
-        assert axes[name]["M_0"] == {"value": axis.M_0, "unit": "N.m"}
-        for group, parameters in (("drive", axis.drive.parameters()), ("friction", axis.friction.parameters())):
-            listed = {n: v["value"] if isinstance(v, dict) else v for n, v in axes[name][group].items()}
-            assert listed == parameters
-            bare = {n for n, v in axes[name][group].items() if isinstance(v, float)}
-            assert not bare, f"{bare} without unit"
-    assert axes["Z"]["drive"]["K_v"]["unit"] == "1/s"
-    assert axes["Z"]["drive"]["filter_1.f"]["unit"] == "Hz"
-    assert axes["Z"]["drive"]["current.K_p"]["unit"] == "V/A"
-    assert axes["Z"]["friction"]["sigma_0"]["unit"] == "N.m/rad"
-
-
 def test_one_line_for_the_terminal() -> None:
     run = circle_run()
     line = report.summary_line(
@@ -314,137 +233,6 @@ def test_one_line_for_the_terminal() -> None:
     assert line.startswith("XZ.G 8.19 um, XZ.glitch_X 4.84 um, ")
     assert "simulated in 0.5 s" in line
     assert "\n" not in line
-
-
-# -- whole or not at all ----------------------------------------------------------------------------------------------
-
-
-def test_nothing_is_left_when_a_value_cannot_be_written(tmp_path: Path) -> None:
-    run = small_run()
-    report.write(run, {}, tmp_path / "kept")
-    before = contents(tmp_path / "kept")
-    spoilt = dict(run.trace.columns) | {"Z.M_a": np.full(len(run.trace), math.inf)}
-    broken = FakeRun(run.scenario, run.program, Trace(run.trace.time, spoilt))
-    with pytest.raises(OutputError, match=r"Z\.M_a is inf"):
-        report.write(broken, {}, tmp_path / "kept")
-    assert contents(tmp_path / "kept") == before
-    with pytest.raises(OutputError):
-        report.write(broken, {}, tmp_path / "fresh")
-    assert not (tmp_path / "fresh").exists()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["kept"]
-
-
-@pytest.mark.parametrize("stuck", ["report.html", "figures/overview.png", "summary.json"])
-def test_earlier_results_are_put_back_when_moving_fails(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stuck: str
-) -> None:
-    run = small_run()
-    report.write(run, {}, tmp_path, drawn=("png",))
-    (tmp_path / "notes.txt").write_text("mine")
-    before = contents(tmp_path)
-    replace = Path.replace
-
-    def failing(self: Path, target: Path) -> Path:
-        if Path(target) == tmp_path / stuck and self.parent != tmp_path and "fresh" in self.parts:
-            raise OSError(28, "No space left on device")
-        return replace(self, target)
-
-    other = FakeRun(run.scenario, run.program, run.trace, wall_time=1.0)
-    monkeypatch.setattr(Path, "replace", failing)
-    with pytest.raises(OutputError, match="No space left on device"):
-        report.write(other, {}, tmp_path, drawn=("png",))
-    assert contents(tmp_path) == before
-    monkeypatch.undo()
-    report.write(other, {}, tmp_path)
-    assert contents(tmp_path)["report.html"] != before["report.html"]
-
-
-def test_folders_made_for_results_go_when_moving_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(self: Path, target: Path) -> Path:
-        if self.name == "summary.json":
-            raise KeyboardInterrupt
-        return replace(self, target)
-
-    replace = Path.replace
-    monkeypatch.setattr(Path, "replace", failing)
-    with pytest.raises(KeyboardInterrupt):
-        report.write(small_run(), {}, tmp_path / "new" / "folder")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_figures_of_an_earlier_run_go_and_other_files_stay(tmp_path: Path) -> None:
-    circle, stop = circle_run(), positioning_run()
-    report.write(circle, evaluate(circle), tmp_path, drawn=("png",))
-    (tmp_path / "figures" / "mine.png").write_bytes(b"x")
-    report.write(stop, evaluate(stop), tmp_path, drawn=("png",))
-    assert set(contents(tmp_path)) == {
-        *(f"figures/{stem}.png" for stem in ("positioning-Z", "overview", "mine")),
-        *("result.csv", "report.html", "summary.json"),
-    }  # fmt: skip
-
-
-def test_foreign_summary_removes_nothing(tmp_path: Path) -> None:
-    victim = tmp_path / "victim.png"
-    victim.write_bytes(b"x")
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "summary.json").write_text(json.dumps({"files": ["../victim.png", "figures/../../victim.png", 3, None]}))
-    report.write(small_run(), {}, out)
-    assert victim.exists()
-
-
-def test_a_result_of_a_kind_nobody_knows_goes_but_for_what_it_keeps(tmp_path: Path) -> None:
-    """Ownership asks the summary alone: a new kind of result needs no entry elsewhere."""
-    content = Report("Odd", "", main=[], footer="", answer=["It is odd."])
-    written = write_report(
-        tmp_path, content, lambda names: {}, {"odd.csv": "x", "odd.yaml": "y"}, kind="odd", keeps=("odd.yaml",)
-    )
-    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
-    assert {"kind", "version", "answer", "figures", "warnings", "findings", "files", "keeps"} <= set(summary)
-    assert (summary["kind"], summary["answer"], summary["keeps"]) == ("odd", ["It is odd."], ["odd.yaml"])
-    assert set(summary["files"]) == {str(path.relative_to(tmp_path)) for path in written}
-    (tmp_path / "mine.csv").write_text("mine")
-    with replacing():
-        report.write(small_run(), {}, tmp_path)
-    assert not (tmp_path / "odd.csv").exists()
-    assert (tmp_path / "odd.yaml").read_text() == "y"
-    assert (tmp_path / "mine.csv").read_text() == "mine"
-
-
-def test_friction_outlives_the_results_that_it_came_with(tmp_path: Path) -> None:
-    """Curves of an identification go with it; friction.yaml may be named by a scenario by now."""
-    curves = ["plateaus.csv", "residuals.csv", "open_loop.csv", "figures/stribeck.png"]
-    (tmp_path / "figures").mkdir()
-    for name in ("friction.yaml", *curves):
-        (tmp_path / name).write_text("x")
-    (tmp_path / "summary.json").write_text(json.dumps({"files": ["friction.yaml", *curves]}))
-    report.write(small_run(), {}, tmp_path)
-    assert not [name for name in curves if (tmp_path / name).exists()]
-    assert (tmp_path / "friction.yaml").read_text() == "x"
-    assert "friction.yaml" not in json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["files"]
-
-
-# -- check before the simulation --------------------------------------------------------------------------------------
-
-
-def test_writable_directories_pass_and_nothing_is_left(tmp_path: Path) -> None:
-    report.check_writable(tmp_path)
-    report.check_writable(tmp_path / "not" / "yet")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_what_cannot_be_written_to_is_said(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="file is a file; allowed: a directory"):
-        report.check_writable(tmp_path / "file")
-    with pytest.raises(OutputError, match="file is a file; allowed: a directory"):
-        report.check_writable(tmp_path / "file" / "below")
-    (tmp_path / "out" / "report.html").mkdir(parents=True)
-    with pytest.raises(OutputError, match=r"report\.html: is in the way of a result file"):
-        report.check_writable(tmp_path / "out")
-    if Path("/proc/self").is_dir():  # where even an administrator cannot write
-        with pytest.raises(OutputError, match="/proc/self/out: cannot be written"):
-            report.check_writable("/proc/self/out")
 
 
 def test_a_run_without_figures_says_so_and_how_it_moved() -> None:

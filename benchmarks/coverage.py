@@ -5,7 +5,7 @@ identified from every log. Each set gives a band of the contour of a short circl
 lies in or not. A friction compensation found on a set is judged on the true machine, beside that found on the truth.
 
     make band-coverage
-    python benchmarks/coverage.py --logs 3 --kinds pulse_characteristic,model
+    python benchmarks/coverage.py --logs 3 --kinds pulse,pulse_characteristic
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from feedsim.scenario import Scenario, load
 from feedsim.structure.modes import checked_modes
 from feedsim.tune.circles import Circles, practical, size
 from feedsim.tune.compensation import tune
+from feedsim.tune.compensators import GROUP_OF_KIND
 from feedsim.uncertainty import cloud_of, of_run
 from feedsim.uncertainty.runs import curves_of
 
@@ -90,6 +91,8 @@ def main() -> int:
     given = parser.parse_args()
     true = load(CIRCLE, SHORT)
     kinds = [kind for kind in given.kinds.split(",") if kind]
+    if unknown := [kind for kind in kinds if kind not in GROUP_OF_KIND]:
+        parser.error(f"--kinds {','.join(unknown)}: of {', '.join(GROUP_OF_KIND)}")
     with TemporaryDirectory() as folder:
         files = identified(true, given.logs, Path(folder))
         nominal = {kind: reductions(true, true, kind) for kind in kinds}

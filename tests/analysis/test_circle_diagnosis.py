@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from dataclasses import replace
 
@@ -84,20 +85,22 @@ def test_shares_add_up_to_the_deviation() -> None:
 
 
 def test_the_first_cause_is_the_one_whose_removal_gains_most() -> None:
-    """Drawn causes, each removed from the generator: the first that is named is the one without which G is least."""
-    rng, right, decided = np.random.default_rng(7), 0, 0
-    for seed in range(40):
-        values = {
-            "squareness": Causes(squareness=rng.uniform(-1e-4, 1e-4)),
-            "servo": Causes(delay=(rng.uniform(-2e-4, 2e-4), 0.0)),
-            "lost_motion X": Causes(lost=(rng.uniform(0, 8e-6), 0.0)),
-            "peaks Z": Causes(peak=(0.0, rng.uniform(0, 9e-6))),
-        }
-        squareness, servo, lost, peak = values.values()
-        whole = Causes(squareness=squareness.squareness, delay=servo.delay, lost=lost.lost, peak=peak.peak)
+    """Drawn causes, eight at a time, each removed from the generator: the first that is named is the one without which
+    G is least. FEEDSIM_DRAWS says how many circles are drawn."""
+    draws = int(os.environ.get("FEEDSIM_DRAWS", "24"))
+    rng, right, decided = np.random.default_rng(11), 0, 0
+    for seed in range(draws):
+        squareness, delay, scale, pitch = rng.uniform([-1e-4, -2e-4, -1e-4, 0], [1e-4, 2e-4, 1e-4, 3e-6]).tolist()
+        lost, peak = rng.uniform(0, 8e-6, 2).tolist(), rng.uniform(0, 9e-6, 2).tolist()
+        whole = Causes(
+            squareness=squareness, delay=(delay, 0.0), scale=(scale, 0.0), pitch_error=(0.0, pitch),
+            lost=(lost[0], lost[1]), peak=(peak[0], peak[1]), noise=5e-8,
+        )  # fmt: skip
         without = {
             "squareness": replace(whole, squareness=0.0), "servo": replace(whole, delay=(0.0, 0.0)),
-            "lost_motion X": replace(whole, lost=(0.0, 0.0)), "peaks Z": replace(whole, peak=(0.0, 0.0)),
+            "scale": replace(whole, scale=(0.0, 0.0)), "pitch Z": replace(whole, pitch_error=(0.0, 0.0)),
+            "lost_motion X": replace(whole, lost=(0.0, lost[1])), "lost_motion Z": replace(whole, lost=(lost[0], 0.0)),
+            "peaks X": replace(whole, peak=(0.0, peak[1])), "peaks Z": replace(whole, peak=(peak[0], 0.0)),
         }  # fmt: skip
         G = {key: both(BALLBAR, causes, seed, 1500).G for key, causes in without.items()}
         best, second = sorted(G.values())[:2]
@@ -107,7 +110,7 @@ def test_the_first_cause_is_the_one_whose_removal_gains_most() -> None:
         first = both(BALLBAR, whole, seed, 1500).terms[0]
         right += f"{first.key} {first.axis}".strip() == min(G, key=lambda key: G[key])
     assert right >= 0.95 * decided
-    assert decided > 25
+    assert decided > 0.6 * draws
 
 
 def test_one_direction_tells_squareness_and_servo_mismatch_as_one() -> None:

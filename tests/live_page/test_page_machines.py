@@ -122,6 +122,27 @@ def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -
     assert axis == {key for key in usual if key}, "the usual knobs, and the effect that the machine has"
 
 
+@pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
+def test_the_play_of_a_transmission_is_a_knob(tmp_path: Path) -> None:
+    """Turned in the page, against a run; the judgement of the loops, of a closed contact, does not know of it."""
+    values = ("stiffness=100 N/um", "damping=3e4 N.s/m", "inertia=0.0005 kg.m^2", "play=2 um")
+    machine = [f"machine.axes.X.transmission.{each}" for each in values]
+    given = scenario.load(SCENARIOS / "one_axis.yaml", machine)
+    data = content(given, nc.plan(given)).data
+    keys = [knob["key"] for knob in data["knobs"]]
+    assert "machine.axes.X.transmission.play" in keys, "the machine has it, so that it is a usual one"
+    assert not [key for key in keys if key.endswith(("transmission.stiffness", "transmission.inertia"))]
+    play = [9e-6 if key.endswith("transmission.play") else knob["value"]
+            for key, knob in zip(keys, data["knobs"], strict=True)]  # fmt: skip
+    keep = ["X.x_a", "X.n_a"]
+    page = answers(data, [{"state": play, "keep": keep}], tmp_path)[0]
+    run = judged(cosim.run(scenario.load(SCENARIOS / "one_axis.yaml", [*machine, *settings(data, play)])))
+    for column in keep:  # impacts make more of the last bit than SAME
+        assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= 1e-9
+    assert sorted(page["warnings"]) == sorted(map(str, run.warnings))
+    assert np.abs(run.trace["X.x_a"] - cosim.run(given).trace["X.x_a"]).max() > 1e-7
+
+
 @pytest.mark.parametrize(
     ("changes", "wanted", "said"),
     [

@@ -118,7 +118,7 @@ def fits(knob: Knob, pattern: str) -> bool:
 def _is_on(knob: Knob) -> bool:
     """Whether a knob is an effect that the machine has: its value is not that of a machine without."""
     parts = knob.key.split(".")
-    effect = any(part in (*EFFECTS, "geometry", "hysteresis", "guide", "play") for part in parts)
+    effect = any(part in (*EFFECTS, "geometry", "hysteresis", "guide", "transmission", "play") for part in parts)
     return effect and knob.value != knob.without and (knob.choices != () or parts[-1] not in SETTINGS)
 
 
@@ -150,11 +150,14 @@ def _of_axes(machine: Machine) -> list[Knob]:
 
 
 def _at_slide(axis: Axis) -> dict[str, Any]:
-    """Hysteresis and friction of its own at the guide; the latter not where it is a share of the axis's friction."""
+    """Hysteresis, friction of its own at the guide, not where it is a share of the axis's friction, and the play of a
+    transmission: its stiffness makes other modes, which the page cannot."""
     table = variables.parameters("plant/axis")
     result = {name: row.start for name, row in table.items() if name.partition(".")[0] in ("hysteresis", "guide")}
     wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
     result |= {f"hysteresis.{name}": value for name, value in wound.items()}
+    if axis.transmission is not None and axis.transmission.stiffness > 0:
+        result["transmission.play"] = axis.transmission.play
     if axis.guide is not None and axis.guide.share is not None:
         return {name: value for name, value in result.items() if not name.startswith("guide.")}
     return result | {f"guide.{name}": value for name, value in axis.friction_at_guide.items()}

@@ -96,6 +96,9 @@ def fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, l
         waves.append(wave)
         result = fit(circle, without(circle, paths, waves))
         waves = settled(circle, result, waves)
+    if len(certain := [wave for wave in waves if wave.amplitude > wave.half]) < len(waves):
+        waves = certain  # what may be nothing must not change the other terms
+        result = fit(circle, without(circle, paths, waves))
     return (result, waves) if stand_out(plain, result) else (plain, [])
 
 

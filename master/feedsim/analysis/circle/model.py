@@ -68,6 +68,8 @@ SETTLES = 0.05
 MAX_WINDOW_PASSES = 6
 # Left out, they must leave this share of the noise to be taken in after all.
 CLEARER = 0.5
+# Neither of two models need be right: a term may be off by so much of their difference, as a standard deviation.
+MODEL_DIFFERENCE_FACTOR = 1.5
 REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
 # The angle that is programmed and the one where the machine is differ by more than rounding from this deviation [m] on.
 PROGRAMMED_TOLERANCE = 5e-9
@@ -205,7 +207,7 @@ def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape)
     other = _shaped(circle, paths, shape._replace(pitches=True))
     if other.noise < CLEARER * shaped.noise:
         return other
-    moved = np.array([shaped[name] - other[name] for name in shaped.names])
+    moved = MODEL_DIFFERENCE_FACTOR * np.array([shaped[name] - other[name] for name in shaped.names])
     return replace(shaped, covariance=shaped.covariance + np.outer(moved, moved))
 
 

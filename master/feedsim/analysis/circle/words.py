@@ -16,6 +16,8 @@ ANGLE, UNCERTAIN = math.radians(0.5), 0.2e-6
 SLOW_TURN_RATE = 2.0
 # Of a cause that lies elsewhere than where G is measured there is, if it alone makes so much of it.
 BESIDES = 0.25
+# A cause without which G does not fall is named from so many of its intervals on: terms that cancel look like causes.
+MIN_CERTAINTY = 2.0
 # Turns of one direction that differ by more than this share of G are not turns of one circle.
 CONTRADICT = 0.5
 
@@ -44,7 +46,11 @@ def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
 
 def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     """Causes that somebody can act on, the largest first."""
-    able = [term for term in diagnosis.terms if term.shows and term.key not in ("rest", "radius")]
+    able = [
+        term for term in diagnosis.terms
+        if term.shows and term.key not in ("rest", "radius")
+        and (term.gain > 0 or not abs(term.value) < MIN_CERTAINTY * term.half)
+    ]  # fmt: skip
     result = [term for term in able if term.share >= SHARE_NAMED and term.size >= SHARE_NAMED * diagnosis.G]
     besides = [
         term for term in able if term not in result and term.key != "offset" and term.size >= BESIDES * diagnosis.G

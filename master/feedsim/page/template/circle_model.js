@@ -3,7 +3,7 @@
 const RADIANS = Math.PI / 180;
 const MODEL = {
   AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, REPEATS: 2,
-  KNOWN: 0.3, WOUND: 0.02, CLEARER: 0.5, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
+  KNOWN: 0.3, WOUND: 0.02, CLEARER: 0.5, DIFFERENCE: 1.5, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
   MOST: 8000, BIWEIGHT: 4.685, SETTLED: 1e-13, UNUSUAL: 0.6745,
 };
 
@@ -18,7 +18,7 @@ function fit_circle(circle, paths, students) {
   if (!found.left_out.some(axis => enough_pitches(circle, axis))) return found;
   const other = fit_lost(circle, paths, students, true);
   if (other.noise < MODEL.CLEARER * found.noise) return other;
-  const moved = found.names.map(name => found.of(name) - other.of(name));
+  const moved = found.names.map(name => MODEL.DIFFERENCE * (found.of(name) - other.of(name)));
   return { ...found, covariance: found.covariance.map((row, i) => row.map((each, j) => each + moved[i] * moved[j])) };
 }
 

@@ -1,5 +1,5 @@
 // What a diagnosis says: feedsim.analysis.circle.words once more, in the same words.
-const SAID = { LITTLE: 0.05, NOISY: 0.3, BESIDES: 0.25 };
+const SAID = { LITTLE: 0.05, NOISY: 0.3, BESIDES: 0.25, CERTAINTY: 2 };
 
 // As Python writes "{value:.{digits}g}".
 function general(value, digits) {
@@ -15,7 +15,7 @@ const in_um = value => `${three(value * 1e6)} um`;
 const term_of = (diagnosis, key) => diagnosis.terms.find(term => term.key === key);
 
 function told_terms({ terms, G }) {
-  const able = terms.filter(term => term.certain && term.key !== "rest" && term.key !== "radius"), found = able.filter(term => term.share >= SAID.LITTLE && term.size >= SAID.LITTLE * G);
+  const able = terms.filter(term => term.certain && term.key !== "rest" && term.key !== "radius" && (term.gain > 0 || !(Math.abs(term.value) < SAID.CERTAINTY * term.half))), found = able.filter(term => term.share >= SAID.LITTLE && term.size >= SAID.LITTLE * G);
   const besides = able.filter(term => !found.includes(term) && term.key !== "offset" && term.size >= SAID.BESIDES * G);
   return [...found.sort((a, b) => b.gain - a.gain || b.share - a.share), ...besides.sort((a, b) => b.size - a.size)];
 }

@@ -32,7 +32,7 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     )
     if diagnosis.left_out:
         axes = " and ".join(diagnosis.left_out)
-        note += f"\nThe circle is too small to separate errors that repeat with the pitch of {axes}."
+        note += f"\nA larger circle separates errors that repeat with the pitch of {axes}; this one is too small."
     if words := swinging(diagnosis):
         note += f"\n{typeset(words)}"
     note += "".join(f"\n{typeset(words)}" for words in further(diagnosis))

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study compensation-study band-coverage identification-accuracy lock ansys clean
+.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -252,6 +252,9 @@ compensation-study: fmus $(VENV)/.run ## what friction compensations take off on
 
 band-coverage: fmus $(VENV)/.run ## whether bands from sets identified at 5 % noise hold the truth (some ten minutes; docs/uncertainty.md)
 	$(PY) benchmarks/coverage.py
+
+friction-laws: fmus $(VENV)/.run ## compare Coulomb, Stribeck, LuGre and Maxwell slip in and out of sample (two minutes; docs/friction-laws.md)
+	$(PY) benchmarks/friction_laws.py --write
 
 identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/identification.md)
 	$(PY) benchmarks/identification.py

@@ -13,9 +13,10 @@ import yaml
 from feedsim import cosim, nc
 from feedsim.errors import InputError, SimulationError
 from feedsim.jobs.compensate import _open_of as open_values
-from feedsim.scenario import Friction, load
+from feedsim.scenario import Friction, GmsFriction, load
 from feedsim.scenario.load import read_friction
 from feedsim.uncertainty import cloud_of, interval, of_run, share_of, torque_scale
+from feedsim.uncertainty import draws as drawing
 from feedsim.uncertainty.draws import on_draw
 from identified_sets import CIRCLE, VALUES, write_set
 
@@ -176,3 +177,15 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
     by_inertia = cosim.run(other, fmus=fmus, torque_feedforward={"X": torque}).trace["X.x_a"]
     assert np.abs(by_torque - by_inertia).max() < 1e-10
     assert np.abs(by_torque - plain).max() > 1e-8  # and it makes a difference
+
+
+def test_draws_of_maxwell_slip_keep_its_law() -> None:
+    """Spread and attraction are drawn and scaled as torques of LuGre are; what is no parameter of it is none."""
+    values = {"sigma_0": 300.0, "sigma_1": 0.8, "sigma_2": 0.006, "F_C": 1.6, "F_S": 2.1, "v_s": 0.6, "spread": 20.0}
+    friction = GmsFriction.model_validate({"law": "gms", **values})
+    made = drawing._friction(friction, {"spread": 25.0, "F_C": 1.7, "W": 0.1}, 1.1)
+    assert made is not None
+    assert (made.law, made.spread, made.F_C, made.C) == ("gms", 25.0, pytest.approx(1.87), pytest.approx(220.0))
+    assert drawing.unit_of("C") == "N.m/s"
+    assert drawing.unit_of("spread") == "1"
+    assert drawing._friction(friction, {"spread": 0.5}, 1.0) is None

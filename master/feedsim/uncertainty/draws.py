@@ -18,7 +18,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,16 +27,18 @@ from feedsim import units
 from feedsim.errors import InputError, SimulationError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.fields import Quantity
-from feedsim.scenario import Drive, Friction, Machine, Scenario
+from feedsim.scenario import Drive, Friction, FrictionParameters, GmsFriction, Machine, Scenario
 from feedsim.scenario.axis_units import SHARED_WITH_GUIDE
 from feedsim.scenario.parameter_group import ParameterGroup
 
 Array = NDArray[np.float64]
+Law = TypeVar("Law", bound=FrictionParameters)
 SAME_VALUE_SHARE = 1e-3  # of the standard deviation: a value that is nearer to that of its identification is that value
 ATTEMPTS = 10_000  # draws until one is possible
 SEARCH_DRAWS = 4  # draws that values are found on besides the machine as it is
 SEARCH_SEED, JUDGE_SEED = 1, 2  # of draws that values are found on, and of others that they are judged on
 LOAD, INERTIA = "constant_load", "inertia"
+ATTRACTION = "C"  # of Maxwell slip, a torque per time
 # Symbol of the correlation matrix -> key of the group `identified`, of what is no parameter of the friction.
 BESIDE = {"M_0": LOAD, "J": INERTIA}
 DRAWN_UNITS = {LOAD: "N.m", INERTIA: "kg.m2"}
@@ -105,7 +107,7 @@ def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[st
     result = {}
     for name in axes or machine.axes:
         axis = machine.axes[name]
-        if not isinstance(axis.friction, Friction):
+        if not isinstance(axis.friction, FrictionParameters):
             continue
         present: dict[str, float] = {LOAD: axis.constant_load, INERTIA: math.nan}  # that of the modes
         present |= {key: float(value) for key, value in axis.friction.parameters().items()}
@@ -121,7 +123,7 @@ def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[st
     return result
 
 
-def known_of(friction: Friction, axis: str, present: Mapping[str, Any]) -> Known:
+def known_of(friction: FrictionParameters, axis: str, present: Mapping[str, Any]) -> Known:
     """What a friction file says of its values. present: key -> value [SI] that is in use; others do not count.
 
     Raises InputError: the group `identified` is not as feedsim writes it.
@@ -176,8 +178,11 @@ def unit_of(name: str) -> str:
     """SI unit of a value by its name. KeyError: no such value."""
     if name in DRAWN_UNITS:
         return DRAWN_UNITS[name]
-    model, key = (Drive, name.removeprefix("drive.")) if name.startswith("drive.") else (Friction, name)
-    quantity = Quantity.of(model.model_fields[key])
+    if name.startswith("drive."):
+        field = Drive.model_fields[name.removeprefix("drive.")]
+    else:
+        field = {**GmsFriction.model_fields, **Friction.model_fields}[name]
+    quantity = Quantity.of(field)
     return quantity.unit if quantity is not None else units.DIMENSIONLESS
 
 
@@ -235,7 +240,7 @@ def on_draw(scenario: Scenario, drawn: Machine) -> Scenario:
     return scenario.model_copy(update={"machine": drawn, "loads": tuple(loads), "logging": None})
 
 
-def drawn_friction(friction: Friction, known: Known, random: np.random.Generator) -> Friction:
+def drawn_friction(friction: Law, known: Known, random: np.random.Generator) -> Law:
     """A draw of a friction alone, as compensations use it. Raises InputError as :meth:`Cloud.draws`."""
     for _ in range(ATTEMPTS):
         drawn = known.draw(random)
@@ -267,12 +272,13 @@ def _impossible(known: Known) -> InputError:
     )
 
 
-def _friction(friction: Friction, drawn: Mapping[str, float], factor: float) -> Friction | None:
+def _friction(friction: Law, drawn: Mapping[str, float], factor: float) -> Law | None:
     """With the values drawn, its torques times `factor`; None where that is no friction."""
-    values = {name: value for name, value in drawn.items() if name in Friction.model_fields}
-    for name in SHARED_WITH_GUIDE if factor != 1 else ():
+    values = {name: value for name, value in drawn.items() if name in type(friction).model_fields}
+    torques = [name for name in (*SHARED_WITH_GUIDE, ATTRACTION) if name in type(friction).model_fields]
+    for name in torques if factor != 1 else ():
         values[name] = factor * values.get(name, float(getattr(friction, name)))
-    if not _within(Friction, values):
+    if not _within(type(friction), values):
         return None
     made = friction.model_copy(update=values)
     # Where the identification found no difference of both, F_S is no value of its own and follows F_C.
@@ -321,7 +327,7 @@ def _times(group: ParameterGroup, names: Iterable[str], factor: float) -> Parame
     return group.model_copy(update={name: factor * getattr(group, name) for name in names})
 
 
-def _within(model: type[Friction | Drive], values: Mapping[str, float]) -> bool:
+def _within(model: type[FrictionParameters | Drive], values: Mapping[str, float]) -> bool:
     """Whether all values are in the ranges of their parameters."""
     for name, value in values.items():
         quantity = Quantity.of(model.model_fields[name])

@@ -244,7 +244,7 @@ pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full
 identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320 logs of known axes, good and flawed (half an hour; docs/identification.md)
 	$(PY) benchmarks/identification_study.py
 
-drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of nine (two hours; docs/replay.md)
+drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of eleven (half an hour of one core; docs/replay.md)
 	$(PY) benchmarks/drive_study.py
 
 compensation-study: fmus $(VENV)/.run ## what friction compensations take off on three machines (some five minutes; docs/tuning.md)

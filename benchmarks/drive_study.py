@@ -287,7 +287,11 @@ def scenario(kind: Kind, random: np.random.Generator, seed: int) -> str:
         for by, feed in zip(way, random.uniform((8000, 4000, 1500), (12000, 8000, 3000)), strict=True)
     )
     # The other axis moves as well, where the record is of two.
-    moves += "".join(f"  - {{kind: move, by: {{{axis}: 15 mm}}, feed: 6000 mm/min}}\n" for axis in kind.axes[1:])
+    moves += "".join(
+        f"  - {{kind: move, by: {{{axis}: {way} mm}}, feed: 6000 mm/min}}\n"
+        for axis in kind.axes[1:]
+        for way in (15, -9)
+    )
     return (
         f"name: log\nmachine: {MACHINE}\nmotions:\n  - {{kind: dwell, duration: 0.12 s}}\n{moves}"
         f"recording: {{interval: 1 ms}}\nlogging: {{interval: 2 ms, axes: [{', '.join(kind.axes)}], "

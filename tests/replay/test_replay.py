@@ -53,6 +53,22 @@ def test_a_log_of_the_machine_itself(log: Path, tmp_path: Path) -> None:
     assert_numbers_agree(tmp_path / "out")
 
 
+@pytest.mark.parametrize("share", [0.7, 0.9])
+def test_torque_that_a_record_cuts_off_counts_in_no_figure(
+    share: float, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The machine itself, whose log ends at a share of the largest torque; at 0.9 that is a few rows only."""
+    own = read_csv(log)
+    torque = np.asarray(own["Z.M_a"])
+    most = share * float(np.max(np.abs(torque)))
+    cut = {name: np.clip(torque, -most, most) if name == "Z.M_a" else own[name] for name in own}
+    write_csv(tmp_path / "cut.csv", Trace(own.time, cut, own.units))
+    figures = replayed(tmp_path / "cut.csv", tmp_path / "out")
+    assert "the torque of these rows counts in no figure" in capsys.readouterr().err
+    assert figures["position_rms"] < 1e-3
+    assert figures["torque_rms"] < 0.05 * most * np.sqrt(np.mean(np.abs(torque) > most))
+
+
 def test_the_torque_at_standstill_is_a_figure_of_its_own(log: Path, tmp_path: Path) -> None:
     """Rest ahead of the first move and behind the last one, with friction that is half as large: what the drive holds
     there is another torque. The figure of the motion does not show it."""

@@ -10,6 +10,7 @@ rows heap, the record is cut off there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,26 +46,35 @@ def without_clipped(
     records: Sequence[Record],
     J: float | None = None,
     left_out: str = "these rows and the plateaus with them are left out",
+    simulated: Sequence[Array] | None = None,
 ) -> tuple[tuple[Record, ...], tuple[str, ...]]:
     """The records with the rows marked at which their torque is cut off, and a sentence for each such record.
 
     J: inertia [kg.m2] for records whose other rows determine none. left_out: what the caller does with such rows.
+    simulated: (N,) of each record: torque [N.m] of a machine on this motion, in place of inertia and simple friction.
     """
     heaps = [tuple(_heap(record, side) for side in (1.0, -1.0)) for record in records]
     trial = [
         replace(record, clipped=np.any([heap.rows for heap in both], axis=0))
         for record, both in zip(records, heaps, strict=True)
     ]
-    try:
-        rigid: Inertia | None = inertia(trial)
-    except InputError:
-        rigid = None
-    if rigid is None and J is None:
+    rigid: Inertia | None = None
+    if simulated is None:
+        with suppress(InputError):
+            rigid = inertia(trial)
+    if rigid is None and J is None and simulated is None:
         return tuple(records), ()
-    needed = [_needed(record, rigid, J or 0.0) for record in records]
-    margin = CLIPPING_SIGMAS * rigid.rms if rigid is not None else 0.0
+    needed = simulated or [_needed(record, rigid, J or 0.0) for record in records]
+    left = rigid.rms if rigid is not None else 0.0
+    if simulated is not None:  # another machine than that of the record needs another torque everywhere
+        off = [(torque - each.torque)[~each.clipped] for each, torque in zip(trial, simulated, strict=True)]  # type: ignore[operator]
+        left = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+    shortest = 1 if simulated is not None else MIN_HEAP_ROWS
     proven = [
-        heap for both, torque in zip(heaps, needed, strict=True) for heap in both if _beyond(heap, torque, margin)
+        heap
+        for both, torque in zip(heaps, needed, strict=True)
+        for heap in both
+        if _beyond(heap, torque, CLIPPING_SIGMAS * left, shortest)
     ]
     result, said = [], []
     for record, both, torque in zip(records, heaps, needed, strict=True):
@@ -108,10 +118,10 @@ def _needed(record: Record, rigid: Inertia | None, J: float) -> Array:
     return torque if record.load is None else torque + record.load
 
 
-def _beyond(heap: _Heap, needed: Array, margin: float) -> bool:
-    """Whether the motion needs clearly more than the limit over some run of the heap."""
+def _beyond(heap: _Heap, needed: Array, margin: float, shortest: int) -> bool:
+    """Whether the motion needs clearly more than the limit over some run of the heap, of so many means at least."""
     limit, side = heap.limit, heap.side
-    inner = [(first, last) for first, last in runs(heap.rows) if last - first >= MIN_HEAP_ROWS + MEAN - 1]
+    inner = [(first, last) for first, last in runs(heap.rows) if last - first >= shortest + MEAN - 1]
     most = max((float(np.median(side * needed[first:last])) for first, last in inner), default=-np.inf)
     return most > limit + max(CLIPPED_EXCESS * abs(limit), margin)
 

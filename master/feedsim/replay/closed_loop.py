@@ -22,6 +22,7 @@ from feedsim.cosim.loads import Acting
 from feedsim.errors import InputError
 from feedsim.files.columns import Columns
 from feedsim.identify import Record, Recorded
+from feedsim.identify.clipping import without_clipped
 from feedsim.identify.read import read_records
 from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
@@ -72,6 +73,12 @@ class AxisRecord:
     def speed(self) -> Array:
         """(N,) measured, by central differences [m/s]."""
         return np.asarray(np.gradient(self.position, self.record.interval), dtype=np.float64)
+
+    @property
+    def counted(self) -> Mask:
+        """(N,) bool: rows whose torque counts, as it is not cut off."""
+        clipped = self.record.clipped
+        return np.ones(len(self.record), dtype=bool) if clipped is None else ~clipped
 
     @property
     def moving(self) -> Mask:
@@ -146,6 +153,20 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
     if np.count_nonzero(rows) < 10:
         raise InputError(f"{read.provenance.file}: {np.count_nonzero(rows)} rows in the window; at least 10 are needed")
     return AxisRecord(axis, record, pitch / (2 * np.pi), rows)
+
+
+def unclipped(
+    each: AxisRecord, left_out: str, J: float | None = None, simulated: Array | None = None
+) -> tuple[AxisRecord, tuple[str, ...]]:
+    """The record with the rows marked at which its torque is cut off, and sentences on them.
+
+    left_out: what becomes of these rows. J: inertia [kg.m2], where it is known. simulated: (N,) torque [N.m] of the
+    machine on this motion, where there is one.
+    """
+    if not each.record.driven:
+        return each, ()
+    (record,), said = without_clipped([each.record], J, left_out, None if simulated is None else [simulated])
+    return replace(each, record=record), tuple(f"axis {each.axis}: {text}" for text in said)
 
 
 def _begins_in_motion(record: Record) -> bool:

@@ -16,7 +16,7 @@ from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.findings import Note, Wrong
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
-from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of, unclipped
 from feedsim.replay.outside import Line, in_words, without_outside
 from feedsim.scenario import Drive, Machine
 from feedsim.trace.trace import Array
@@ -60,7 +60,8 @@ class Comparison:
             where there is none.
         limit: torque that the simulated drive cannot exceed [N.m]; limited: share of its rows at that limit.
         open_loop: whether the recorded torque drives the axis, in place of a drive.
-        outside: lines of the record that come from outside the axis.
+        outside: lines of the record that come from outside the axis. clipped: sentences on torque that the record cuts
+            off: its rows count in no figure of the torque.
     """
 
     axis: str
@@ -74,6 +75,7 @@ class Comparison:
     limited: float = 0.0
     open_loop: bool = False
     outside: Sequence[Line] = ()
+    clipped: Sequence[str] = ()
 
     @property
     def findings(self) -> list[str]:
@@ -93,6 +95,7 @@ class Comparison:
                 f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) than the recorded "
                 f"one is behind its setpoint ({1e6 * self.lag:.4g} um): this is not the machine of the record"
             ))  # fmt: skip
+        result += self.clipped
         if self.outside:
             result.append(Note(in_words(self.axis, self.outside)))
         return result
@@ -104,14 +107,14 @@ class Comparison:
         result: dict[str, Figure] = {}
         for name, channel in self.channels.items():
             scale, unit = {"m": (1e6, "um"), "rad/s": (TO_RPM, "rpm")}.get(channel.unit, (1.0, channel.unit))
-            error = scale * channel.error[rows]
+            error = scale * channel.error[rows & self.each.counted if name == "torque" else rows]
             key = name.replace(" ", "_")
             reported = f"{channel.meaning}: simulated less recorded{'' if self.open_loop else ', while the axis moves'}"
             result[f"{self.axis}.{key}_rms"] = Figure(rms(error), unit, f"{reported}, root mean square")
             result[f"{self.axis}.{key}_largest"] = Figure(
                 float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{reported}, largest magnitude"
             )
-        still = self.each.rows & ~self.each.moving
+        still = self.each.rows & ~self.each.moving & self.each.counted
         if "torque" in self.channels and np.count_nonzero(still) >= LEAST_STILL:
             result[f"{self.axis}.torque_standstill_rms"] = Figure(
                 rms(self.channels["torque"].error[still]), "N.m",
@@ -205,8 +208,12 @@ def compared(
     x_a = simulated["x_a"][::per_row]
     channels = {"position": Channel(axis_record.position, x_a, "m", "position")}
     delay = None
+    clipped: tuple[str, ...] = ()
     if record.driven:
         delay, torque = _delayed(axis_record, simulated["M_a"], per_row)
+        axis_record, clipped = unclipped(axis_record, "the torque of these rows counts in no figure", simulated=torque)
+        if clipped:
+            delay, torque = _delayed(axis_record, simulated["M_a"], per_row)
         channels["torque"] = Channel(record.torque, torque, "N.m", "motor torque")
     if speed is not None and record.speed_setpoint is not None:
         asked = speed.of(record.setpoint, x_a / axis_record.I_P, record.feedforward)
@@ -217,7 +224,7 @@ def compared(
     limited = limited[np.repeat(axis_record.rows, per_row)[per_row - 1 :]]
     return Comparison(
         axis_record.axis, axis_record, channels, taps, speed, lag, delay, limit, float(np.mean(limited)),
-        outside=without_outside(axis_record)[1],
+        outside=without_outside(axis_record)[1], clipped=clipped,
     )  # fmt: skip
 
 
@@ -225,7 +232,7 @@ def _delayed(axis_record: AxisRecord, torque: Array, per_row: int) -> tuple[floa
     """The delay [s] with which the simulated torque agrees best with the recorded one, and that torque at the rows."""
     time, h = axis_record.record.time, axis_record.record.interval
     fine = time[0] + h / per_row * np.arange(len(torque))
-    rows = axis_record.moving if np.any(axis_record.moving) else axis_record.rows
+    rows = (axis_record.moving if np.any(axis_record.moving) else axis_record.rows) & axis_record.counted
 
     def at(delay: float) -> Array:
         return np.asarray(np.interp(time - delay, fine, torque), dtype=np.float64)

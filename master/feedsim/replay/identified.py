@@ -12,11 +12,10 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
-from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
-from feedsim.replay.closed_loop import AxisRecord, Replay, same_time
+from feedsim.replay.closed_loop import AxisRecord, Replay, same_time, unclipped
 from feedsim.replay.compare import Comparison, replayed
 from feedsim.replay.coupling import coupled
 from feedsim.replay.drive import DECISIVE, DriveFound, identify_drive
@@ -84,7 +83,8 @@ def identify_drives(
     """
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
-    fitted, outside, clipped = {}, {}, []
+    fitted, outside = {}, {}
+    clipped: list[str] = []
     for axis, each in records.items():
         _refuse_own_setpoint(each)
         whole, said = _without_clipped(each, machine)
@@ -141,20 +141,19 @@ def identify_drives(
             files = machine_files(name, note, rigid, interval, cycle, control)
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
-        comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
+        comparisons = [
+            replace(replayed(made[axis], {axis: each}, fmus)[axis], clipped=()) for axis, each in records.items()
+        ]
     return DrivesFound(found, comparisons, files, outside, clipped)
 
 
-def _without_clipped(each: AxisRecord, machine: Machine | None) -> tuple[AxisRecord, list[str]]:
+def _without_clipped(each: AxisRecord, machine: Machine | None) -> tuple[AxisRecord, Sequence[str]]:
     """The record with the rows marked at which its torque is cut off, and a sentence on them."""
-    if not each.record.driven:
-        return each, []
     J = checked_modes(machine).J_tot(each.axis) if machine is not None else None
-    if J is None:
+    if J is None and each.record.driven:
         with suppress(InputError):  # where a torque is cut off, it comes out too small: what needs more, does
             J = inertia([each.record]).J.value
-    (record,), said = without_clipped([each.record], J, "the torque of these rows is left out of the fit")
-    return replace(each, record=record), [f"axis {each.axis}: {text}" for text in said]
+    return unclipped(each, "the torque of these rows is left out of the fit", J)
 
 
 def _beside(

@@ -123,8 +123,7 @@ class Problem:
     @property
     def counted(self) -> Mask:
         """(N,) of `rows`: whether the torque counts."""
-        clipped = self.each.record.clipped
-        return np.ones(len(self.rows), dtype=bool) if clipped is None else ~clipped[self.rows]
+        return self.each.counted[self.rows]
 
     @property
     def per_row(self) -> int:
@@ -147,8 +146,7 @@ class Problem:
         fine = time[0] + h * np.arange(len(result["M_a"]))
         torque = scale * np.interp(time - delay, fine, result["M_a"])
         off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
-        if self.each.record.clipped is not None:
-            off = np.where(self.each.record.clipped, 0.0, off)
+        off = np.where(self.each.counted, off, 0.0)
         return result["x_a"][:: self.per_row] - self.each.position, off
 
     def damping_penalty(self, values: Mapping[str, float]) -> float:

@@ -196,16 +196,6 @@ class Chart:
     panels: Sequence[Part]
     widths: Sequence[float] = (1.0,)
 
-    @property
-    def legend(self) -> dict[str, Curve]:
-        """A curve of each name, in their order."""
-        result: dict[str, Curve] = {}
-        for panel in self.panels:
-            if not isinstance(panel, Grid):
-                for curve in panel.curves:
-                    result.setdefault(curve.name, curve)
-        return {name: curve for name, curve in result.items() if name}
-
     def rows(self) -> Iterator[Sequence[Part]]:
         """The panels of each row."""
         for k in range(0, len(self.panels), len(self.widths)):

@@ -325,9 +325,9 @@ def _arrow(start: Array, end: Array, width: float, tip: float, colour: str = "")
 def _named_bodies(of: Model) -> list[Named]:
     """Bodies by their colours."""
     metal = [name for name in of.colours if name.startswith(("screw ", "rotor "))]
-    found = [_patch(colour * 0.86, name or "(no body)") for name, colour in list(of.colours.items())[:MOST_BODIES]
+    names = [_patch(colour * 0.86, name or "(no body)") for name, colour in list(of.colours.items())[:MOST_BODIES]
              if name not in metal]  # fmt: skip
-    return [*found, _patch(of.colours[metal[0]] * 0.86, "screws, motors")] if metal else found
+    return [*names, _patch(of.colours[metal[0]] * 0.86, "screws, motors")] if metal else names
 
 
 def _named_features(of: Model) -> list[Named]:

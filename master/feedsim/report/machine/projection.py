@@ -71,8 +71,8 @@ def tube(stations: Array, colour: Array) -> list[Faces]:
     turn = [(i + 1) % c for i in range(c)]
     sides = np.stack([first, first[:, turn], after[:, turn], after], axis=2).reshape(-1, 4, 3)
     ends = np.stack([stations[0][::-1], stations[-1]])
-    found = [Faces(sides, np.tile(colour, (len(sides), 1)))]
-    return [*found, Faces(ends, np.tile(colour, (2, 1)))]
+    faces = [Faces(sides, np.tile(colour, (len(sides), 1)))]
+    return [*faces, Faces(ends, np.tile(colour, (2, 1)))]
 
 
 class Field:

@@ -101,7 +101,7 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
         locks = [lock]
         if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
-            reported = lock.told()
+            reported = lock.content()
             if reported and f" on {platform.node()} since " not in reported:
                 lock.close()
                 raise OutputError(
@@ -114,7 +114,7 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
         if all(lock.state is not False for lock in locks):
             lock.tell(_self())
             return locks
-        reported = lock.told()
+        reported = lock.content()
         for entry in locks:
             entry.close()
         if time.monotonic() >= until:
@@ -161,7 +161,7 @@ class _Lock:
             os.lseek(self._file, 0, os.SEEK_SET)
             os.write(self._file, text.encode("utf-8", "replace"))
 
-    def told(self) -> str:
+    def content(self) -> str:
         """What its owner has written into it."""
         with suppress(OSError):
             os.lseek(self._file, 0, os.SEEK_SET)

@@ -12,7 +12,7 @@ import pytest
 from analysis.drawn_circles import Causes, driven
 from feedsim import cli
 from feedsim.analysis.circle import CircleUnderTest
-from feedsim.analysis.circle.header import told_ahead
+from feedsim.analysis.circle.header import header_values
 
 RADIUS, SPEED = 0.15, 1.0 / 60
 CIRCLE = CircleUnderTest(("X", "Y"), RADIUS, SPEED)
@@ -95,7 +95,7 @@ def test_lines_of_other_things_tell_nothing() -> None:
         "",
         "Feed override: 100 %",
     ]
-    assert told_ahead(lines) == ({}, [])
+    assert header_values(lines) == ({}, [])
 
 
 @pytest.mark.parametrize("suffix", [".b5r", ".KGM"])

@@ -262,7 +262,7 @@ def test_rows_stay_where_results_cannot_be_written(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["report.html", "result.csv", "result.partial.csv"]
     assert (tmp_path / "result.csv").read_text() == "old result.csv"
     assert (tmp_path / "report.html").read_text() == "old report.html"
-    assert partial.left
+    assert partial.has_rows
     write_csv(tmp_path / "afterwards.csv", run.trace)
     assert partial.path.read_bytes() == (tmp_path / "afterwards.csv").read_bytes()
 
@@ -274,10 +274,10 @@ def test_run_that_never_begins_takes_no_rows_away(fmus: Path, tmp_path: Path) ->
     with pytest.raises(InputError), report.growing(tmp_path) as partial:
         cosim.run(scenario.load(CIRCLE, [*SHORT]), fmus=tmp_path / "none", sink=partial)
     assert kept.read_text() == "of another run"
-    assert not partial.left
+    assert not partial.has_rows
     partial = report.growing(tmp_path)
     cosim.run(scenario.load(CIRCLE, [*SHORT]), fmus=fmus, sink=partial)
-    assert partial.left
+    assert partial.has_rows
     assert kept.read_text().startswith("time [s],")
     assert target.read_text() == "of another run"
 

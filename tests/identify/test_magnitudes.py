@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify.magnitudes import MAX_ROWS, check_found, check_inertia, check_size, check_time
+from feedsim.identify.magnitudes import MAX_ROWS, check_estimates, check_inertia, check_size, check_time
 from feedsim.identify.parameters import estimate
 from feedsim.identify.read import read_records
 from feedsim.identify.record import Record
@@ -63,13 +63,13 @@ def test_what_no_feed_axis_has(name: str, value: float, said: str) -> None:
     """The default machine's Z axis; one of its parameters is off by 1000 as with mm for m."""
     true = {"sigma_0": 300.0, "F_C": 1.6, "v_s": 0.6, "J": 0.0164}
     found = {each: estimate(each, size, 0.01 * size) for each, size in true.items()}
-    check_found(found, LEAD)
+    check_estimates(found, LEAD)
     with pytest.raises(InputError, match="nothing is written") as error:
-        check_found(found | {name: estimate(name, value, 0.01 * value)}, LEAD)
+        check_estimates(found | {name: estimate(name, value, 0.01 * value)}, LEAD)
     assert said in str(error.value)
     # What is not known tells nothing.
-    check_found(found | {name: estimate(name, value, status="undetermined", reason="-")}, LEAD)
-    check_found(found | {name: estimate(name, value, 0.5 * value)}, LEAD)
+    check_estimates(found | {name: estimate(name, value, status="undetermined", reason="-")}, LEAD)
+    check_estimates(found | {name: estimate(name, value, 0.5 * value)}, LEAD)
 
 
 def test_an_inertia_of_another_magnitude() -> None:

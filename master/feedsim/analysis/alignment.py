@@ -28,7 +28,7 @@ SAME_MOTION = 0.02
 SAME_CENTRE = 1e-3
 # An axis counts as moving faster than this [m/s], and further [m]: splines through setpoints ring by less.
 MOVING_SPEED, MOVING_DISTANCE = 10e-6, 1e-6
-MOST_TOLD = 4  # signals in a message
+MAX_SIGNALS_NAMED = 4  # signals in a message
 WORDS = {"x_s": "position setpoints x_s", "x_a": "positions x_a, which takes out what all axes lag"}
 
 
@@ -38,8 +38,8 @@ def aligned(sources: Sequence[Source]) -> list[Source]:
     InputError lists the sources that share no signal and no figure with any other one.
     """
     alone = [
-        f"{source.name}: has nothing that can be laid over another one; it has {_told(source)}; the others have "
-        f"{'; '.join(_told(other) for other in sources if other is not source)}"
+        f"{source.name}: has nothing that can be laid over another one; it has {_signals(source)}; the others have "
+        f"{'; '.join(_signals(other) for other in sources if other is not source)}"
         for source in sources
         if len(sources) > 1 and not any(_shares(source, other) for other in sources if other is not source)
     ]
@@ -50,9 +50,12 @@ def aligned(sources: Sequence[Source]) -> list[Source]:
     return [_with_circles(source, circles) for source in shifted]
 
 
-def _told(source: Source) -> str:
-    more = len(source.signals) - MOST_TOLD
-    return ", ".join(source.signals[:MOST_TOLD]) + (f" and {more} more" if more > 0 else "") or "no signal of an axis"
+def _signals(source: Source) -> str:
+    more = len(source.signals) - MAX_SIGNALS_NAMED
+    return (
+        ", ".join(source.signals[:MAX_SIGNALS_NAMED]) + (f" and {more} more" if more > 0 else "")
+        or "no signal of an axis"
+    )
 
 
 def _shares(one: Source, other: Source) -> bool:

@@ -223,8 +223,8 @@ def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Ma
         if name.rpartition(".")[2] in ("G", "G_ls") or name.startswith(REVERSAL)
     }
     rest = {name: both for name, both in worse.items() if name not in grave}
-    told = [Wrong(f"worse with compensation than without: {_listed(grave)}")] if grave else []
-    return told + ([f"larger with compensation than without: {_listed(rest)}"] if rest else [])
+    wrongs = [Wrong(f"worse with compensation than without: {_listed(grave)}")] if grave else []
+    return wrongs + ([f"larger with compensation than without: {_listed(rest)}"] if rest else [])
 
 
 def _size(name: str, value: float) -> float:
@@ -256,7 +256,7 @@ def _same_model(
     same = [axis for axis, friction in used.items() if friction == machine.axes[axis].friction and axis in lags]
     if not same:
         return []
-    worst = max(table, key=lambda each: each.quality.G, default=None)
+    worst = max(table, key=lambda variation: variation.quality.G, default=None)
     errors = "errors of it are not tried here (--no-table)"
     if worst is not None:
         errors = (
@@ -303,9 +303,9 @@ def circle_figures(turn: Turn, before: Trace, after: Trace) -> dict[str, Figure]
 
 def _figures_of(turn: Turn, name: str, words: str, trace: Trace) -> dict[str, Figure]:
     """Figures of the turn of a run. name: ahead of the keys; words: "without" or "with", for the meanings."""
-    found = circularity(trace, turn)
+    figures = circularity(trace, turn)
     for axis, dip in quality(trace, turn).dip.items():
-        found[f"dip_{axis}"] = Figure(
+        figures[f"dip_{axis}"] = Figure(
             dip * 1e6,
             "um",
             f"lowest radius deviation within +-45 deg of where {axis} reverses, less the median, by the linear "
@@ -313,7 +313,7 @@ def _figures_of(turn: Turn, name: str, words: str, trace: Trace) -> dict[str, Fi
         )
     return {
         f"{name}.{key}": replace(figure, meaning=f"{words} compensation: {figure.meaning}")
-        for key, figure in found.items()
+        for key, figure in figures.items()
     }
 
 

@@ -124,17 +124,17 @@ def errors_and_changes(
         plan = lean.model_copy(update={"machine": own})
         return quality(run(plan, program=cut, fmus=fmus, torque_feedforward=torque).trace, turn)
 
-    found = []
+    variations = []
     for done, (what, change, unit, set_, delay) in enumerate(wanted):
         progress("what errors cost", done, total)
-        found.append(Variation(what, change, unit, left(machine, feedforward(set_, delay))))
+        variations.append(Variation(what, change, unit, left(machine, feedforward(set_, delay))))
     changed = []
     torque = feedforward(frictions, delays) if machines else {}
     for done, (words, own) in enumerate(machines.items(), start=len(wanted)):
         progress("what errors cost", done, total)
         changed.append(Changed(words, left(own, None), left(own, torque)))
     progress("what errors cost", total, total)
-    return tuple(found), tuple(changed)
+    return tuple(variations), tuple(changed)
 
 
 def _varied(friction: Friction, names: Sequence[str], factor: float) -> Friction:

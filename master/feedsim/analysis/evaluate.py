@@ -174,7 +174,7 @@ class AccuracyTask:
         """Columns without which there is nothing to evaluate."""
         return (f"{self.visits.axis}.x_a",)
 
-    def found(self, trace: Trace) -> dict[str, Accuracy]:
+    def accuracies(self, trace: Trace) -> dict[str, Accuracy]:
         """By the linear scale (""), and by the tool point ("tool.") where that is recorded."""
         names = {"": f"{self.visits.axis}.x_a", "tool.": f"tcp.x_{self.visits.axis}"}
         rng = np.random.default_rng(self.seed)
@@ -188,7 +188,7 @@ class AccuracyTask:
         """Figures of the task, without prefix."""
         return {
             f"{place}{name}": figure
-            for place, accuracy in self.found(trace).items()
+            for place, accuracy in self.accuracies(trace).items()
             for name, figure in accuracy.figures.items()
         }
 

@@ -38,7 +38,7 @@ examples:
 def sweep(options: Namespace) -> int:
     """feedsim sweep."""
     if options.row is not None or options.dry_run:
-        return _told(options)
+        return _described(options)
     from feedsim.jobs.sweep import sweep
 
     out: Path = options.out or Path("results") / options.study.stem
@@ -70,7 +70,7 @@ def sweep(options: Namespace) -> int:
     return 0
 
 
-def _told(options: Namespace) -> int:
+def _described(options: Namespace) -> int:
     """What a study would do, or the command of one of its runs; nothing is run."""
     from feedsim.scenario.study import load_study
     from feedsim.sweep import design

@@ -17,8 +17,8 @@ from feedsim.compare.options import (
     chosen,
     factor,
     missing,
+    repeated_units,
     sources,
-    units_told,
     with_units,
 )
 from feedsim.compare.overlap import Overlap
@@ -77,8 +77,8 @@ def _compared(
     asked = [name for name in chosen(reference.all_names, options) if not tolerances.of(name).ignore]
     results = sources((*result.all_names, *result.skipped), asked, options)
     notes = _unused(result, reference, tolerances, options)
-    notes += units_told(reference.units, asked, options.reference_units, "reference")
-    notes += units_told(result.units, results.values(), options.units, "result")
+    notes += repeated_units(reference.units, asked, options.reference_units, "reference")
+    notes += repeated_units(result.units, results.values(), options.units, "result")
     result, reference = with_units(result, options.units), with_units(reference, options.reference_units)
     unused = tuple(tolerances.unused(reference.all_names))
     blank = Comparison(*names, "unusable", notes=tuple(notes), shift=options.shift, unused=unused)
@@ -87,7 +87,7 @@ def _compared(
         return replace(blank, problem=f"no column in common: {wanted}")
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
-    fixed = _held(between, reference)
+    fixed = _bounds_between(between, reference)
     reach = min(tolerances.of(name).time or 0.0 for name in results)
     over = Overlap(result, reference, options, reach, bounded=fixed.keys() >= results.keys())
     peers = _magnitudes(reference, asked)
@@ -127,7 +127,7 @@ def _compared(
     )
 
 
-def _held(between: Series | None, reference: Series) -> dict[str, Between]:
+def _bounds_between(between: Series | None, reference: Series) -> dict[str, Between]:
     """Variable -> its bounds between the rows of the reference. InputError: they are of another one."""
     if between is None:
         return {}

@@ -37,7 +37,7 @@ class _Guess:
     """What one variable looks like. left: root mean square of what is left of the difference; outside: rows that would
     still be outside, None where nothing can be put right."""
 
-    left: float
+    remaining: float
     words: str
     outside: int | None = None
 
@@ -67,7 +67,7 @@ def likeness(
         assert entry.curves is not None
         guesses = [] if entry.curves.hold else list(_guesses(entry, entry.curves, result))
         if guesses:
-            guessed[entry.name] = min(guesses, key=lambda guess: guess.left)
+            guessed[entry.name] = min(guesses, key=lambda guess: guess.remaining)
         if not guesses or guessed[entry.name].outside:
             open_ones.append(entry)
     shift = _shifted(open_ones, result, reference, tolerances, options) if open_ones else None
@@ -78,7 +78,7 @@ def likeness(
         assert entry.curves is not None
         remaining = np.inf if shift is None else _rest(entry.curves, shift - options.shift)
         if remaining <= EXPLAINED * _rms(_difference(entry.curves)) and (
-            entry.name not in guessed or remaining < guessed[entry.name].left
+            entry.name not in guessed or remaining < guessed[entry.name].remaining
         ):
             late.append(entry)
             guessed.pop(entry.name, None)
@@ -87,14 +87,14 @@ def likeness(
         if entry.name in guessed:
             groups.setdefault(guessed[entry.name].words, []).append(entry)
     outside = {name: guess.outside for name, guess in guessed.items()}
-    made = [_told(those, words, outside) for words, those in groups.items()]
+    made = [_proposal(those, words, outside) for words, those in groups.items()]
     if late and shift is not None:
         after = {variable.name: variable.outside for variable in again(replace(options, shift=shift)).variables}
-        made.insert(0, _told(late, _time_words(shift, options.shift, result), after))
+        made.insert(0, _proposal(late, _time_words(shift, options.shift, result), after))
     return tuple(made)
 
 
-def _told(those: Sequence[Variable], words: str, outside: Mapping[str, int | None]) -> Proposal:
+def _proposal(those: Sequence[Variable], words: str, outside: Mapping[str, int | None]) -> Proposal:
     """The same words of several variables, and what it would change; outside: rows that it would leave outside."""
     names = [variable.name for variable in those]
     rest = [

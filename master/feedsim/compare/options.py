@@ -98,7 +98,7 @@ def _given(name: str, given: Mapping[str, str]) -> str:
     return next((unit for pattern, unit in reversed(list(given.items())) if matches(name, pattern)), "")
 
 
-def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[str, str], whose: str) -> list[str]:
+def repeated_units(headers: Mapping[str, str], names: Iterable[str], given: Mapping[str, str], whose: str) -> list[str]:
     """Which compared columns are given the unit that their header gives already; one that it does not: InputError.
 
     headers: name -> unit as the file has it. given: pattern -> unit.

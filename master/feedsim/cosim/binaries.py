@@ -40,8 +40,8 @@ def is_shipped(archive: Archive) -> bool:
 def programs(archive: Archive) -> dict[str, str]:
     """What of an archive can be loaded on this platform."""
     root = archive.directory
-    found = [file for folder in folders() for file in (root / "binaries" / folder).rglob("*") if file.is_file()]
-    return {file.relative_to(root).as_posix(): _digest(file.read_bytes()) for file in sorted(found)}
+    paths = [file for folder in folders() for file in (root / "binaries" / folder).rglob("*") if file.is_file()]
+    return {file.relative_to(root).as_posix(): _digest(file.read_bytes()) for file in sorted(paths)}
 
 
 def _parts(machine: Machine, folder: Path, coupling: Coupling | None) -> dict[Path, list[str]]:
@@ -93,10 +93,10 @@ def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = No
     """
     folder = fmus or fmus_directory()
     parts = _parts(machine, folder, coupling)
-    told = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
+    reported = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
     if (digest := _loop(folder, fmus_directory())) is not None:
-        told.append(f"executes {folder / exchange.LIBRARY_NAME} as cycle loop, SHA-256 {digest}")
-    return told
+        reported.append(f"executes {folder / exchange.LIBRARY_NAME} as cycle loop, SHA-256 {digest}")
+    return reported
 
 
 def executing(path: Path, who: str) -> list[str]:
@@ -127,9 +127,9 @@ def _states(folder: Path) -> list[tuple[Path, int, int]]:
 def _shipped(*states: tuple[Path, int, int]) -> list[Programs]:
     """Programs of the shipped archives, none of which is unpacked for it."""
     wanted = tuple(f"binaries/{folder}/" for folder in folders())
-    found: list[Programs] = []
+    result: list[Programs] = []
     for path, _, _ in states:
         with suppress(OSError, zipfile.BadZipFile), zipfile.ZipFile(path) as package:
-            names = [each.filename for each in package.infolist() if not each.is_dir()]
-            found.append({name: _digest(package.read(name)) for name in names if name.startswith(wanted)})
-    return found
+            names = [zip_info.filename for zip_info in package.infolist() if not zip_info.is_dir()]
+            result.append({name: _digest(package.read(name)) for name in names if name.startswith(wanted)})
+    return result

@@ -71,8 +71,12 @@ class FrictionLaw(Closing):
         except BaseException:
             self.close()
             raise
-        parameters = [each for each in self._archive.description.modelVariables if each.causality == "parameter"]
-        self.start_values: Mapping[str, float] = {each.name: float(each.start) for each in parameters}
+        parameters = [
+            model_variable
+            for model_variable in self._archive.description.modelVariables
+            if model_variable.causality == "parameter"
+        ]
+        self.start_values: Mapping[str, float] = {parameter.name: float(parameter.start) for parameter in parameters}
         self.names = tuple(self.start_values)
         self._defaults = tuple(self.start_values.items())
         self._values = ctypes.c_double * len(self.names)

@@ -103,11 +103,11 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
         except InputError as error:
             group = "inputs" if signal in role.inputs else "outputs"
             problems.append(f"{archive.path.name}: {key}.{group}.{name}: {variable!r} {error}")
-    bare = [name for name, each in signals.items() if role.signals[name].unit not in (BOOLEAN, "1")
-            and archive.declared_unit(each.name) is None]  # fmt: skip
+    bare = [name for name, alias in signals.items() if role.signals[name].unit not in (BOOLEAN, "1")
+            and archive.declared_unit(alias.name) is None]  # fmt: skip
     if bare:
-        told = ", ".join(f"{signals[name].name} ({role.signals[name].unit})" for name in bare)
-        warnings.append(f"{where}: modelDescription.xml gives no unit for {told}: taken to be in SI units")
+        reported = ", ".join(f"{signals[name].name} ({role.signals[name].unit})" for name in bare)
+        warnings.append(f"{where}: modelDescription.xml gives no unit for {reported}: taken to be in SI units")
     parameters: dict[str, Parameter] = {}
     for name, given in unit.parameters.items():
         try:
@@ -116,10 +116,15 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
             problems.append(f"{archive.path.name}: {key}.parameters: parameter {name!r} {error}")
     if problems:
         raise InputError.of(where, problems)
-    left = [each for each in archive.variables.values()
-            if each.causality == "input" and each.name not in taken and each.name not in parameters]  # fmt: skip
-    if left:
-        kept = ", ".join(f"{each.name} ({each.start if each.start is not None else 'no start value'})" for each in left)
+    remaining = [
+        variable
+        for variable in archive.variables.values()
+        if variable.causality == "input" and variable.name not in taken and variable.name not in parameters
+    ]
+    if remaining:
+        kept = ", ".join(
+            f"{entry.name} ({entry.start if entry.start is not None else 'no start value'})" for entry in remaining
+        )
         warnings.append(f"{where}: nothing drives {kept}: inputs that no signal is given to keep their start values")
     flags = [signal.name for signal in role.outputs if signal.unit == BOOLEAN and signal.name not in signals]
     if flags:
@@ -133,10 +138,10 @@ def _alias(signal: Signal, is_input: bool, name: str, archive: Archive) -> Alias
     variable = archive.variables.get(name)
     causalities = ("input",) if is_input else ("output",) if signal.needed else ("output", "local")
     if variable is None:
-        fitting = [each.name for each in archive.variables.values() if each.causality in causalities]
+        fitting = [variable.name for variable in archive.variables.values() if variable.causality in causalities]
         raise InputError(f"is no variable of the archive{_named(name, fitting, ' or '.join(causalities))}")
     if variable.causality not in causalities:
-        fitting = [each.name for each in archive.variables.values() if each.causality in causalities]
+        fitting = [variable.name for variable in archive.variables.values() if variable.causality in causalities]
         raise InputError(
             f"is {variable.causality}, {' or '.join(causalities)} is needed{_listed(fitting, causalities[0])}"
         )
@@ -178,7 +183,7 @@ def start_value(archive: Archive, name: str, given: Parameter, driven: Mapping[s
     """What `given` is for the variable `name`, in the unit and type that it declares. `driven`: variables that stand
     for signals. InputError: it is no parameter, cannot be set, or not to that."""
     variable = archive.variables.get(name)
-    known = [each.name for each in archive.variables.values() if each.causality == "parameter"]
+    known = [variable.name for variable in archive.variables.values() if variable.causality == "parameter"]
     if variable is None:
         raise InputError(f"is no variable of the archive{_named(name, known, 'parameter')}")
     if name in driven:
@@ -264,12 +269,12 @@ def _listed(known: Sequence[str], kind: str) -> str:
 def check_instances(filled: Iterable[RoleUnit]) -> None:
     """InputError where an archive that allows one instance in a process stands on several axes."""
     axes: dict[Path, list[RoleUnit]] = {}
-    for each in filled:
-        if each.archive.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
-            axes.setdefault(each.archive.path.resolve(), []).append(each)
+    for role_unit in filled:
+        if role_unit.archive.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+            axes.setdefault(role_unit.archive.path.resolve(), []).append(role_unit)
     problems = [
         f"{crowd[0].archive.path.name} allows one instance in a process; it is named as "
-        + ", ".join(f"{each.role.name} of {each.axis}" for each in crowd)
+        + ", ".join(f"{entry.role.name} of {entry.axis}" for entry in crowd)
         for crowd in axes.values()
         if len(crowd) > 1
     ]

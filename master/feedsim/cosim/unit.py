@@ -173,9 +173,9 @@ class Unit:
                     setter([reference for _, reference, _ in group], [value for _, _, value in group])
             except Exception:
                 self._said()
-                self._set_each(setter, group)
+                self._set_one_by_one(setter, group)
 
-    def _set_each(self, setter: Any, group: Iterable[tuple[str, int, Any]]) -> None:
+    def _set_one_by_one(self, setter: Any, group: Iterable[tuple[str, int, Any]]) -> None:
         """Set start values one by one: name, reference, value. InputError names the one that is refused."""
         for name, reference, value in group:
             try:

@@ -88,29 +88,29 @@ def friction_yaml(identified: Identified, software: Mapping[str, str]) -> str:
     return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION_FILE, model=model)
 
 
-def constant_load_hint(found: Identification) -> str:
+def constant_load_hint(identification: Identification) -> str:
     """How to set the constant load, which is no friction; empty where there is none beyond doubt."""
-    load = found.estimates.get("M_0")
+    load = identification.estimates.get("M_0")
     if load is None or load.status == "held" or not abs(load.value) > NORMAL_95 * np.nan_to_num(load.sigma):
         return ""
-    key = f"machine.axes.{found.axis}.constant_load"
+    key = f"machine.axes.{identification.axis}.constant_load"
     interval = f" (95 %: {interval_text(load)})" if interval_text(load) else ""
     text = f"constant load M_0 {value_text(load)} N.m{interval} is no part of the friction"
-    lean = found.estimates.get("asymmetry")
+    lean = identification.estimates.get("asymmetry")
     if lean is not None and lean.status == "estimated" and abs(lean.value) > NORMAL_95 * lean.sigma:
         text += ", but goes with this asymmetry (either alone is wrong)"
     return f'{text}; set it with {key}="{load.value:.6g} N.m"'
 
 
-def open_loop_line(found: Identification) -> str:
+def open_loop_line(identification: Identification) -> str:
     """What the position in open loop changed, in one line; empty where there is nothing to say: it was not asked for,
     or all records are of sines."""
-    balance = found.balance
+    balance = identification.balance
     if balance is None or not balance.applies:
         return ""
     if not balance.applied:
         return f"not applied: {balance.reason}"
-    before, after = (1e3 * found.I_P * rms for rms in balance.position)
+    before, after = (1e3 * identification.I_P * rms for rms in balance.position)
     parts = [f"position off by {after:.3g} mm rms instead of {before:.3g} mm"]
     words: dict[str, list[str]] = {}  # "F_C and F_S -1.2 %" and "M_0 +0.0034 N.m", of those that moved
     for name, (old, new) in balance.changes.items():
@@ -201,10 +201,10 @@ def _head(identified: Identified, version: str) -> Sequence[str]:
 
 def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, Any]:
     """The group `identified`: where the values come from, for people and programs."""
-    found, subject = identified.found, identified.subject
+    identification, subject = identified.found, identified.subject
     sources = zip(identified.traces, identified.sources, strict=True)
     content: dict[str, Any] = {
-        "axis": found.axis,
+        "axis": identification.axis,
         "date": identified.date,
         "traces": [{"file": name, "sha256": source.sha256} for name, source in sources],
     }
@@ -212,25 +212,27 @@ def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, An
         content["machine"] = {"name": subject.machine.name, "note": subject.machine.note}
     if identified.settings:
         content["settings"] = dict(identified.settings)
-    content["lead"] = _quantity(found.I_P, "m/rad")
+    content["lead"] = _quantity(identification.I_P, "m/rad")
     named = {"M_0": "constant_load", "J": "inertia", "delay": "delay"}
     for name, key in named.items():
-        if (estimate := found.estimates.get(name)) is not None:
+        if (estimate := identification.estimates.get(name)) is not None:
             content[key] = {"value": _quantity(estimate.value, estimate.unit), **_interval(estimate)}
-    if found.balance is not None and found.balance.applied:
+    if identification.balance is not None and identification.balance.applied:
         drifts = [
             {"record": record, "value": _quantity(rate.value, rate.unit), **_interval(rate)}
-            for record, rate in found.balance.load_rates.items()
+            for record, rate in identification.balance.load_rates.items()
             if not _open(rate)
         ]
         if drifts:
             content["constant_load"]["drift"] = drifts
-    if line := open_loop_line(found):
+    if line := open_loop_line(identification):
         content["open_loop"] = line
-    content["parameters"] = {name: _interval(each) for name, each in found.estimates.items() if name not in named}
-    if found.correlation.names:
-        matrix = [[round(float(value), 4) for value in row] for row in found.correlation.matrix]
-        content["correlation"] = {"names": list(found.correlation.names), "matrix": matrix}
+    content["parameters"] = {
+        name: _interval(estimate) for name, estimate in identification.estimates.items() if name not in named
+    }
+    if identification.correlation.names:
+        matrix = [[round(float(value), 4) for value in row] for row in identification.correlation.matrix]
+        content["correlation"] = {"names": list(identification.correlation.names), "matrix": matrix}
     if identified.warnings:
         content["warnings"] = identified.warnings
     content["software"] = {name: software[name] for name in ("feedsim", "python", "numpy", "scipy")}
@@ -310,8 +312,8 @@ _Dumper.add_representer(list, _list)
 
 def _units(model: type[FrictionParameters]) -> dict[str, str]:
     """Name -> SI unit of every friction parameter, in the order of the file."""
-    found = {name: Quantity.of(info) for name, info in model.model_fields.items()}
-    return {name: quantity.unit for name, quantity in found.items() if quantity is not None}
+    quantities = {name: Quantity.of(info) for name, info in model.model_fields.items()}
+    return {name: quantity.unit for name, quantity in quantities.items() if quantity is not None}
 
 
 def _number(value: float) -> str:

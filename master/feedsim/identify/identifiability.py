@@ -39,7 +39,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
     kept: what is free whatever its bound, because a prior determines it.
     """
     values = solution.values
-    found: list[tuple[float, Verdict]] = []
+    result: list[tuple[float, Verdict]] = []
     for name in free:
         # Those without a scale of their own are determined with any bound, large or small.
         lenient = name in kept or name in ANY_VALUE
@@ -48,17 +48,17 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
             continue
         judged = _judge(solution, name)
         if judged is not None:
-            found.append(judged)
-    if not found:
+            result.append(judged)
+    if not result:
         return None
-    found.sort(key=lambda pair: -pair[0])
+    result.sort(key=lambda pair: -pair[0])
     # Damping and engagement first: they lean on the others.
     order = ("asymmetry", "gamma", "W", "skew", "spread", "F_log", "F_S", "v_s", "sigma_1", "sigma_2")
     for name in order:
-        for _, candidate in found:
+        for _, candidate in result:
             if name in candidate.held:
                 return _complete(candidate, free, values)
-    return _complete(found[0][1], free, values)
+    return _complete(result[0][1], free, values)
 
 
 def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
@@ -87,17 +87,17 @@ def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
 
 def _complete(judged: Verdict, free: Collection[str], values: Mapping[str, float]) -> Verdict:
     """What goes with it: W and gamma only make sense together, so do F_S and v_s."""
-    held = dict(judged.held)
-    if {"W", "gamma"} & set(held):
-        held = {name: NO_EFFECT[name] for name in ("W", "gamma") if name in free}
-    if {"F_S", "v_s"} & set(held):
-        held = {name: values["F_C"] if name == "F_S" else values["v_s"] for name in ("F_S", "v_s") if name in free}
-    if "spread" in held:  # what the shares lean on
-        held |= {"skew": NO_EFFECT["skew"]} if "skew" in free else {}
+    fixed = dict(judged.held)
+    if {"W", "gamma"} & set(fixed):
+        fixed = {name: NO_EFFECT[name] for name in ("W", "gamma") if name in free}
+    if {"F_S", "v_s"} & set(fixed):
+        fixed = {name: values["F_C"] if name == "F_S" else values["v_s"] for name in ("F_S", "v_s") if name in free}
+    if "spread" in fixed:  # what the shares lean on
+        fixed |= {"skew": NO_EFFECT["skew"]} if "skew" in free else {}
     for name in ("sigma_1", "sigma_2", "F_log", "asymmetry", "skew"):
-        if name in held:
-            held[name] = NO_EFFECT[name]
-    return Verdict(held, judged.name, judged.reason)
+        if name in fixed:
+            fixed[name] = NO_EFFECT[name]
+    return Verdict(fixed, judged.name, judged.reason)
 
 
 def no_delay(models: Sequence[RecordTorque], solution: Solution, free: Collection[str]) -> Verdict | None:
@@ -128,11 +128,13 @@ def has_sines(models: Sequence[RecordTorque]) -> bool:
     return any(part.kind == "sine" for model in models for part in model.parts)
 
 
-def explained(models: Sequence[RecordTorque], found: Solution, tried: Solution) -> float:
+def explained(models: Sequence[RecordTorque], solution: Solution, tried: Solution) -> float:
     """How much the residual falls from one solution to the other, in squares, as a share of the torque's rms [1]."""
     squares = torque = 0.0
     for k, model in enumerate(models):
-        ends = [model.residual(one.values, float(one.states[k, 0]), float(one.states[k, 1])) for one in (found, tried)]
+        ends = [
+            model.residual(one.values, float(one.states[k, 0]), float(one.states[k, 1])) for one in (solution, tried)
+        ]
         squares += float(np.sum(ends[0] ** 2) - np.sum(ends[1] ** 2))
         torque += float(np.sum(model.measured**2))
     return float(np.sqrt(max(squares, 0.0) / max(torque, 1e-300)))
@@ -162,8 +164,8 @@ def _reversals(model: RecordTorque) -> list[int]:
     fast = np.flatnonzero(np.abs(n) > FAST * np.max(np.abs(n)))
     sides = np.sign(n[fast])
     turns = np.flatnonzero(sides[1:] != sides[:-1])
-    found = []
+    indexes = []
     for k in turns:
         between = n[fast[k] : fast[k + 1] + 1] * sides[k]
-        found.append(int(fast[k] + np.argmax(between <= 0)))
-    return found
+        indexes.append(int(fast[k] + np.argmax(between <= 0)))
+    return indexes

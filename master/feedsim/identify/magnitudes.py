@@ -79,7 +79,7 @@ def check_size(records: Sequence[Record], where: str = "the traces") -> None:
         )
 
 
-def check_found(estimates: Mapping[str, Estimate], I_P: float) -> None:
+def check_estimates(estimates: Mapping[str, Estimate], I_P: float) -> None:
     """Raises InputError: what was estimated, of the rigid axis or in all, is nothing that a feed axis has."""
     for name, value, words in _slide(estimates, I_P):
         low, high, unit = PLAUSIBLE[name]

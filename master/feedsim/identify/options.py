@@ -9,7 +9,7 @@ from pathlib import Path
 
 from feedsim import variables
 from feedsim.errors import InputError
-from feedsim.identify.parameters import PARAMETER_KINDS, Kind, check_held, estimate
+from feedsim.identify.parameters import PARAMETER_KINDS, Kind, check_fixed, estimate
 from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
 from feedsim.scenario import Friction, Machine
@@ -65,7 +65,7 @@ class Options:
             PARAMETER_KINDS["J"].check("the inertia is given as", self.J.value)
         if self.delay is not None:
             PARAMETER_KINDS["delay"].check("the delay of the torque is given as", self.delay)
-        check_held(self.hold)
+        check_fixed(self.hold)
 
 
 @dataclass(frozen=True)

@@ -90,11 +90,11 @@ class _Known:
     drift: Prior | None = None
     open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
 
-    def leave_open(self, names: Collection[str], free: Solution, held: Solution) -> None:
+    def leave_open(self, names: Collection[str], free: Solution, solution: Solution) -> None:
         """free: the fit with `names`. held: the one without."""
         self.open[tuple(sorted(names))] = {
-            name: free.sigma(name) ** 2 + (free.fit[name] - held.fit[name]) ** 2
-            for name in held.fit.names
+            name: free.sigma(name) ** 2 + (free.fit[name] - solution.fit[name]) ** 2
+            for name in solution.fit.names
             if name in free.fit.names and isfinite(free.sigma(name))
         }
 
@@ -143,27 +143,27 @@ def dynamic(
     coarse = models(records, law, coarse=True, without=without)
     starts = [start for start in grid(coarse, known.values, base) if "W" not in base or start["W"] > 0]
     tell("first fits", 0.2)
-    found = search.best(starts, states, base)
-    search = Search(fine, known.prior, _weights(fine, found, weights))
-    held = dict(known.held)
-    found, base = _told(search, found, base, known, held)
+    results = search.best(starts, states, base)
+    search = Search(fine, known.prior, _weights(fine, results, weights))
+    fixed = dict(known.held)
+    results, base = _told(search, results, base, known, fixed)
     if prior is None:
         groups = [group for group in REFINEMENTS if set(group) <= set(law.names)]
         for k, group in enumerate(groups):
             tell("refinements", 0.4 + 0.48 * k / len(groups))
-            found, base = _refined(search, coarse, found, base, group, known, held)
-            search = Search(fine, known.prior, _weights(fine, found, weights))
+            results, base = _refined(search, coarse, results, base, group, known, fixed)
+            search = Search(fine, known.prior, _weights(fine, results, weights))
     tell("final fit", 0.9)
-    found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
-    found, base = _told(search, found, base, known, held)
-    honest = uncertainty(search, found, known.open.values(), known.drift)
+    results = search.solve(results.values, results.states, base, tolerance=FINAL, limit=40)
+    results, base = _told(search, results, base, known, fixed)
+    honest = uncertainty(search, results, known.open.values(), known.drift)
     # The delay first: without it damping is determined that both together leave open.
     while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
-        found, base = _without(search, found, base, judged, known, held)
-        honest = uncertainty(search, found, known.open.values(), known.drift)
+        results, base = _without(search, results, base, judged, known, fixed)
+        honest = uncertainty(search, results, known.open.values(), known.drift)
     if prior is None and has_sines(fine):
-        held |= _left_with(known, base)
-    result = _result(fine, search, honest, base, held, I_P, prior)
+        fixed |= _left_with(known, base)
+    result = _result(fine, search, honest, base, fixed, I_P, prior)
     tell("done", 1.0)
     return result
 
@@ -177,7 +177,7 @@ def _known(
     free: Collection[str],
 ) -> _Known:
     values = {**NO_EFFECT, "J": 0.0, "delay": delay if delay is not None else 0.0}
-    held: dict[str, tuple[Status, str]] = {
+    fixed: dict[str, tuple[Status, str]] = {
         name: ("held", "usual value, records of friction hardly determine it")
         for name in DEFAULT_SHAPES
         if name not in free
@@ -191,10 +191,10 @@ def _known(
         for name, estimate in prior.estimates.items():
             # What stage 1 cannot determine is free here: held, it would bend what hangs on it.
             if estimate.status not in ("estimated", "undetermined") and name in PARAMETER_KINDS and name not in free:
-                held[name] = estimate.status, estimate.reason or "as in stage 1"
+                fixed[name] = estimate.status, estimate.reason or "as in stage 1"
             elif estimate.status == "undetermined" and name == "F_S" and name not in hold:
                 values["F_S"] = OPEN_RISE * values["F_C"]
-        names = tuple(name for name in prior.correlation.names if name not in held and name not in hold)
+        names = tuple(name for name in prior.correlation.names if name not in fixed and name not in hold)
         places = [prior.correlation.names.index(name) for name in names]
         if names:
             at = np.array([values[name] for name in names])
@@ -208,17 +208,20 @@ def _known(
         if isfinite(J.sigma) and J.sigma > 0:
             priors.append(Prior(("J",), np.array([J.value]), np.array([[J.sigma**2]])))
         else:
-            held["J"] = (J.status if J.status != "estimated" else "given"), J.reason or "no standard deviation is known"
+            fixed["J"] = (
+                (J.status if J.status != "estimated" else "given"),
+                J.reason or "no standard deviation is known",
+            )
     if prior is None and not _both_directions(fine):
         reason = "the axis moves in one direction only: friction, constant load and asymmetry cannot be separated"
-        held |= {name: ("undetermined", reason) for name in ("M_0", "asymmetry")}
+        fixed |= {name: ("undetermined", reason) for name in ("M_0", "asymmetry")}
         unknown.discard("M_0")
     if delay is not None:
-        held["delay"] = "given", ""
+        fixed["delay"] = "given", ""
     elif (turns := reversals(fine)) < LEAST_REVERSALS:
-        held["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} determine it"
+        fixed["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} determine it"
     values |= hold
-    held |= {name: ("held", "no stage determines it") if name in FIXED else ("given", "") for name in hold}
+    fixed |= {name: ("held", "no stage determines it") if name in FIXED else ("given", "") for name in hold}
     values |= sliding(fine, values, unknown - set(hold))
     if prior is None:
         values["F_S"] = max(hold.get("F_S", values["F_C"]), values["F_C"])
@@ -227,10 +230,10 @@ def _known(
         typical = float(np.median(sliding_speed))
         if "v_log" not in hold and "v_log" not in free and typical > FAR_ABOVE * DEFAULT_SHAPES["v_log"]:
             values["v_log"] = typical / BEND
-            held["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
+            fixed["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     values.setdefault("sigma_0", 0.0)
-    told = tuple(name for one in priors for name in one.names)
-    return _Known(values, Prior.joined(priors), told, held, drift)
+    reported = tuple(name for one in priors for name in one.names)
+    return _Known(values, Prior.joined(priors), reported, fixed, drift)
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
@@ -262,69 +265,69 @@ def _first_weights(model: RecordTorque) -> Array:
     return np.asarray(np.maximum(levels, 1e-2 * model.recorded_rms()), dtype=np.float64)
 
 
-def _weights(fine: Sequence[RecordTorque], found: Solution, before: Sequence[Array]) -> list[Array]:
+def _weights(fine: Sequence[RecordTorque], solution: Solution, before: Sequence[Array]) -> list[Array]:
     """Of the residuals per stretch [N.m]."""
     made = []
-    for model, state, weight in zip(fine, found.states, before, strict=True):
-        residual = model.residual(found.values, float(state[0]), float(state[1]))
+    for model, state, weight in zip(fine, solution.states, before, strict=True):
+        residual = model.residual(solution.values, float(state[0]), float(state[1]))
         levels = np.array([spread(residual[model.stretch == k]) for k in range(len(weight))])
         made.append(np.hypot(levels, MODEL_ACCURACY * float(np.sqrt(np.mean(model.measured**2)))))
     return made
 
 
 def _told(
-    search: Search, found: Solution, base: list[str], known: _Known, held: dict[str, tuple[Status, str]]
+    search: Search, solution: Solution, base: list[str], known: _Known, fixed: dict[str, tuple[Status, str]]
 ) -> tuple[Solution, list[str]]:
     """Without what the data do not determine, one after the other."""
-    while (judged := verdict(found, base, known.told)) is not None:
-        found, base = _without(search, found, base, judged, known, held)
-    return found, base
+    while (judged := verdict(solution, base, known.told)) is not None:
+        solution, base = _without(search, solution, base, judged, known, fixed)
+    return solution, base
 
 
 def _without(
     search: Search,
-    found: Solution,
+    solution: Solution,
     base: list[str],
     judged: Verdict,
     known: _Known,
-    held: dict[str, tuple[Status, str]],
+    fixed: dict[str, tuple[Status, str]],
 ) -> tuple[Solution, list[str]]:
-    held |= {name: ("undetermined", reason) for name, reason in judged.reasons.items()}
-    values = {**found.values, **judged.held}
-    left = [name for name in base if name not in judged.held]
-    if not left:
+    fixed |= {name: ("undetermined", reason) for name, reason in judged.reasons.items()}
+    values = {**solution.values, **judged.held}
+    remaining = [name for name in base if name not in judged.held]
+    if not remaining:
         raise InputError(f"stage 2: these records determine no parameter at all; last {judged.name}: {judged.reason}")
-    without = search.solve(values, found.states, left, tolerance=FINAL, limit=40)
-    known.leave_open(judged.held, found, without)
-    return without, left
+    without = search.solve(values, solution.states, remaining, tolerance=FINAL, limit=40)
+    known.leave_open(judged.held, solution, without)
+    return without, remaining
 
 
 def _refined(
     search: Search,
     coarse: Sequence[RecordTorque],
-    found: Solution,
+    solution: Solution,
     base: list[str],
     group: tuple[str, ...],
     known: _Known,
-    held: dict[str, tuple[Status, str]],
+    fixed: dict[str, tuple[Status, str]],
 ) -> tuple[Solution, list[str]]:
     """With a group of parameters more, if the data ask for them and determine them."""
     added = [name for name in group if name not in known.held and name not in base]
     if not added or len(added) < len(group):
-        return found, base
+        return solution, base
     if group == ("asymmetry",) and not {"F_log", "v_s"} & set(base):
-        held["asymmetry"] = "undetermined", "friction that hardly depends on speed leaves it a constant load"
-        return found, base
+        fixed["asymmetry"] = "undetermined", "friction that hardly depends on speed leaves it a constant load"
+        return solution, base
     general = not has_sines(search.models)
     if (
         general
         and {"sigma_1", "W", "spread", "skew"} & set(added)
-        and (rows := turnover_rows(search.models, found)) < MIN_TURNOVER_ROWS
+        and (rows := turnover_rows(search.models, solution)) < MIN_TURNOVER_ROWS
     ):
         reason = f"bristles turn over within {rows:.0f} rows of the log"
-        held |= dict.fromkeys(added, ("undetermined", reason))
-        return found, base
-    values = dict(found.values)
+        fixed |= dict.fromkeys(added, ("undetermined", reason))
+        return solution, base
+    values = dict(solution.values)
     if "sigma_1" in added:
         values["sigma_1"] = 1e-2 * values["sigma_0"] * deflection(values)
     if "F_S" in added:
@@ -334,30 +337,30 @@ def _refined(
     starts = [values]
     if {"W", "gamma"} <= set(added):
         starts = [start for start in grid(coarse, values, ["W", "gamma", "sigma_0"])[:FOLLOWED] if start["W"] > 0][:2]
-    tried = search.best(starts, found.states, [*base, *added])
+    tried = search.best(starts, solution.states, [*base, *added])
     # Weighted by what the richer model leaves: what it explains must not pass for noise that hides it.
     search = Search(search.models, known.prior, _weights(search.models, tried, search.weights))
     tried = search.solve(tried.values, tried.states, [*base, *added], tolerance=1e-6, limit=30)
     judged = verdict(tried, added)
-    gain = search.cost(found) - search.cost(tried)
-    share = explained(search.models, found, tried) if general else 1.0
+    gain = search.cost(solution) - search.cost(tried)
+    share = explained(search.models, solution, tried) if general else 1.0
     if judged is None and gain >= MIN_GAIN_PER_PARAMETER * len(added) and share >= LEAST_EXPLAINED:
         for name in added:
-            held.pop(name, None)
+            fixed.pop(name, None)
         known.open.pop(tuple(sorted(added)), None)
         return tried, [*base, *added]
     if judged is not None:
         rest = f"{GOES_WITH} {judged.name}"
         reasons = dict.fromkeys(added, rest) | judged.reasons
-        known.leave_open(added, tried, found)
+        known.leave_open(added, tried, solution)
     else:
         with_it = f"with {' and '.join(added)}" if len(added) > 1 else "with it"
         little = (
             f"sum of squares by {gain:.1f}" if share >= LEAST_EXPLAINED else f"by {100 * share:.2g} % of the torque"
         )
         reasons = dict.fromkeys(added, f"the residual hardly falls {with_it} ({little})")
-    held |= {name: ("undetermined", reasons[name]) for name in added}
-    return found, base
+    fixed |= {name: ("undetermined", reasons[name]) for name in added}
+    return solution, base
 
 
 def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
@@ -367,9 +370,9 @@ def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
     if not missing:
         return {}
     reason = f"sines alone leave {', '.join(missing)} open, for which it stands; strokes at constant speed determine it"
-    left = [name for name in CURVE if name in base]
-    base[:] = [name for name in base if name not in left]
-    return {name: ("undetermined", reason) for name in left}
+    remaining = [name for name in CURVE if name in base]
+    base[:] = [name for name in base if name not in remaining]
+    return {name: ("undetermined", reason) for name in remaining}
 
 
 def _result(
@@ -377,18 +380,18 @@ def _result(
     search: Search,
     honest: Uncertainty,
     base: list[str],
-    held: Mapping[str, tuple[Status, str]],
+    fixed: Mapping[str, tuple[Status, str]],
     I_P: float | None,
     prior: Stationary | None,
 ) -> Dynamic:
     names = tuple(name for name in names_of(fine[0].law) if name in base)
-    found = honest.solution
-    covariance = found.covariance(names)
+    result = honest.solution
+    covariance = result.covariance(names)
     sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     estimates = {}
     for name in names_of(fine[0].law):
-        status, reason = held.get(name, ("estimated" if name in names else "held", ""))
-        estimates[name] = estimate(name, found.values[name], sigma.get(name, nan), status, reason)
+        status, reason = fixed.get(name, ("estimated" if name in names else "held", ""))
+        estimates[name] = estimate(name, result.values[name], sigma.get(name, nan), status, reason)
     without = dict(sigma)
     if "delay" in names:
         at = names.index("delay")
@@ -396,8 +399,8 @@ def _result(
         without = {name: float(np.sqrt(max(given[k, k], 0.0))) for k, name in enumerate(names) if name != "delay"}
     pieces = tuple(
         piece
-        for model, weight, state in zip(fine, search.weights, found.states, strict=True)
-        for piece in _stretches(model, weight, found.values, float(state[0]), float(state[1]))
+        for model, weight, state in zip(fine, search.weights, result.states, strict=True)
+        for piece in _stretches(model, weight, result.values, float(state[0]), float(state[1]))
     )
     rows = sum(len(piece.time) for piece in pieces)
     rms = float(np.sqrt(sum(len(piece.time) * piece.rms**2 for piece in pieces) / rows))
@@ -408,8 +411,8 @@ def _result(
         covariance,
         rms,
         without,
-        advice(pieces, estimates, without, deflection(found.values), I_P),
-        (*_doubts(held, prior), *limits(honest, names, fine), *_speeds(fine, prior, I_P)),
+        advice(pieces, estimates, without, deflection(result.values), I_P),
+        (*_doubts(fixed, prior), *limits(honest, names, fine), *_speeds(fine, prior, I_P)),
     )
 
 
@@ -425,15 +428,15 @@ def _speeds(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float |
     )
 
 
-def _doubts(held: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[str, ...]:
+def _doubts(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[str, ...]:
     """What is undetermined and why, a sentence per reason; what stage 1 hands on it has said itself."""
     names: dict[str, list[str]] = {}
-    for name, (status, reason) in held.items():
+    for name, (status, reason) in fixed.items():
         before = prior.estimates.get(name) if prior is not None else None
         handed_on = before is not None and (before.status, before.reason) == (status, reason)
         if status == "undetermined" and reason and not handed_on and not reason.startswith(GOES_WITH):
             names.setdefault(reason, []).append(name)
-    return tuple(f"{' and '.join(each)}: {reason}" for reason, each in names.items())
+    return tuple(f"{' and '.join(name)}: {reason}" for reason, name in names.items())
 
 
 def _stretches(model: RecordTorque, weight: Array, values: Mapping[str, float], z: float, c: float) -> list[Stretch]:

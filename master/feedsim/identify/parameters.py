@@ -107,7 +107,7 @@ def estimate(name: str, value: float, sigma: float = nan, status: Status = "esti
     return Estimate(name, value, PARAMETER_KINDS[name].unit, PARAMETER_KINDS[name].meaning, sigma, status, reason)
 
 
-def check_held(hold: Mapping[str, float]) -> None:
+def check_fixed(hold: Mapping[str, float]) -> None:
     """Raises InputError: a value outside its physical range, or F_S below F_C."""
     for name, value in hold.items():
         PARAMETER_KINDS[name].check(f"{name} is held at", value)
@@ -189,24 +189,24 @@ LEAST_GAMMA = 1e-3  # at 0 nothing is engaged at a reversal, and sigma_0 acts on
 def reversal_ranges(start: Mapping[str, float]) -> dict[str, Range]:
     """Of what stage 2 moves, from the start values; no wider than what is physical."""
     F_C = start["F_C"]
-    found: dict[str, dict[str, Any]] = {name: {} for name in PARAMETER_KINDS}
+    result: dict[str, dict[str, Any]] = {name: {} for name in PARAMETER_KINDS}
     for name, decades in DECADES.items():  # known by their order of magnitude at first, and above 0
         span = 10**decades
         value = start.get(name, NO_EFFECT.get(name, 0.0))
-        found[name] = {"lower": value / span, "upper": value * span, "log": True}
+        result[name] = {"lower": value / span, "upper": value * span, "log": True}
     for name in ("F_C", "beta", "v_log", "J"):
-        found[name] = {"lower": LEAST_SHARE * start[name]}
-    found["sigma_1"] = {"scale": max(abs(start["sigma_1"]), 1e-4 * start["sigma_0"])}
-    found["sigma_2"] = {"scale": max(abs(start["sigma_2"]), 1e-4 * F_C)}
-    found["gamma"] = {"lower": LEAST_GAMMA, "scale": 1.0}
-    found["skew"] = {"scale": 1.0}
-    found["F_log"] = found["M_0"] = {"scale": F_C}
-    found["asymmetry"] = {"lower": -MOST_ASYMMETRY, "upper": MOST_ASYMMETRY, "scale": 0.1}
-    found["delay"] = {"lower": DELAYS[0], "upper": DELAYS[1], "scale": 1e-4}
+        result[name] = {"lower": LEAST_SHARE * start[name]}
+    result["sigma_1"] = {"scale": max(abs(start["sigma_1"]), 1e-4 * start["sigma_0"])}
+    result["sigma_2"] = {"scale": max(abs(start["sigma_2"]), 1e-4 * F_C)}
+    result["gamma"] = {"lower": LEAST_GAMMA, "scale": 1.0}
+    result["skew"] = {"scale": 1.0}
+    result["F_log"] = result["M_0"] = {"scale": F_C}
+    result["asymmetry"] = {"lower": -MOST_ASYMMETRY, "upper": MOST_ASYMMETRY, "scale": 0.1}
+    result["delay"] = {"lower": DELAYS[0], "upper": DELAYS[1], "scale": 1e-4}
     for name, kind in PARAMETER_KINDS.items():
-        lower, upper = found[name].get("lower", -inf), found[name].get("upper", inf)
-        found[name] = {**found[name], "lower": max(lower, kind.lower), "upper": min(upper, kind.upper)}
-    return {**found, EXCESS: {"lower": 0.0, "upper": MOST_EXCESS * max(F_C, start["F_S"]), "scale": F_C}}
+        lower, upper = result[name].get("lower", -inf), result[name].get("upper", inf)
+        result[name] = {**result[name], "lower": max(lower, kind.lower), "upper": min(upper, kind.upper)}
+    return {**result, EXCESS: {"lower": 0.0, "upper": MOST_EXCESS * max(F_C, start["F_S"]), "scale": F_C}}
 
 
 # --- friction at constant speed: the static level of Eq. 7, its viscous part, and the constant load -------------------

@@ -161,8 +161,8 @@ def gain_by_deviation(records: Sequence[Record], delay: float) -> Constant:
     K_v, sigma = _of_stretches(A, b, np.eye(A.shape[1])[0])
     x_e, others = A[:, 0], A[:, 1:]
     alone = float(np.sum((x_e - others @ _least_squares(others, x_e)[0]) ** 2))
-    left = float(np.sum((b - A @ _least_squares(A, b)[0]) ** 2))
-    small = left / (K_v * alone) if K_v and alone > 0 else np.inf
+    remaining = float(np.sum((b - A @ _least_squares(A, b)[0]) ** 2))
+    small = remaining / (K_v * alone) if K_v and alone > 0 else np.inf
     return Constant(K_v, float(np.linalg.norm([sigma, small, BETWEEN_ROWS * K_v])))
 
 
@@ -208,7 +208,7 @@ def _usable(records: Sequence[Record], roles: Sequence[str]) -> list[Record]:
     for record in records:
         if missing := [role for role in roles if getattr(record, role) is None]:
             raise InputError(f"{record.name}: no {' and no '.join(missing)}; the position loop needs it")
-    moved = [each for each in records if np.ptp(np.asarray(each.setpoint)) > LEAST_TRAVEL]
+    moved = [record for record in records if np.ptp(np.asarray(record.setpoint)) > LEAST_TRAVEL]
     if not moved:
         raise InputError(f"{records[0].name}: the setpoint does not move; the position loop cannot be identified")
     return moved
@@ -229,9 +229,9 @@ def _window(
     # Widest windows first: where one of them holds the whole interpolation, the residual falls to the rounding.
     width = min(MAX_TAPS, longest + 1)
     for first in range(longest - width + 2):
-        left = _solved(records, targets, others, first, width, longest, gain)[1]
-        if best is None or left < best[0]:
-            best = left, first, width
+        remaining = _solved(records, targets, others, first, width, longest, gain)[1]
+        if best is None or remaining < best[0]:
+            best = remaining, first, width
     assert best is not None
     floor, begin, _ = best
     rows = sum(len(record) - longest for record in records)
@@ -240,22 +240,22 @@ def _window(
     rounding = (SIGNAL_ROUNDING * max(float(np.ptp(target)) for target in targets)) ** 2
     chosen = begin, width
     for narrow in range(1, width):
-        found = min(
+        result = min(
             (_solved(records, targets, others, first, narrow, longest, gain)[1], first)
             for first in range(begin, begin + width - narrow + 1)
         )
-        grown = log((found[0] ** 2 + rounding) / (floor**2 + rounding))
+        grown = log((result[0] ** 2 + rounding) / (floor**2 + rounding))
         if grown <= max(BY_CHANCE * (width - narrow) / rows, 2 * GROWS if floor < digits else 0.0):
-            chosen = found[1], narrow
+            chosen = result[1], narrow
             break
-    coefficients, left, largest, covariance = _solved(records, targets, others, *chosen, longest, gain)
+    coefficients, remaining, largest, covariance = _solved(records, targets, others, *chosen, longest, gain)
     first, width = chosen
     weights, further = coefficients[:width], coefficients[width:]
     total = 1.0 if gain is None else float(further[gain])
     ages = (first + np.arange(width)) * records[0].interval
     lean = (ages - float(weights @ ages) / float(np.sum(weights))) / total
     variance = float(lean @ covariance[:width, :width] @ lean)
-    taps = Taps(first, weights / np.sum(weights), records[0].interval, np.sqrt(max(variance, 0.0)), left, largest)
+    taps = Taps(first, weights / np.sum(weights), records[0].interval, np.sqrt(max(variance, 0.0)), remaining, largest)
     return taps, further, covariance
 
 

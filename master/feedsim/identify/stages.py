@@ -16,7 +16,7 @@ from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import Inertia, contradiction, inertia
-from feedsim.identify.magnitudes import check_found, check_inertia, check_size
+from feedsim.identify.magnitudes import check_estimates, check_inertia, check_size
 from feedsim.identify.motion import Part, motion, parts
 from feedsim.identify.open_loop import balanced
 from feedsim.identify.options import Options
@@ -95,12 +95,12 @@ class _Run:
             J = options.J or (rigid.J if rigid is not None else None)
             self._compare(rigid)
             if rigid is not None:
-                check_found(rigid.estimates, options.I_P)
+                check_estimates(rigid.estimates, options.I_P)
         with self._timed("plateaus"):
             # J dn/dt hardly matters at constant speed.
-            found = self._plateaus(J.value if J is not None else 0.0) if 1 in options.stages else ()
+            results = self._plateaus(J.value if J is not None else 0.0) if 1 in options.stages else ()
         with self._timed("stage 1"):
-            first = self._stationary(found)
+            first = self._stationary(results)
         with self._timed("stage 2"):
             second = self._dynamic(first)
         if first is None and second is None:
@@ -116,19 +116,19 @@ class _Run:
                 estimates = balance.estimates
                 self.progress("open loop", 1, 1)
         estimates, believed = self._believed(estimates, rigid)
-        check_found(estimates, options.I_P)
+        check_estimates(estimates, options.I_P)
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
         if first is not None and prior:
             # Nor is what stage 1 could not determine, but stage 2 does.
-            told = [f"{name} is not estimated" for name, each in estimates.items() if each.status == "estimated"]
-            self.warnings += [text for text in first.warnings if not text.startswith(tuple(told))]
+            reported = [f"{name} is not estimated" for name, value in estimates.items() if value.status == "estimated"]
+            self.warnings += [text for text in first.warnings if not text.startswith(tuple(reported))]
         self.warnings += second.warnings if second is not None else ()
         self.advice += second.advice if second is not None else ()
         return Identification(
             axis=options.axis,
             I_P=options.I_P,
-            estimates={name: each.judged() for name, each in estimates.items()},
+            estimates={name: value.judged() for name, value in estimates.items()},
             correlation=merged_correlation(first if prior else None, second, self.law.names)
             if believed
             else NOTHING_TOLD,
@@ -154,16 +154,16 @@ class _Run:
             return estimates, True
         reason = f"the fit went astray: it says {reason}"
         self.warnings.insert(0, f"no parameter is offered as estimated: {reason}; look at signs, units and known load")
-        line = {name: each.value for name, each in rigid.estimates.items()}
+        line = {name: entry.value for name, entry in rigid.estimates.items()}
         line |= {"F_S": line["F_C"], "F_log": 0.0, "asymmetry": 0.0, "sigma_0": line["F_C"] / USUAL_DEFLECTION}
         line |= {"sigma_1": line["sigma_0"] * USUAL_RELAXATION, "W": NO_EFFECT["W"], "gamma": NO_EFFECT["gamma"]}
         line["sigma_2"] = max(line["sigma_2"], 0.0)
         doubtful = ("estimated", "undetermined")
         return {
-            name: replace(each, value=line.get(name, each.value), sigma=nan, status="undetermined", reason=reason)
-            if each.status in doubtful
-            else each
-            for name, each in estimates.items()
+            name: replace(entry, value=line.get(name, entry.value), sigma=nan, status="undetermined", reason=reason)
+            if entry.status in doubtful
+            else entry
+            for name, entry in estimates.items()
         }, False
 
     def _slides(self) -> bool:
@@ -173,18 +173,18 @@ class _Run:
         return any(part.kind != "sine" or part.amplitude > SLIDING for part in every)
 
     def _plateaus(self, J: float) -> tuple[Plateau, ...]:
-        found: list[Plateau] = []
+        result: list[Plateau] = []
         for k, (record, begun) in enumerate(zip(self.records, begins(self.records), strict=True)):
             self.progress("plateaus", k, len(self.records))
-            found += [replace(each, elapsed=begun + each.elapsed) for each in plateaus(record, J)]
+            result += [replace(plateau, elapsed=begun + plateau.elapsed) for plateau in plateaus(record, J)]
         self.progress("plateaus", len(self.records), len(self.records))
-        return tuple(found)
+        return tuple(result)
 
-    def _stationary(self, found: tuple[Plateau, ...]) -> Stationary | None:
+    def _stationary(self, result: tuple[Plateau, ...]) -> Stationary | None:
         if 1 not in self.options.stages:
             self.reasons[1] = "stage 1 was not asked for"
             return None
-        if not found:
+        if not result:
             self.reasons[1] = "no stretches at constant speed"
             self.advice.append(
                 "no stretch at constant speed was found: strokes at 8 or more speeds from 10 mm/min up, in both "
@@ -194,7 +194,7 @@ class _Run:
         self.progress("stage 1: Stribeck curve", 0, 1)
         hold, free = self._held(CONSTANT_SPEED)
         try:
-            return stationary(found, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
+            return stationary(result, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
         except InputError as error:
             self.reasons[1] = str(error)
             self.warnings.append(f"no Stribeck curve: {error}")
@@ -245,14 +245,14 @@ class _Run:
         """Inverse dynamics; None where the records determine no inertia."""
         self.progress("inertia", 0, 1)
         try:
-            found = inertia(records)
+            result = inertia(records)
         except InputError:
             return None
         finally:
             self.progress("inertia", 1, 1)
         if self.options.J is None:
-            self.warnings += [text for text in found.warnings if text not in self.warnings]
-        return found
+            self.warnings += [text for text in result.warnings if text not in self.warnings]
+        return result
 
     def _compare(self, rigid: Inertia | None) -> None:
         """Warn where the given inertia is not that of the accelerating parts.
@@ -276,37 +276,37 @@ class _Run:
     def _held(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
         """What of `names` is held at which value, besides the usual ones, and what is freed."""
         constant = {name: self.options.fallback.get(name, NO_EFFECT[name]) for name in FIXED if name in self.law.names}
-        held = {name: value for name, value in (constant | dict(self.options.hold)).items() if name in names}
-        return held, tuple(name for name in self.options.free if name in names)
+        fixed = {name: value for name, value in (constant | dict(self.options.hold)).items() if name in names}
+        return fixed, tuple(name for name in self.options.free if name in names)
 
     def _merged(self, first: Stationary | None, second: Dynamic | None, J: Estimate | None) -> dict[str, Estimate]:
         """One estimate per parameter: stage 2's, which knows stage 1, else stage 1's, else what is held, and why.
 
         Where stage 2 stands alone its whole set is taken: values of two fits do not make one friction.
         """
-        found: dict[str, Estimate] = {"J": J} if J is not None else {}
+        result: dict[str, Estimate] = {"J": J} if J is not None else {}
         for stage in (first, second):
             if stage is not None:
-                known = {name for name, each in found.items() if each.status == "estimated" and self.prior}
-                found |= {
-                    name: each
-                    for name, each in stage.estimates.items()
-                    if name not in known or each.status == "estimated"
+                known = {name for name, value in result.items() if value.status == "estimated" and self.prior}
+                result |= {
+                    name: value
+                    for name, value in stage.estimates.items()
+                    if name not in known or value.status == "estimated"
                 }
-        if "delay" not in found and self.options.delay is not None:
+        if "delay" not in result and self.options.delay is not None:
             reason = "not used: stage 2 is absent"
-            found["delay"] = estimate("delay", self.options.delay, status="given", reason=reason)
+            result["delay"] = estimate("delay", self.options.delay, status="given", reason=reason)
         for name in self.law.names:
-            if name not in found:
-                found[name] = self._absent(name, found)
-        if found["F_S"].value < found["F_C"].value:
+            if name not in result:
+                result[name] = self._absent(name, result)
+        if result["F_S"].value < result["F_C"].value:
             reason = "no rise towards rest is seen: the fit puts it below F_C"
-            found["F_S"] = replace(
-                found["F_S"], value=found["F_C"].value, sigma=nan, status="undetermined", reason=reason
+            result["F_S"] = replace(
+                result["F_S"], value=result["F_C"].value, sigma=nan, status="undetermined", reason=reason
             )
-        return {name: found[name] for name in (*self.law.names, "M_0", "J", "delay") if name in found}
+        return {name: result[name] for name in (*self.law.names, "M_0", "J", "delay") if name in result}
 
-    def _absent(self, name: str, found: Mapping[str, Estimate]) -> Estimate:
+    def _absent(self, name: str, estimates: Mapping[str, Estimate]) -> Estimate:
         """A parameter that no stage determines."""
         options, reason = self.options, self.reasons.get(2 if name in PRE_SLIDING else 1, "")
 
@@ -320,14 +320,14 @@ class _Run:
         if name in options.fallback:
             return held(options.fallback[name], "value of the machine file")
         if name in ("F_C", "F_S"):
-            other = found.get("F_C" if name == "F_S" else "F_S")
+            other = estimates.get("F_C" if name == "F_S" else "F_S")
             if other is None:
                 raise InputError(f"{name} is not determined by the records: {reason}")
             return held(other.value, f"as {other.name}")
         if name == "sigma_0":
-            return held(found["F_S"].value / USUAL_DEFLECTION, "usual deflection")
+            return held(estimates["F_S"].value / USUAL_DEFLECTION, "usual deflection")
         if name == "sigma_1":
-            return held(found["sigma_0"].value * USUAL_RELAXATION, "usual relaxation time")
+            return held(estimates["sigma_0"].value * USUAL_RELAXATION, "usual relaxation time")
         return held(NO_EFFECT[name], "no effect")
 
     @contextmanager
@@ -340,20 +340,20 @@ class _Run:
 
 def begins(records: Sequence[Record]) -> list[float]:
     """When each record began [s], one after the other: pieces of a trace as its time says, files without a gap."""
-    found = [0.0]
+    values = [0.0]
     for before, after in pairwise(records):
         gap = float(after.time[0] - before.time[-1])
-        found.append(found[-1] + float(before.time[-1] - before.time[0]) + max(gap, 0.0))
-    return found
+        values.append(values[-1] + float(before.time[-1] - before.time[0]) + max(gap, 0.0))
+    return values
 
 
 def transitions(records: Sequence[Record]) -> tuple[Record, ...]:
     """Records that stage 2 is fitted to: those with sines, else those in which the axis reverses."""
-    found = {id(record): _parts(record) for record in records}
-    sines = tuple(r for r in records if any(part.kind == "sine" for part in found[id(r)]))
+    result = {id(record): _parts(record) for record in records}
+    sines = tuple(r for r in records if any(part.kind == "sine" for part in result[id(r)]))
     if sines:
         return sines
-    ways = {id(record): _directions(record, found[id(record)]) for record in records}
+    ways = {id(record): _directions(record, result[id(record)]) for record in records}
     reversing = tuple(r for r in records if len(ways[id(r)]) > 1)
     # Strokes of one direction each, of which one file is up and the other down, determine both together.
     both = len(set().union(*ways.values())) > 1
@@ -364,11 +364,11 @@ def merged_correlation(first: Stationary | None, second: Dynamic | None, law: Se
     """Of all that was estimated; nan between a parameter that stage 1 alone determines and one that stage 2 alone
     does."""
     stages = [stage.correlation for stage in (second, first) if stage is not None]
-    names = tuple(dict.fromkeys(name for each in stages for name in each.names))
+    names = tuple(dict.fromkeys(name for stage in stages for name in stage.names))
     matrix = np.full((len(names), len(names)), nan)
-    for each in reversed(stages):  # stage 2 last: it knows more
-        at = [names.index(name) for name in each.names]
-        matrix[np.ix_(at, at)] = each.matrix
+    for entry in reversed(stages):  # stage 2 last: it knows more
+        at = [names.index(name) for name in entry.names]
+        matrix[np.ix_(at, at)] = entry.matrix
     np.fill_diagonal(matrix, 1.0)
     known = (*law, "M_0", "J", "delay")
     order = [name for name in known if name in names] + [name for name in names if name not in known]
@@ -383,9 +383,9 @@ def _parts(record: Record) -> tuple[Part, ...]:
         return ()
 
 
-def _directions(record: Record, found: Sequence[Part]) -> set[float]:
+def _directions(record: Record, result: Sequence[Part]) -> set[float]:
     """Signs of the directions in which the axis moves, within a stretch or from one to the next."""
-    if any(part.reversals for part in found):
+    if any(part.reversals for part in result):
         return {-1.0, 1.0}
-    speed = motion(record).coarse() if found else None
-    return set() if speed is None else {float(np.sign(np.sum(speed[part.rows]))) for part in found}
+    speed = motion(record).coarse() if result else None
+    return set() if speed is None else {float(np.sign(np.sum(speed[part.rows]))) for part in result}

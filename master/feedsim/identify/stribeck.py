@@ -21,7 +21,7 @@ from feedsim.identify.parameters import (
     NO_EFFECT,
     PRIOR_DEVIATIONS,
     UNSEEN_SPEED_RATIO,
-    check_held,
+    check_fixed,
     curve,
     estimate,
     hidden,
@@ -79,7 +79,7 @@ def stationary(
         if name not in CONSTANT_SPEED:
             raise InputError(f"{name} is no parameter of stationary friction: {', '.join(CONSTANT_SPEED)}")
     fixed = {name: value for name, value in {**DEFAULT_SHAPES, **asked}.items() if name not in free}
-    check_held(fixed)
+    check_fixed(fixed)
     points = Points.of(plateaus)
     problem = _Problem(points, fixed, seed)
     result, reasons, extra = problem.solve()

@@ -77,10 +77,10 @@ class RecordTorque:
             # Linear in sigma_2: that part is added outside and costs no run.
             law = {name: values[name] for name in self.law.names} | {"sigma_2": 0.0}
             h, start = self.record.interval / self.count, z * deflection(values)
-            found = self.law(law, fine, h, z=start, c=c * values.get("W", 0.0))
+            result = self.law(law, fine, h, z=start, c=c * values.get("W", 0.0))
             if len(self._law) >= MAX_CACHED_RESPONSES:
                 del self._law[next(iter(self._law))]
-            self._law[key] = np.asarray(found[:: self.count][self.rows], dtype=np.float64)
+            self._law[key] = np.asarray(result[:: self.count][self.rows], dtype=np.float64)
         return self._law[key]
 
     def moved(self, delay: float) -> tuple[Array, Array, Array, Array]:

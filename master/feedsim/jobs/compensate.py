@@ -199,9 +199,9 @@ def _open_of(
     if not count:
         return {}, None
     check_count(count)
-    found = {axis: known_of(friction, axis, friction.parameters()) for axis, friction in sets.items()}
+    result = {axis: known_of(friction, axis, friction.parameters()) for axis, friction in sets.items()}
     of_machine = known_values(plan.machine)
-    known = {axis: each for axis, each in found.items() if each.names and axis not in of_machine}
+    known = {axis: value for axis, value in result.items() if value.names and axis not in of_machine}
     return known, None if known and not of_machine else cloud_of(plan.machine)
 
 

@@ -63,8 +63,8 @@ class IdentifyResult(Result):
     def figures(self) -> Mapping[str, Figure]:
         """The estimates as figures, "Z.F_C"."""
         return Named(
-            (f"{self.found.axis}.{name}", Figure(each.value, each.unit, each.meaning))
-            for name, each in self.estimates.items()
+            (f"{self.found.axis}.{name}", Figure(estimate.value, estimate.unit, estimate.meaning))
+            for name, estimate in self.estimates.items()
         )
 
     @property
@@ -170,7 +170,7 @@ def identify(
     begin = perf_counter()
     recorded = read_traces(files, mapping, axis, described, watch.progress)
     reading = {"reading": perf_counter() - begin}
-    sources = tuple(each.provenance for each in recorded)
+    sources = tuple(entry.provenance for entry in recorded)
     known = asked.with_traces(sources, described)
     records = named_apart(recorded)
     inputs = [*files, *([Path(columns)] if columns is not None else [])]
@@ -181,9 +181,9 @@ def identify(
         for sentence in cosim.executing(archives / f"{unit}.fmu", "friction law") if archives is not None else ():
             watch.announce(sentence)
         with FrictionLaw(archives, unit) as friction:
-            found = identified_from(records, friction, known, watch.progress)
-        found = replace(found, seconds=reading | dict(found.seconds))
-        identified = Identified(found, records, sources, subject, settings, date.today().isoformat())
+            identification = identified_from(records, friction, known, watch.progress)
+        identification = replace(identification, seconds=reading | dict(identification.seconds))
+        identified = Identified(identification, records, sources, subject, settings, date.today().isoformat())
         result = IdentifyResult(identified, inputs)
         if folder is not None:
             result.save(folder, figures=figures, force=force)

@@ -305,6 +305,6 @@ def _rows_kept(recorded: Partial, watch: Watch) -> Iterator[Partial]:
         with recorded:
             yield recorded
     except BaseException:
-        if recorded.left:
+        if recorded.has_rows:
             watch.announce(f"the rows up to {recorded.time:.9g} s are kept in {recorded.path}")
         raise

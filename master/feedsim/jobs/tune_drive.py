@@ -81,11 +81,11 @@ class TuneDriveResult(Result):
 
     def files(self) -> Mapping[str, Content]:
         """Values to load, values to type, and a drive file for the tuned axis and for every other that changes."""
-        found = {
+        result = {
             drive_files.SETTINGS: drive_files.settings(self.tuned),
             drive_files.SHEET: drive_files.sheet(self.tuned, self.control),
         }
-        return {**found, **drive_files.drives(self.tuned)}
+        return {**result, **drive_files.drives(self.tuned)}
 
     def report(self) -> Report:
         """Content of report.html."""
@@ -193,10 +193,10 @@ def tune_drive(
 
 
 def _positive(name: str, value: Value, unit: str, example: str, *, zero: bool = False) -> float:
-    found = _decibels(value, name) if unit == "dB" else quantity(name, value, unit, example)
-    if found < 0 or (found == 0 and not zero):
+    result = _decibels(value, name) if unit == "dB" else quantity(name, value, unit, example)
+    if result < 0 or (result == 0 and not zero):
         raise InputError(f"{spelt(name)} {value}: more than zero is needed, e.g. {example}")
-    return found
+    return result
 
 
 def _decibels(value: Value, name: str) -> float:
@@ -211,15 +211,15 @@ def _decibels(value: Value, name: str) -> float:
 
 def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int, uncertain: int) -> dict[str, str]:
     """What was asked for besides changes of the scenario, the same text for the same value."""
-    found = {
+    result = {
         "axis": axis,
         "gain_margin": f"{limits.gain_margin:g} dB",
         "phase_margin": f"{limits.phase_margin:g} deg",
         "encoder_noise": f"{1e6 * limits.encoder_noise:g} urad",
         "evaluations": str(evaluations),
     }
-    found |= {"at": "; ".join(at)} if at else {}
-    return found | ({"uncertain": str(uncertain)} if uncertain else {})
+    result |= {"at": "; ".join(at)} if at else {}
+    return result | ({"uncertain": str(uncertain)} if uncertain else {})
 
 
 def _places(machine: Machine, texts: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -235,7 +235,7 @@ def _places(machine: Machine, texts: Sequence[str]) -> dict[str, dict[str, float
 def _place(machine: Machine, text: str) -> dict[str, float]:
     pose: dict[str, float] = {}
     for part in text.split(","):
-        axis, equals, position = (each.strip() for each in part.partition("="))
+        axis, equals, position = (name.strip() for name in part.partition("="))
         if not equals or axis not in machine.axes:
             raise InputError(
                 f"{spelt('at')} {text}: AXIS=POSITION is needed, e.g. Z=600mm; axes are {', '.join(machine.axes)}"
@@ -254,11 +254,11 @@ def _place(machine: Machine, text: str) -> dict[str, float]:
 
 def _poses(machine: Machine, places: Mapping[str, Mapping[str, float]], watch: Watch) -> dict[str, Modes]:
     """Name -> modes of further poses, computed from the structure."""
-    found: dict[str, Modes] = {}
+    result: dict[str, Modes] = {}
     for k, (text, pose) in enumerate(places.items()):
         watch.progress("poses", k, len(places))
         assert machine.structure is not None
-        found[text] = build(load_structure(machine.structure), pose).solution.modes
+        result[text] = build(load_structure(machine.structure), pose).solution.modes
     if places:
         watch.progress("poses", len(places), len(places))
-    return found
+    return result

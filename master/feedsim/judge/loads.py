@@ -30,42 +30,44 @@ def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[str]:
         f"is not carried at the start, the axis sags while the drive takes it up; put a dwell of {LOAD_TAKEN_UP:g} s "
         "ahead of the first motion"
     )
-    told = [
+    reported = [
         f"axis {name}: the constant load of {axis.M_0:g} N.m {sagging}"
         for name, axis in machine.axes.items()
         if axis.M_0 != 0
     ]
-    for each in loads:
-        torque = at_motor(each.load, float(each.means(start)[0]), machine)
-        friction = machine.axes[each.load.axis_name].friction if torque is not None else None
+    for acting in loads:
+        torque = at_motor(acting.load, float(acting.means(start)[0]), machine)
+        friction = machine.axes[acting.load.axis_name].friction if torque is not None else None
         # Friction alone holds what is below F_C.
         if torque is not None and isinstance(friction, FrictionParameters) and abs(torque) > friction.F_C:
-            told.append(f"{each.place}: the load of {torque:.3g} N.m at the motor of {each.load.axis_name} {sagging}")
-    return told
+            reported.append(
+                f"{acting.place}: the load of {torque:.3g} N.m at the motor of {acting.load.axis_name} {sagging}"
+            )
+    return reported
 
 
 def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[str]:
     """Loads that the drive cannot hold, and such that nothing feels: of another unit or at another place than meant."""
-    told = []
-    for each in loads:
-        peak, name = each.peak(program.duration), each.load.axis_name
-        torque = at_motor(each.load, peak, machine)
+    reported = []
+    for acting in loads:
+        peak, name = acting.peak(program.duration), acting.load.axis_name
+        torque = at_motor(acting.load, peak, machine)
         if torque is None:
             continue
         drive, friction = machine.axes[name].drive, machine.axes[name].friction
-        at_the_motor = "" if each.load.UNIT == "N.m" else f", {abs(torque):.4g} N.m at the motor of {name}"
-        size = f"{each.place}: the load {each.load.words} reaches {peak:.4g} {each.load.UNIT}{at_the_motor}"
+        at_the_motor = "" if acting.load.UNIT == "N.m" else f", {abs(torque):.4g} N.m at the motor of {name}"
+        size = f"{acting.place}: the load {acting.load.words} reaches {peak:.4g} {acting.load.UNIT}{at_the_motor}"
         if isinstance(drive, Drive) and abs(torque) > drive.M_max:
-            told.append(
+            reported.append(
                 f"{size}, {abs(torque) / drive.M_max:.3g} times the drive's M_max, {drive.M_max:.4g} N.m: the axis "
                 "cannot hold it; are unit, kind and factor right?"
             )
         elif isinstance(friction, FrictionParameters) and abs(torque) < FELT * friction.F_C:
-            told.append(
+            reported.append(
                 f"{size}, {abs(torque) / friction.F_C:.2g} of the Coulomb friction F_C, {friction.F_C:.4g} N.m: next "
                 "to nothing feels it; are unit, kind and factor right?"
             )
-    return told
+    return reported
 
 
 def driving(run: Run) -> list[str]:
@@ -82,7 +84,7 @@ def driving(run: Run) -> list[str]:
 
 def contradicted(run: Run) -> list[str]:
     """By the energy: loads with which the motor of the run does other work than that of the record."""
-    scenario, told = run.scenario, []
+    scenario, reported = run.scenario, []
     for work in run.loads:
         drives = work.drives
         if drives is None or (factor := drives.factor) is None or abs(factor - 1) < FACTOR_OFF:
@@ -95,10 +97,10 @@ def contradicted(run: Run) -> list[str]:
             wrong = "the record shows little or nothing of it: its size, kind or time is wrong"
         else:
             wrong = "its sign is wrong" if factor < 0 else "its size is wrong: unit, kind or factor"
-        told.append(
+        reported.append(
             f"{scenario.at('loads', work.load)}: while the load {work.words} acts, the motor of {load.axis_name} does "
             f"{drives.run:.3g} J of work in the run and {drives.record:.3g} J in the record (column "
             f"{column!r}); the load does {drives.load:.3g} J on the machine. If the recorded torque's own sign is "
             f"right, {wrong}; both agree with factor: {factor * load.factor:.3g}"
         )
-    return told
+    return reported

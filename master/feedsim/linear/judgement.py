@@ -96,9 +96,9 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     if not axes:
         return ()
     frictions = machine.shipped_frictions
-    held = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
+    fixed = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
     driven = tuple((name, axis.drive, axis.I_P) for name, axis in axes.items() if isinstance(axis.drive, Drive))
-    return _judged_axes(driven, held, machine.cycles, modes)
+    return _judged_axes(driven, fixed, machine.cycles, modes)
 
 
 def locked_modes(machine: Machine, modes: Modes) -> tuple[Floats, Floats, Floats]:
@@ -127,12 +127,12 @@ class Bristles(NamedTuple):
 # Most of the time of a short run; in a study many runs have the same loops, whatever else differs.
 @lru_cache(maxsize=8)
 def _judged_axes(
-    driven: tuple[tuple[str, Drive, float], ...], held: tuple[Bristles | None, ...], cycles: Cycles, modes: Modes
+    driven: tuple[tuple[str, Drive, float], ...], fixed: tuple[Bristles | None, ...], cycles: Cycles, modes: Modes
 ) -> tuple[Loop, ...]:
     """`driven`: name, drive and I_P of the axes judged; `held`: what holds each at rest, where that is known."""
     axes = tuple(name for name, _, _ in driven)
     drives = tuple(LinearDrive(drive, cycles, I_P) for _, drive, I_P in driven)
-    return Sampled(axes, drives, held, ModalPlant.of(modes, axes)).judged()
+    return Sampled(axes, drives, fixed, ModalPlant.of(modes, axes)).judged()
 
 
 def _judged(
@@ -229,7 +229,7 @@ class Sampled:
         _, position = self._along(
             partial(self._position_level, asked), self._frequencies(0.5 / cycles.T_pos, self.locked_resonances())
         )
-        found: list[Loop] = []
+        loops: list[Loop] = []
         kind: Kind
         for k, state in enumerate(STATES):
             of_speed = -_windings(speed[k, 0])
@@ -242,8 +242,8 @@ class Sampled:
                 ):
                     if gain > 0:
                         L = level[0] / level[1 + j] - 1
-                        found.append(_judged(axis, kind, state, gain, L, growing, closed, inner))
-        return tuple(found), frequency, speed
+                        loops.append(_judged(axis, kind, state, gain, L, growing, closed, inner))
+        return tuple(loops), frequency, speed
 
     def _along(self, level: Callable[[Complexes], Complexes], frequency: Floats) -> tuple[Floats, Complexes]:
         """Half of a level's contour [Hz] and its determinants there (2, 1 + asked, F), close enough together that none
@@ -260,8 +260,8 @@ class Sampled:
             size = np.abs(L)
             counts = (np.abs(np.angle(-L)) < CRITICAL_SECTOR) & (size > 1 / CRITICAL_RATIO) & (size < CRITICAL_RATIO)
             changes = np.abs(np.diff(L)) > CRITICAL_STEP * size[..., 1:]
-            told = (changes & (counts[..., 1:] | counts[..., :-1])).any(axis=(0, 1))
-            wide = np.flatnonzero((turns > MAX_PHASE_STEP) | told)
+            reported = (changes & (counts[..., 1:] | counts[..., :-1])).any(axis=(0, 1))
+            wide = np.flatnonzero((turns > MAX_PHASE_STEP) | reported)
             if not wide.size:
                 break
             between = 0.5 * (frequency[wide] + frequency[wide + 1])
@@ -324,12 +324,12 @@ class Sampled:
         answer = np.empty((len(every), A), dtype=np.complex128)
         for i, drive in enumerate(self.drives):
             answer[:, i] = drive.torque(every)[0] * drive.from_setpoint(every) * drive.ramp(every)
-        found = []
+        result = []
         for x, loop, _ in self._speed_loops(every):
             torques = np.linalg.solve(np.eye(A) + loop, np.eye(A) * answer[:, None])
             sampled = (x @ torques).reshape(len(s), len(components), A, A).sum(axis=1)
-            found.append(_determinants(gains[:, None] * sampled, np.zeros_like(sampled), asked))
-        return np.stack(found)
+            result.append(_determinants(gains[:, None] * sampled, np.zeros_like(sampled), asked))
+        return np.stack(result)
 
     def _speed_loops(self, s: Complexes) -> Iterator[tuple[Complexes, Complexes, Complexes]]:
         """Per state, (C, A, A) each: positions per torque, what the speed loops take off the torques, and what of that
@@ -338,8 +338,8 @@ class Sampled:
         n_M, x_M = n_fr, x_fr = self.ports(s, "linear")
         ideal = np.array([drive.drive.ideal_current_loop for drive in self.drives])
         if ideal.any():
-            held = self.ports(s, "held")
-            n_M, x_M = (np.asarray(np.where(ideal, h, linear)) for h, linear in zip(held, (n_M, x_M), strict=True))
+            fixed = self.ports(s, "held")
+            n_M, x_M = (np.asarray(np.where(ideal, h, linear)) for h, linear in zip(fixed, (n_M, x_M), strict=True))
         through, past = (np.empty((len(s), A, 1), dtype=np.complex128) for _ in range(2))
         for i, drive in enumerate(self.drives):
             E, past[:, i, 0] = drive.torque(s)
@@ -352,8 +352,8 @@ class Sampled:
                 n = np.asarray(np.linalg.solve(np.eye(A) + n_fr * R[:, None], n_M))
                 x = np.asarray(x_M - x_fr @ (R[:, :, None] * n))
             if any(drive.drive.indirect for drive in self.drives):
-                each = [drive.measured_position(s, n[:, i], x[:, i]) for i, drive in enumerate(self.drives)]
-                x = np.stack(each, axis=1)
+                entry = [drive.measured_position(s, n[:, i], x[:, i]) for i, drive in enumerate(self.drives)]
+                x = np.stack(entry, axis=1)
             seen = n.copy()
             for i, V in enumerate(windows):
                 if V is not None:
@@ -376,11 +376,11 @@ class Sampled:
         """(C, A) friction torque at rest per speed [N.m.s/rad], sampled: the angle by the trapezoidal rule."""
         T_c = self.drives[0].cycles.T_c
         angle = 0.5 * T_c * (np.exp(s * T_c) + 1) / np.expm1(s * T_c)
-        found = np.zeros((len(s), len(self.axes)), dtype=np.complex128)
-        for i, each in enumerate(self.bristles):
-            if each is not None:
-                found[:, i] = each.stiffness * angle + each.sigma_1 + each.sigma_2
-        return found
+        values = np.zeros((len(s), len(self.axes)), dtype=np.complex128)
+        for i, value in enumerate(self.bristles):
+            if value is not None:
+                values[:, i] = value.stiffness * angle + value.sigma_1 + value.sigma_2
+        return values
 
 
 def _s(frequency: Floats) -> Complexes:

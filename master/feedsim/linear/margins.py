@@ -55,7 +55,7 @@ def crossings(curve: Curve, frequency: Floats, values: Floats | None = None) -> 
     where = np.flatnonzero(np.isfinite(values[:-1]) & np.isfinite(values[1:]) & ((values[:-1] < 0) != (values[1:] < 0)))
     if not where.size:
         return np.empty(0)
-    each = np.arange(len(where))
+    entry = np.arange(len(where))
     ends, at_ends = frequency[[where, where + 1]], values[[where, where + 1]]
     for number in range(CROSSING_ROUNDS):
         low, high = ends
@@ -64,7 +64,7 @@ def crossings(curve: Curve, frequency: Floats, values: Floats | None = None) -> 
         places = _around_chord(ends, at_ends) if number % 3 else _places(low, high)
         heights = np.vstack([at_ends[:1], curve(places[1:-1].ravel()).reshape(INSIDE, -1), at_ends[1:]])
         first = ((heights < 0) != (at_ends[0] < 0)).argmax(axis=0)
-        ends, at_ends = (np.stack([one[first - 1, each], one[first, each]]) for one in (places, heights))
+        ends, at_ends = (np.stack([one[first - 1, entry], one[first, entry]]) for one in (places, heights))
     return np.asarray(0.5 * (ends[0] + ends[1]))
 
 
@@ -86,13 +86,13 @@ def extremes(curve: Curve, frequency: Floats, values: Floats | None = None) -> t
     """Local minima and local maxima of a real curve inside the grid `frequency` (F,)."""
     values = curve(frequency) if values is None else values
     rise = np.diff(values)
-    found: list[list[Extreme]] = []
+    result: list[list[Extreme]] = []
     for sign in (-1.0, 1.0):
         where = np.flatnonzero((sign * rise[:-1] > 0) & (sign * rise[1:] <= 0)) + 1
         places = _highest(curve, sign, frequency[where - 1], frequency[where + 1])
         heights = curve(places) if places.size else places
-        found.append([Extreme(float(f), float(v)) for f, v in zip(places, heights, strict=True)])
-    return found[0], found[1]
+        result.append([Extreme(float(f), float(v)) for f, v in zip(places, heights, strict=True)])
+    return result[0], result[1]
 
 
 def peak(curve: Curve, frequency: Floats) -> Extreme | None:
@@ -109,11 +109,11 @@ def peak(curve: Curve, frequency: Floats) -> Extreme | None:
 
 def _highest(curve: Curve, sign: float, low: Floats, high: Floats) -> Floats:
     """The maximum of sign * curve in every bracket."""
-    each = np.arange(len(low))
+    values = np.arange(len(low))
     for _ in range(EXTREME_ROUNDS if low.size else 0):
         places = _places(low, high)
         best = (sign * curve(places[1:-1].ravel())).reshape(INSIDE, -1).argmax(axis=0) + 1
-        low, high = places[best - 1, each], places[best + 1, each]
+        low, high = places[best - 1, values], places[best + 1, values]
     return np.asarray(0.5 * (low + high))
 
 
@@ -197,12 +197,12 @@ def margins(gain: Gain, frequency: Floats) -> Margins:
     negative = at_real.real < 0
     unit = crossings(lambda f: np.log(np.abs(gain(f))), frequency, np.log(np.abs(values)))
     at_unit = gain(unit) if unit.size else np.empty(0, dtype=np.complex128)
-    left = np.degrees(np.angle(-at_unit))  # 0 where the phase is -180 degrees
+    remaining = np.degrees(np.angle(-at_unit))  # 0 where the phase is -180 degrees
     return Margins(
         gain=tuple(
             GainCrossing(float(f), float(1 / abs(L))) for f, L in zip(real[negative], at_real[negative], strict=True)
         ),
-        phase=tuple(PhaseCrossing(float(f), float(margin)) for f, margin in zip(unit, left, strict=True)),
+        phase=tuple(PhaseCrossing(float(f), float(margin)) for f, margin in zip(unit, remaining, strict=True)),
     )
 
 
@@ -225,10 +225,10 @@ def bandwidth(response: Gain, frequency: Floats) -> Bandwidth:
     def above(f: Floats) -> Floats:
         return np.asarray(np.abs(response(f)) - THREE_DB)
 
-    found = crossings(above, frequency)
-    if not found.size:
+    values = crossings(above, frequency)
+    if not values.size:
         return Bandwidth(math.nan, math.nan)
-    falling = found[above(found * (1 + 1e-6)) < 0]
+    falling = values[above(values * (1 + 1e-6)) < 0]
     return Bandwidth(float(falling[0]), float(falling[-1])) if falling.size else Bandwidth(math.nan, math.nan)
 
 

@@ -111,7 +111,7 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
     best, step = float(grid[int(np.argmax(power))]), 0.5 / (FINER * width)
     for _ in range(3):  # the sine that leaves least is near the highest line
         near = best + step * np.arange(-3, 4)
-        best = float(near[int(np.argmin([_left(time, position, f, before, after) for f in near]))])
+        best = float(near[int(np.argmin([_remaining_squares(time, position, f, before, after) for f in near]))])
         step /= 3
     sides = [(before, detrended(position, before)), (after, detrended(position, after))]
     for (own, y), (other, z) in (sides, sides[::-1]):
@@ -122,7 +122,7 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
     return best
 
 
-def _left(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> float:
+def _remaining_squares(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> float:
     """Sum of squares that one sine over both sides leaves."""
     W, y = _both(time, signal, frequency, before, after)
     return float(np.sum((y - W @ np.linalg.lstsq(W, y, rcond=None)[0]) ** 2))

@@ -12,7 +12,7 @@ from feedsim.trace import Mark
 
 _TIME = re.compile(r"[-+.\d]")  # what a time begins with; a block of a program does not
 _COUNTED = re.compile(r"(.*?)\s*#(\d+)")
-MOST_TOLD = 12
+MAX_MARKS_NAMED = 12
 
 
 def window(text: str, marks: Sequence[Mark]) -> tuple[float, float]:
@@ -41,12 +41,12 @@ def _span(part: str, marks: Sequence[Mark]) -> tuple[float, float]:
     name, number = (counted[1], int(counted[2])) if counted else (part, None)
     indexes = [i for i, mark in enumerate(marks) if _begins(mark.text, name)]
     if not indexes or (number is not None and not 1 <= number <= len(indexes)):
-        there = "; ".join(dict.fromkeys(_short(mark.text) for mark in marks)) if len(marks) <= MOST_TOLD else ""
+        there = "; ".join(dict.fromkeys(_short(mark.text) for mark in marks)) if len(marks) <= MAX_MARKS_NAMED else ""
         known = f"there is {there}" if there else _known(marks)
         how_often = f"{name!r} begins {len(indexes)} of them" if indexes else f"none begins with {name!r}"
         raise InputError(f"of the {len(marks)} blocks of the record {how_often}; {known}")
     if number is None and len(indexes) > 1:
-        times = ", ".join(f"{marks[i].time:.6g} s" for i in indexes[:MOST_TOLD])
+        times = ", ".join(f"{marks[i].time:.6g} s" for i in indexes[:MAX_MARKS_NAMED])
         raise InputError(
             f"{len(indexes)} blocks of the record begin with {name!r}, at {times}; say which, for example {name} #2"
         )
@@ -67,5 +67,5 @@ def _short(text: str) -> str:
 
 def _known(marks: Sequence[Mark]) -> str:
     first = dict.fromkeys(text.split()[0] for mark in marks if (text := mark.text.strip()))
-    shown = [_short(name) for name in first][:MOST_TOLD]
+    shown = [_short(name) for name in first][:MAX_MARKS_NAMED]
     return f"they begin with {', '.join(shown)}{' ...' if len(first) > len(shown) else ''}" if shown else "it has none"

@@ -60,7 +60,7 @@ class Partial:
         return next(path for path in (folder, *folder.parents) if path.is_dir())
 
     @property
-    def left(self) -> bool:
+    def has_rows(self) -> bool:
         """Whether the file is there, with rows."""
         return self.rows > 0 and self.path.exists()
 

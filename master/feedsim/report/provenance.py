@@ -77,17 +77,17 @@ def hashed(files: Sequence[tuple[str, Path]]) -> list[InputFile]:
 def software() -> dict[str, str]:
     """Versions of the package, of what it calculates with, and the platform."""
     names = ("feedsim", "numpy", "scipy", "ruckig", "fmpy")
-    found = {"python": platform.python_version(), "platform": platform.platform()}
-    return found | {name: version(name) or "not installed as a package" for name in names}
+    result = {"python": platform.python_version(), "platform": platform.platform()}
+    return result | {name: version(name) or "not installed as a package" for name in names}
 
 
 def archives(units: Mapping[str, Mapping[str, str]]) -> list[ArchiveUse]:
     """Distinct archives of a run's units (instance -> GUID and version), in the order of their first use."""
-    found: dict[tuple[str, str, str], list[str]] = {}
+    result: dict[tuple[str, str, str], list[str]] = {}
     for instance, unit in units.items():
         key = (unit.get("name", instance.partition("_")[0]), unit.get("version", "?"), unit.get("guid", "?"))
-        found.setdefault(key, []).append(instance)
-    return [ArchiveUse(*key, tuple(instances)) for key, instances in found.items()]
+        result.setdefault(key, []).append(instance)
+    return [ArchiveUse(*key, tuple(instances)) for key, instances in result.items()]
 
 
 def axis_parameters(axis: Axis) -> dict[str, dict[str, tuple[Parameter, str]]]:
@@ -104,12 +104,12 @@ def friction_origins(machine: Machine) -> dict[str, str]:
     """
     origins: dict[str, str] = {}
     for name, axis in machine.axes.items():
-        told = axis.friction.identified if isinstance(axis.friction, FrictionParameters) else None
-        if not told:
+        reported = axis.friction.identified if isinstance(axis.friction, FrictionParameters) else None
+        if not reported:
             continue
-        traces = told.get("traces")
+        traces = reported.get("traces")
         files = [item.get("file") for item in traces if isinstance(item, dict)] if isinstance(traces, list) else []
-        parts = [f"identified {told['date']}" if "date" in told else "identified"]
+        parts = [f"identified {reported['date']}" if "date" in reported else "identified"]
         parts += ["from " + ", ".join(str(file) for file in files)] if files else []
         origins[name] = " ".join(parts)
     return origins
@@ -154,7 +154,7 @@ def quantity(value: Any, unit: str, **more: str) -> dict[str, Any]:
 
 def figures_part(figures: Mapping[str, Figure]) -> dict[str, Any]:
     """Figures by name; one that could not be determined has the value null."""
-    return {name: quantity(each.value, each.unit, meaning=each.meaning) for name, each in figures.items()}
+    return {name: quantity(figure.value, figure.unit, meaning=figure.meaning) for name, figure in figures.items()}
 
 
 def machine_part(machine: Machine) -> dict[str, Any]:

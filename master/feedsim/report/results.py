@@ -167,13 +167,13 @@ def write_report(
                 grown[name] = already
         write_text(fresh / REPORT, html(report, kind))
         head = {"kind": kind, "version": ENVELOPE, "answer": list(report.answer), "figures": {}}
-        rest = {**_found(report), "files": list(names), "keeps": [name for name in keeps if name in files]}
+        rest = {**_finding_entries(report), "files": list(names), "keeps": [name for name in keeps if name in files]}
         write_text(fresh / SUMMARY, to_json({**head, **summary(names), "kind": kind, **rest}))
 
     return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown, drawn, kind=kind, own=own)
 
 
-def _found(report: Report) -> dict[str, Any]:
+def _finding_entries(report: Report) -> dict[str, Any]:
     """Entries of summary.json: what there is to say about the result by its severity, and of that the warnings."""
     return {
         "warnings": [text for severity, text in report.findings if severity != "note"],

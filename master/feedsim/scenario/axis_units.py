@@ -102,7 +102,10 @@ def _friction_fields(unit: str) -> dict[str, Any]:
     """The parameters of a friction unit, each with how it is checked, and where they come from."""
     known = variables.parameters(unit)
     defaults = dict.fromkeys(_FRICTION_NEEDED, ...) | _FRICTION_WITHOUT
-    fields = {name: (float, parameter(each, defaults.get(name, float(each.start)))) for name, each in known.items()}
+    fields = {
+        name: (float, parameter(variable, defaults.get(name, float(variable.start))))
+        for name, variable in known.items()
+    }
     return {**fields, "identified": (dict[str, Any], Field(default={}, description=_IDENTIFIED))}
 
 

@@ -235,12 +235,12 @@ def _lines(data: Mapping[str, Any], place: Place, remarks: Mapping[Place, str], 
             yield from _lines(value, own, remarks, depth + 1)
         elif isinstance(value, list):
             reported = "; ".join(remarks[(*own, k)] for k in range(len(value)) if (*own, k) in remarks)
-            yield _told(f"{head} {_flow(value)}", reported)
+            yield _commented(f"{head} {_flow(value)}", reported)
         else:
-            yield _told(f"{head} {_flow(value)}", remarks.get(own, ""))
+            yield _commented(f"{head} {_flow(value)}", remarks.get(own, ""))
 
 
-def _told(text: str, remark: str) -> str:
+def _commented(text: str, remark: str) -> str:
     plain = "".join(c if c.isprintable() else "." for c in remark)
     return f"{text:<36}  # {plain}" if remark else text
 

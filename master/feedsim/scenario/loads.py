@@ -34,7 +34,7 @@ class Table(Model):
         return time
 
     @model_validator(mode="after")
-    def _a_value_each(self) -> Self:
+    def _as_many_values(self) -> Self:
         if len(self.time) != len(self.values):
             raise fault(f"{len(self.time)} instants and {len(self.values)} values; each instant needs a value")
         return self

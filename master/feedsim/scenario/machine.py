@@ -108,7 +108,7 @@ class Axis(Model):
         share = self.guide.share if self.guide is not None else None
         if share is None:
             return values
-        least = {name: each.minimum for name, each in variables.parameters("friction").items()}
+        least = {name: variable.minimum for name, variable in variables.parameters("friction").items()}
         return values | {name: max(float(values[name]) * (1 - share), least[name]) for name in SHARED_WITH_GUIDE}
 
     @property

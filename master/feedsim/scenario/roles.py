@@ -72,8 +72,11 @@ class Role:
 def _role(name: str, shipped: str, *needed: str, others: Mapping[str, str] = MappingProxyType({})) -> Role:
     """A role with the signals that the table of the shipped unit declares, in its order."""
     known = {
-        name: (each.causality, Signal(name, each.unit if each.kind == "REAL" else BOOLEAN, each.short, name in needed))
-        for name, each in variables.table(shipped).items()
+        name: (
+            variable.causality,
+            Signal(name, variable.unit if variable.kind == "REAL" else BOOLEAN, variable.short, name in needed),
+        )
+        for name, variable in variables.table(shipped).items()
     }
     inputs, outputs = (
         tuple(signal for causality, signal in known.values() if causality in wanted)

@@ -49,16 +49,16 @@ class Parts:
         """Component, the first that is made from it -> file name of a shipped archive, as runs know it."""
         if self.coupling is not None:
             return {self.roles.plant: f"{UNIT}.fmu"}
-        first = {found[0]: f"{kind}.fmu" for kind, found in self.shipped.items()}
+        first = {value[0]: f"{kind}.fmu" for kind, value in self.shipped.items()}
         return {self.roles.plant: "plant.fmu", **first}
 
     @property
     def shipped(self) -> dict[str, list[str]]:
         """Name of a shipped archive -> components of drives and frictions that are made from it."""
-        found: dict[str, list[str]] = {}
+        result: dict[str, list[str]] = {}
         for name in (*self.roles.shipped_drives, *self.roles.shipped_frictions):
-            found.setdefault(str(self.archives[name].description.modelName), []).append(name)
-        return found
+            result.setdefault(str(self.archives[name].description.modelName), []).append(name)
+        return result
 
 
 def cycles(
@@ -78,10 +78,10 @@ def cycles(
     if roles.shipped_drives:
         known = values[roles.shipped_drives[0]]
         return float(known["T_c"]), float(known["T_pos"]), ""
-    told = ((own or {}).get("machine") or {}).get("cycles", {})
-    if "control" in told and "position" in told:
+    reported = ((own or {}).get("machine") or {}).get("cycles", {})
+    if "control" in reported and "position" in reported:
         try:
-            return units.parse(str(told["control"]), "s"), units.parse(str(told["position"]), "s"), ""
+            return units.parse(str(reported["control"]), "s"), units.parse(str(reported["position"]), "s"), ""
         except InputError as error:
             raise InputError(f"{where}: the annotation feedsim.scenario: machine.cycles: {error}") from None
     if step is not None:
@@ -105,25 +105,25 @@ def faults(parts: Parts, where: str) -> list[str]:
     """What does not fit together although each part is right."""
     roles, values = parts.roles, parts.values
     lengths = {"control": parts.T_c, "position": parts.T_pos}
-    found = [f"{where}: the {name} cycle is {cycle!r} s; it must be greater than 0"
+    result = [f"{where}: the {name} cycle is {cycle!r} s; it must be greater than 0"
              for name, cycle in lengths.items() if not cycle > 0]  # fmt: skip
     for name in ("T_c", "T_pos"):
         given = {control: values[control][name] for control in roles.shipped_drives}
         if len(set(given.values())) > 1:
             said = ", ".join(f"{control} {value!r} s" for control, value in given.items())
-            found.append(f"{where}: the controllers differ in {name}: {said}; all axes have one cycle here")
+            result.append(f"{where}: the controllers differ in {name}: {said}; all axes have one cycle here")
     plant = values[roles.plant]
     if plant.get("modes_file"):
-        found.append(f"{where}: {roles.plant}.modes_file: the modes are those inside "
+        result.append(f"{where}: {roles.plant}.modes_file: the modes are those inside "
                      f"{parts.archives[roles.plant].path.name}; name no other file")  # fmt: skip
     for axis, name in roles.setpoints.items():
         if name not in parts.table.x_s:
-            found.append(f"{where}: axis {axis}: {roles.setpoint} has no setpoints of an axis {name!r}")
+            result.append(f"{where}: axis {axis}: {roles.setpoint} has no setpoints of an axis {name!r}")
     for shipped in parts.shipped.values() if parts.coupling is None else ():
         guids = {parts.archives[name].guid for name in shipped}
         if len(guids) > 1:
-            found.append(f"{where}: {', '.join(shipped)} are made from different archives ({', '.join(guids)})")
-    return found
+            result.append(f"{where}: {', '.join(shipped)} are made from different archives ({', '.join(guids)})")
+    return result
 
 
 def annotation(text: str | None, files: Collection[str], where: str) -> dict[str, Any] | None:
@@ -147,12 +147,12 @@ def annotation(text: str | None, files: Collection[str], where: str) -> dict[str
     if data["machine"].get("structure") == STRUCTURE and STRUCTURE not in files:
         missing.append(STRUCTURE)
     if unknown or missing:
-        told = [f"{what} has the unknown key {key!r}" for key in unknown]
+        reported = [f"{what} has the unknown key {key!r}" for key in unknown]
         raise InputError.of(
-            what, told + [f"{what} names the recording {name!r}, which is not in it" for name in missing]
+            what, reported + [f"{what} names the recording {name!r}, which is not in it" for name in missing]
         )
-    found: dict[str, Any] = data
-    return found
+    result: dict[str, Any] = data
+    return result
 
 
 def named_files(own: Mapping[str, Any] | None) -> list[str]:
@@ -190,8 +190,8 @@ def _check_types(data: Any, what: str) -> None:
 def _depth(data: Any) -> int:
     """Levels of groups and lists."""
     level, depth = [data], 0
-    while level := [each for each in level if isinstance(each, (dict, list))]:
-        level = [inner for each in level for inner in (each.values() if isinstance(each, dict) else each)]
+    while level := [entry for entry in level if isinstance(entry, (dict, list))]:
+        level = [inner for entry in level for inner in (entry.values() if isinstance(entry, dict) else entry)]
         depth += 1
     return depth
 
@@ -203,7 +203,7 @@ def scenario_data(
     taken over, or else the setpoints stand as recorded ones."""
     roles = parts.roles
     own = dict(own or {})
-    told = own.get("machine", {})
+    reported = own.get("machine", {})
     if not motions or "motions" not in own:
         columns = {axis: {"column": f"{setpoint}.x_s"} for axis, setpoint in roles.setpoints.items()}
         own["motions"] = [{"kind": "setpoints", "file": SETPOINTS_RESOURCE, "columns": columns}]
@@ -211,49 +211,52 @@ def scenario_data(
     plant = parts.values[roles.plant]
     axes = {}
     for axis in roles.axes:
-        axes[axis] = _axis(parts, axis, told.get("axes", {}).get(axis, {}), folder)
+        axes[axis] = _axis(parts, axis, reported.get("axes", {}).get(axis, {}), folder)
     machine = {
-        "name": told.get("name", name),
-        "note": told.get("note", ""),
+        "name": reported.get("name", name),
+        "note": reported.get("note", ""),
         "modes": MODES_RESOURCE,
         "plant": parts.places[roles.plant],
         "pose": {axis: f"{plant[f'{axis}.x_0']!r} m" for axis in roles.axes},
         "cycles": {"interpolation": f"{parts.T_pos!r} s"}
-        | told.get("cycles", {})
+        | reported.get("cycles", {})
         | {"control": f"{parts.T_c!r} s", "position": f"{parts.T_pos!r} s"},
-        "path": told.get("path", {"jerk": "1000 m/s^3", "acceleration": "100 m/s^2"}),
+        "path": reported.get("path", {"jerk": "1000 m/s^3", "acceleration": "100 m/s^2"}),
         "axes": axes,
     }
     geometry = _group(parts, roles.plant).get("geometry", {}) if roles.plant in parts.archives else {}
     if any(plant[f"geometry.{name}"] for name in geometry):
         machine["geometry"] = {name: value for name, value in geometry.items() if plant[f"geometry.{name}"]}
-    if told.get("structure") == STRUCTURE:
+    if reported.get("structure") == STRUCTURE:
         machine["structure"] = STRUCTURE
     if parts.coupling is not None:
         own["coupling"] = parts.coupling
     return {**own, "name": own.get("name", name), "machine": machine}
 
 
-def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _axis(parts: Parts, axis: str, reported: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     roles = parts.roles
     plant = parts.values[roles.plant]
     control, contact = roles.drives[axis], roles.frictions[axis]
     limits = _limits(parts.table, roles.setpoints[axis], float(plant[f"{axis}.x_0"]))
     if control in roles.foreign:
-        drive = _foreign(parts, control, DRIVE, told, folder)
-        pitch = told.get("pitch") or f"{_seen_pitch(parts.table, roles.setpoints[axis])!r} m"
+        drive = _foreign(parts, control, DRIVE, reported, folder)
+        pitch = reported.get("pitch") or f"{_seen_pitch(parts.table, roles.setpoints[axis])!r} m"
     else:
-        drive, pitch = _shipped_drive(parts, control), _pitch(float(parts.values[control]["I_P"]), told.get("pitch"))
+        drive, pitch = (
+            _shipped_drive(parts, control),
+            _pitch(float(parts.values[control]["I_P"]), reported.get("pitch")),
+        )
     if contact in roles.foreign:
-        friction = _foreign(parts, contact, FRICTION_ROLE, told, folder)
+        friction = _foreign(parts, contact, FRICTION_ROLE, reported, folder)
     else:
-        identified = {key: value for key, value in told.get("friction", {}).items() if key == "identified"}
+        identified = {key: value for key, value in reported.get("friction", {}).items() if key == "identified"}
         laws = {unit: law for law, unit in FRICTION_ROLE.others} if parts.coupling is None else {}
         law = laws.get(str(parts.archives[contact].description.modelName))
         friction = {**({"law": law} if law else {}), **_group(parts, contact), **identified}
     return {
         **limits,
-        **{key: value for key, value in told.items() if key in (*limits, "display_sign")},
+        **{key: value for key, value in reported.items() if key in (*limits, "display_sign")},
         "pitch": pitch,
         "constant_load": f"{plant[f'{axis}.M_0']!r} N.m",
         **({"play": f"{play!r} m"} if (play := plant.get(f"{axis}.play")) else {}),
@@ -292,12 +295,12 @@ def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:
     return drive
 
 
-def _foreign(parts: Parts, component: str, role: Role, told: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _foreign(parts: Parts, component: str, role: Role, reported: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """A component that is no shipped unit. The wiring shows what is exchanged, the annotation what else is recorded."""
     archive, signals = parts.archives[component], parts.roles.foreign[component]
     recorded = {
         signal: name
-        for signal, name in told.get(role.name, {}).get("outputs", {}).items()
+        for signal, name in reported.get(role.name, {}).get("outputs", {}).items()
         if signal not in signals and isinstance(name, str) and name in archive.variables
     }
     return {
@@ -323,13 +326,13 @@ def _group(parts: Parts, component: str, leave: tuple[str, ...] = ()) -> dict[st
     return group
 
 
-def _pitch(I_P: float, told: Any) -> str:
+def _pitch(I_P: float, reported: Any) -> str:
     """A pitch whose lead is I_P [m/rad] to the last bit, if there is one; the annotated one, where it still is."""
     near = 2 * pi * I_P
     candidates = [near, nextafter(near, inf), nextafter(near, -inf)]
-    if isinstance(told, str):
+    if isinstance(reported, str):
         with suppress(InputError):
-            candidates.insert(0, number(told.removesuffix(" m")))
+            candidates.insert(0, number(reported.removesuffix(" m")))
     best = min(candidates, key=lambda pitch: abs(pitch / (2 * pi) - I_P))
     return f"{best!r} m"
 

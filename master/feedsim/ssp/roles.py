@@ -54,11 +54,11 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
     """
     problems: list[str] = []
     for kind in ("plant", "setpoint"):
-        found = [name for name, archive in archives.items() if _kind(archive) == kind]
-        if len(found) != 1:
+        result = [name for name, archive in archives.items() if _kind(archive) == kind]
+        if len(result) != 1:
             problems.append(
                 f"{where}: one component made from {kind}.fmu is needed; there "
-                f"{'is none' if not found else 'are ' + ', '.join(found)}"
+                f"{'is none' if not result else 'are ' + ', '.join(result)}"
             )
     for component in structure.components:
         problems += connector_faults(component, archives[component.name], where)
@@ -168,8 +168,8 @@ def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where:
             else:
                 outputs[f"{axis}.{torque}"] = source
                 partners[role][axis] = source[0]
-    names = [name for found in partners.values() for name in found.values()]
-    for axes in (list(found.values()) for found in partners.values()):
+    names = [name for partner in partners.values() for name in partner.values()]
+    for axes in (list(partner.values()) for partner in partners.values()):
         problems += [f"{where}: {name} drives {axes.count(name)} axes; one is allowed" for name in dict.fromkeys(axes)
                      if axes.count(name) > 1]  # fmt: skip
     problems += [f"{where}: {name} is connected as drive and as friction; one is allowed"
@@ -180,9 +180,9 @@ def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where:
         raise InputError.of(where, problems)
     setpoints = {axis: _setpoint_axis(driven, name, setpoint) or axis for axis, name in partners[DRIVE].items()}
     foreign: dict[str, dict[str, str]] = {}
-    for role, found in partners.items():
-        torque = next(name for name, each in TORQUES.items() if each is role)
-        for axis, name in found.items():
+    for role, value in partners.items():
+        torque = next(name for name, entry in TORQUES.items() if entry is role)
+        for axis, name in value.items():
             if not _is_shipped(archives[name], role):
                 offered = _offered(axis, role, plant, setpoint, setpoints[axis])
                 foreign[name] = {torque: outputs[f"{axis}.{torque}"][1]}
@@ -204,19 +204,19 @@ def _offered(axis: str, role: Role, plant: str, setpoint: str, setpoint_axis: st
     """What the system has for the inputs of a role: where it comes from -> signal."""
     places = {wiring.PLANT: (plant, axis), wiring.NC: (setpoint, setpoint_axis)}
     instance = wiring.controller(axis) if role is DRIVE else wiring.friction(axis)
-    found: dict[End, str] = {}
-    for each in wiring.figure_2((axis,)):
-        if each.target.instance == instance and each.source.instance in places:
-            component, prefix = places[each.source.instance]
-            found[component, f"{prefix}.{each.target.name}"] = each.target.name
-    return found
+    result: dict[End, str] = {}
+    for connection in wiring.figure_2((axis,)):
+        if connection.target.instance == instance and connection.source.instance in places:
+            component, prefix = places[connection.source.instance]
+            result[component, f"{prefix}.{connection.target.name}"] = connection.target.name
+    return result
 
 
 def _signals(
     driven: Mapping[End, End], name: str, role: Role, offered: Mapping[End, str], where: str, problems: list[str]
 ) -> dict[str, str]:
     """Signal -> variable of the component, by what its inputs are connected to."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for (component, variable), source in driven.items():
         if component != name:
             continue
@@ -225,36 +225,36 @@ def _signals(
             listed = ", ".join(".".join(end) for end in offered)
             problems.append(f"{where}: {name}.{variable} is connected to {'.'.join(source)}; a {role.name} of its axis "
                             f"can be given {listed}")  # fmt: skip
-        elif signal in found:
-            problems.append(f"{where}: {'.'.join(source)} drives {name}.{found[signal]} and {name}.{variable}; "
+        elif signal in result:
+            problems.append(f"{where}: {'.'.join(source)} drives {name}.{result[signal]} and {name}.{variable}; "
                             "one is allowed")  # fmt: skip
         else:
-            found[signal] = variable
+            result[signal] = variable
     ends = {signal: end for end, signal in offered.items()}
     problems += [
         f"{where}: nothing of {name} is connected to {'.'.join(ends[signal.name])}; the {role.name} of an axis needs it"
         for signal in role.inputs
-        if signal.needed and signal.name not in found
+        if signal.needed and signal.name not in result
     ]
-    return found
+    return result
 
 
-def _other_wiring(driven: Mapping[End, End], found: Roles, where: str) -> list[str]:
+def _other_wiring(driven: Mapping[End, End], result: Roles, where: str) -> list[str]:
     """Every difference from Fig. 2."""
-    names = {wiring.PLANT: found.plant}
-    names |= {wiring.controller(axis): name for axis, name in found.drives.items()}
-    names |= {wiring.friction(axis): name for axis, name in found.frictions.items()}
+    names = {wiring.PLANT: result.plant}
+    names |= {wiring.controller(axis): name for axis, name in result.drives.items()}
+    names |= {wiring.friction(axis): name for axis, name in result.frictions.items()}
 
     def end(variable: wiring.Variable) -> End:
         if variable.instance == wiring.NC:
             axis, _, name = variable.name.rpartition(".")
-            return found.setpoint, f"{found.setpoints[axis]}.{name}"
+            return result.setpoint, f"{result.setpoints[axis]}.{name}"
         return names[variable.instance], variable.name
 
     problems = []
-    for connection in wiring.figure_2(found.axes):
+    for connection in wiring.figure_2(result.axes):
         target = end(connection.target)
-        if target[0] in found.foreign or names.get(connection.source.instance) in found.foreign:
+        if target[0] in result.foreign or names.get(connection.source.instance) in result.foreign:
             continue
         given = driven.get(target)
         if connection.source.instance == wiring.ZERO:

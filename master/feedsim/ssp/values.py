@@ -46,7 +46,7 @@ def values(
 
     Raises:
         InputError: lists every set that cannot be read, every parameter that is unknown, of another type or unit, and
-            every input that nothing drives but a set, with another value than the archive's (:func:`_held_inputs`);
+            every input that nothing drives but a set, with another value than the archive's (:func:`_constant_inputs`);
             the first of them where there are many.
     """
     problems: list[str] = []
@@ -76,7 +76,7 @@ def values(
                 result[component][name] = said.value(archive, structure)
             except InputError as error:
                 problems.append(f"{said.place}: {name}: {error}")
-    problems += _held_inputs(inputs, structure, archives, result, foreign)
+    problems += _constant_inputs(inputs, structure, archives, result, foreign)
     if len(problems) > parameter_set.MOST_PROBLEMS:
         problems[parameter_set.MOST_PROBLEMS :] = [f"{where}: and more like these; the first are listed"]
     if problems:
@@ -128,7 +128,7 @@ def _sets(
     return result
 
 
-def _held_inputs(
+def _constant_inputs(
     inputs: Mapping[tuple[str, str], _Said],
     structure: Structure,
     archives: Mapping[str, Archive],

@@ -234,7 +234,7 @@ def _part_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
             faults.append((p, members, axes))
         elif free[p] == 0:
             fixed.append(members)
-    return _flying(assembly, faults, free, sizes, main, count), _held(assembly, fixed, int(sizes[main]))
+    return _flying(assembly, faults, free, sizes, main, count), _grounded_parts(assembly, fixed, int(sizes[main]))
 
 
 def _flying(
@@ -264,7 +264,7 @@ def _modes(count: int) -> str:
     )
 
 
-def _held(assembly: Assembly, parts: list[Integers], largest: int) -> list[str]:
+def _grounded_parts(assembly: Assembly, parts: list[Integers], largest: int) -> list[str]:
     warnings = [
         f"a part of {counted(len(members), *DEGREES)} "
         f"({few(assembly.labels, members)}) is connected to the ground alone, not to the {largest} of the largest part"

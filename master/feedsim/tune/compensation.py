@@ -65,14 +65,14 @@ class Judged:
     def beyond_friction(self) -> list[tuple[str, Pair, float, float]]:
         """Axis, pair, error without friction and before [m], of pairs held out whose error is more than friction's, the
         largest share first."""
-        found = [
+        result = [
             (axis, pair, float(self.held_frictionless[i, k]), float(self.held_before[i, k]))
             for k, axis in zip(self.columns, self.axes, strict=True)
             for i, pair in enumerate(self.held)
         ]
         return sorted(
-            (each for each in found if each[2] > OTHER_CAUSES * each[3]),
-            key=lambda each: each[2] / each[3],
+            (entry for entry in result if entry[2] > OTHER_CAUSES * entry[3]),
+            key=lambda entry: entry[2] / entry[3],
             reverse=True,
         )
 
@@ -98,20 +98,20 @@ def tune(
     practical range fits the travel, a drive or a friction of another maker; SimulationError as a run.
     """
     machine = without(scenario.machine, kind, axes)
-    held = practical(machine, plane)
-    if len(held) < 4:
+    pairs = practical(machine, plane)
+    if len(pairs) < 4:
         raise InputError(
-            f"{plane[0]}-{plane[1]}: {len(held)} circles of the practical range fit travel, speed and acceleration of "
+            f"{plane[0]}-{plane[1]}: {len(pairs)} circles of the practical range fit travel, speed and acceleration of "
             "these axes; at least 4 are needed"
         )
-    tuned = tuned_on(held)
-    on, off = Circles.of(scenario, plane, tuned), Circles.of(scenario, plane, held)
+    tuned = tuned_on(pairs)
+    on, off = Circles.of(scenario, plane, tuned), Circles.of(scenario, plane, pairs)
 
     def draws(count: int, seed: int) -> Iterator[Machine]:
-        return (without(each, kind, axes) for each in cloud.draws(count, seed)) if cloud is not None else iter(())
+        return (without(draw, kind, axes) for draw in cloud.draws(count, seed)) if cloud is not None else iter(())
 
     machines = [machine, *(draws(SEARCH_DRAWS, SEARCH_SEED) if kind != "model" else ())]
-    found = _found(on, machines, kind, axes, objective, fmus, progress)
+    result = _found(on, machines, kind, axes, objective, fmus, progress)
 
     def errors(circles: Circles, own: Machine, *, compensated: bool) -> Array:
         if not compensated:
@@ -119,8 +119,8 @@ def tune(
         torque = None
         if kind == "model":
             made = _feedforward(circles, machine, axes, fmus)
-            torque = {axis: torque_scale(machine, own, axis) * each for axis, each in made.items()}
-        return size(circles.errors(found.on(own, machine), fmus=fmus, torque=torque))
+            torque = {axis: torque_scale(machine, own, axis) * values for axis, values in made.items()}
+        return size(circles.errors(result.on(own, machine), fmus=fmus, torque=torque))
 
     names = list(effects_of(machine, axes))
     total, done = 5 + len(names) + count, 0
@@ -129,10 +129,10 @@ def tune(
         nonlocal done
         progress("judging", done, total)
         done += 1
-        return np.array([errors(off, own, compensated=each) for each in (False, True)])
+        return np.array([errors(off, own, compensated=entry) for entry in (False, True)])
 
     progress("judging", done, total)
-    tuned_before, tuned_after = (errors(on, machine, compensated=each) for each in (False, True))
+    tuned_before, tuned_after = (errors(on, machine, compensated=entry) for entry in (False, True))
     held_before, held_after = both(machine)
     free = errors(off, frictionless(machine, plane), compensated=False)
     changed = {effect: both(own) for effect, own in names}
@@ -142,7 +142,7 @@ def tune(
             drawn.append(both(own))
     progress("judging", total, total)
     return Judged(
-        scenario, plane, tuple(axes), objective, found, tuple(tuned), tuple(held), tuned_before, tuned_after,
+        scenario, plane, tuple(axes), objective, result, tuple(tuned), tuple(pairs), tuned_before, tuned_after,
         held_before, held_after, free, changed, np.array(drawn) if drawn else None, cloud,
     )  # fmt: skip
 
@@ -162,7 +162,7 @@ def _found(
     if kind == "table":
         return table(on, machines, objective, fmus=fmus, progress=progress, axes=axes)
     grid = PulseGrid.measured(on, machines, fmus=fmus, progress=progress, axes=axes)
-    accelerations = np.array([each.acceleration for each in on.pairs] * len(machines))
+    accelerations = np.array([pair.acceleration for pair in on.pairs] * len(machines))
     values = {
         axis: {
             **pulse(grid, on.plane.index(axis), accelerations, objective, adapted=kind == "pulse_characteristic"),

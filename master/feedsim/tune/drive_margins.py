@@ -31,7 +31,7 @@ class Judge:
     machine: Machine
     axis: str
 
-    def found(self, drive: Drive) -> tuple[Worst, float]:
+    def least(self, drive: Drive) -> tuple[Worst, float]:
         """Least margins, and torque of noise [N.m/rad] as the machine itself has it."""
         judged = self.candidates.judge(self._on_draw(drive))
         return _least_of(judged.loops), judged.noise / torque_scale(self.machine, self.draw, self.axis)
@@ -63,7 +63,7 @@ def judges_of(
 
 def margins_of(judges: Mapping[str, Judge], drive: Drive) -> Margins:
     """Least margins and largest noise over judges."""
-    result = {name: value.found(drive) for name, value in judges.items()}
+    result = {name: value.least(drive) for name, value in judges.items()}
     return _over({name: worst for name, (worst, _) in result.items()}, max(noise for _, noise in result.values()))
 
 

@@ -24,7 +24,7 @@ ORDER = 10.0  # of the cogging per turn, where the number of pole pairs is not k
 PLAY = 2e-6  # [m]
 # Contact that the play of an axis measured directly lies in: the motor against a slide that stands still.
 CONTACT, CONTACT_DAMPING = 300.0, 0.1  # [Hz], [1]
-MOTOR = 0.5  # share of the motor in the inertia that answers a torque at once
+MOTOR_SHARE_OF_INERTIA = 0.5  # share of the motor in the inertia that answers a torque at once
 # Wear takes preload away and widens the engaging zone; warm grease is half as viscous.
 WORN = {"F_C": 0.7, "F_S": 0.7, "F_log": 0.7, "sigma_0": 0.7, "W": 2.0}
 WARM = {"F_log": 0.5, "sigma_2": 0.5}
@@ -103,7 +103,7 @@ def _play(machine: Machine, axis: str) -> Machine | None:
         return _with(machine, axis, play=PLAY)
     if machine.plant is not None:
         return None
-    inertia = MOTOR * checked_modes(machine).J_inf(axis)
+    inertia = MOTOR_SHARE_OF_INERTIA * checked_modes(machine).J_inf(axis)
     omega = 2 * math.pi * CONTACT
     stiffness = inertia / own.I_P**2 * omega**2
     values = {"stiffness": stiffness, "damping": 2 * CONTACT_DAMPING * stiffness / omega, "inertia": inertia}

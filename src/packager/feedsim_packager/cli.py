@@ -72,7 +72,10 @@ def _add_resources(parser: argparse.ArgumentParser) -> None:
         for name in kind.options:
             takers.setdefault(name, []).append(kind_name)
     for name, kind_names in takers.items():
-        option, named = kinds.KINDS[kind_names[0]].options[name], " or ".join(f"'{each}'" for each in kind_names)
+        option, named = (
+            kinds.KINDS[kind_names[0]].options[name],
+            " or ".join(f"'{kind_name}'" for kind_name in kind_names),
+        )
         parser.add_argument(
             f"--{name}", type=Path, help=f"{option.help}; only for a unit with resources of the kind {named}"
         )
@@ -120,9 +123,9 @@ def _describe(options: argparse.Namespace) -> None:
 
 def _variables(options: argparse.Namespace) -> None:
     compiler = find_compiler(options.cc)
-    found = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
-    archive.write(options.out, declared.dump(found))
-    print(f"{options.out}: tables of {', '.join(each.unit for each in found)}")
+    tables = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
+    archive.write(options.out, declared.dump(tables))
+    print(f"{options.out}: tables of {', '.join(entry.unit for entry in tables)}")
 
 
 def _exchange(options: argparse.Namespace) -> None:
@@ -131,8 +134,8 @@ def _exchange(options: argparse.Namespace) -> None:
 
 
 def _web(options: argparse.Namespace) -> None:
-    found = web.make(options.out, shlex.split(options.cc) if options.cc else None)
-    print(f"{found}: {found.stat().st_size / 1024:.0f} KiB")
+    path = web.make(options.out, shlex.split(options.cc) if options.cc else None)
+    print(f"{path}: {path.stat().st_size / 1024:.0f} KiB")
 
 
 def _build(options: argparse.Namespace) -> None:

@@ -129,14 +129,14 @@ def _display_units(rows: Iterable[Row]) -> dict[str, list[str]]:
     Units in order of their first use, display units with the one of most signals first, then of most parameters: there
     are importers that show all values of a unit in its first one (FMPy's plots), and signals are what is plotted.
     """
-    found: dict[str, Counter[str]] = {}
+    result: dict[str, Counter[str]] = {}
     plotted: Counter[tuple[str, str]] = Counter()
     for row in rows:
-        found.setdefault(row.unit, Counter())[row.display_unit] += 1
+        result.setdefault(row.unit, Counter())[row.display_unit] += 1
         plotted[row.unit, row.display_unit] += row.causality != "parameter"
     return {  # equally many: in order of their first use
         unit: sorted((n for n in names if n != unit), key=lambda n: (-plotted[unit, n], -names[n]))
-        for unit, names in found.items()
+        for unit, names in result.items()
     }
 
 

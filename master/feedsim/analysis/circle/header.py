@@ -47,7 +47,7 @@ def own_format(path: Path) -> None:
         )
 
 
-def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
+def header_values(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
     """Of "radius" [m] and "feed" [m/s] those that lines give, and words of those that they do not give clearly."""
     values: dict[str, float] = {}
     notes: list[str] = []
@@ -87,7 +87,7 @@ class Told:
 
     def add(self, file: Path, lines: Sequence[str]) -> None:
         """InputError: the file is of another circle than those ahead of it."""
-        values, unclear = told_ahead(lines)
+        values, unclear = header_values(lines)
         self.doubts += [f"{file}: {name}" for name in unclear]
         for what, value in values.items():
             if self._given[what] is not None:

@@ -46,7 +46,7 @@ def _panels(variable: Variable) -> list[Panel]:
     assert curves is not None
     unit = display_unit(variable.unit)
     time = Axis("time", "s")
-    reference = Curve("reference", *_held(curves), RECORDED, width=1.2)
+    reference = Curve("reference", *_as_steps(curves), RECORDED, width=1.2)
     colour = RESIDUAL_COLOUR if variable.outside else MUTED
     whole = Panel(
         variable.name, time, Axis(variable.name, unit),
@@ -69,7 +69,7 @@ def _panels(variable: Variable) -> list[Panel]:
     return [whole, detail]
 
 
-def _held(curves: Curves) -> tuple[Array, Array]:
+def _as_steps(curves: Curves) -> tuple[Array, Array]:
     """The reference, as steps where it is held."""
     if not curves.hold:
         return curves.reference_time, curves.reference

@@ -76,16 +76,18 @@ def answers(compensation: Compensation) -> list[str]:
     figures = compensation.figures
     named = [("G", "the circular deviation G")]
     named += [(f"glitch_{axis}", f"the quadrant glitch of {axis}") for axis in compensation.turn.axes]
-    told = [f"{what} from {_um(figures[f'before.{key}'])} to {_um(figures[f'after.{key}'])} um" for key, what in named]
-    lines = [f"Friction compensation takes {', '.join(told[:-1])} and {told[-1]}."]
+    reported = [
+        f"{what} from {_um(figures[f'before.{key}'])} to {_um(figures[f'after.{key}'])} um" for key, what in named
+    ]
+    lines = [f"Friction compensation takes {', '.join(reported[:-1])} and {reported[-1]}."]
     if compensation.table:
-        worst = max(compensation.table, key=lambda each: each.quality.G)
+        worst = max(compensation.table, key=lambda variation: variation.quality.G)
         lines.append(
             f"It is as good as its model: {worst.what} wrong by {worst.change:+.3g} {worst.unit} leaves G at "
             f"{1e6 * worst.quality.G:.2f} um."
         )
     if compensation.changed:
-        most = max(compensation.changed, key=lambda each: each.after.G)
+        most = max(compensation.changed, key=lambda changed: changed.after.G)
         lines.append(
             f"With {most.words} it takes G from {1e6 * most.before.G:.2f} to {1e6 * most.after.G:.2f} um, the largest "
             "of the effects that were tried."
@@ -118,13 +120,13 @@ def _errors(compensation: Compensation) -> Section:
         numbers = [*quality.peak.values(), *quality.dip.values(), quality.G]
         amount = minus(f"{change:+.3g} {unit}") if unit else ""
         rows.append((what, amount, *(minus(f"{1e6 * number:.3f}") for number in numbers)))
-    each = [f"{kind}, {axis} reverses [µm]" for kind in ("glitch", "dip") for axis in compensation.turn.axes]
+    entry = [f"{kind}, {axis} reverses [µm]" for kind in ("glitch", "dip") for axis in compensation.turn.axes]
     note = (
         "An error of the delay or of a parameter, of all axes at once. Glitch and dip: largest and smallest radius "
         "deviation within ±45° of the reversals of an axis, less the median of the turn. Too little compensation "
         "leaves glitches, too much leaves dips."
     )
-    table = Table("lrr" + "r" * len(each), ("Compensation", "Error", *each, "G [µm]"), rows, note)
+    table = Table("lrr" + "r" * len(entry), ("Compensation", "Error", *entry, "G [µm]"), rows, note)
     return Section("What errors cost", [table], "errors")
 
 
@@ -132,18 +134,21 @@ def _effects(compensation: Compensation) -> Section:
     """G and peaks on changed machines, without and with the same compensation."""
     rows: list[tuple[Text, ...]] = []
     nominal = ("as the machine file has it", compensation.left_before, compensation.left_after)
-    for words, before, after in (nominal, *((each.words, each.before, each.after) for each in compensation.changed)):
-        cells = [1e6 * left.G for left in (before, after)]
+    for words, before, after in (
+        nominal,
+        *((entry.words, entry.before, entry.after) for entry in compensation.changed),
+    ):
+        cells = [1e6 * quality.G for quality in (before, after)]
         cells += [
-            1e6 * max(left.peak[axis], -left.dip[axis])
-            for axis in compensation.turn.axes for left in (before, after)
+            1e6 * max(quality.peak[axis], -quality.dip[axis])
+            for axis in compensation.turn.axes for quality in (before, after)
         ]  # fmt: skip
         rows.append((words, *(minus(f"{cell:.2f}") for cell in cells)))
-    each = ["G without [µm]", "with"]
+    item = ["G without [µm]", "with"]
     for axis in compensation.turn.axes:
-        each += [f"peak or dip, {axis} reverses, without [µm]", "with"]
+        item += [f"peak or dip, {axis} reverses, without [µm]", "with"]
     note = "The same compensation on a changed machine. The sizes are usual ones, not measured ones."
-    table = Table("l" + "r" * len(each), ("Machine", *each), rows, note)
+    table = Table("l" + "r" * len(item), ("Machine", *item), rows, note)
     return Section("With other effects of the machine", [table], "effects")
 
 
@@ -153,12 +158,12 @@ def _frictions(compensation: Compensation, files: Mapping[str, Path]) -> Section
     sets = []
     for axis, friction in compensation.frictions.items():
         own = machine.axes[axis]
-        sets += [axis_parameters(each)["friction"] for each in (own.model_copy(update={"friction": friction}), own)]
+        sets += [axis_parameters(axis)["friction"] for axis in (own.model_copy(update={"friction": friction}), own)]
     rows: list[tuple[Text, ...]] = []
-    for name in dict.fromkeys(name for each in sets for name in each):
-        found = [each.get(name) for each in sets]
-        unit = next(value[1] for value in found if value is not None)
-        rows.append((code(name), display_unit(unit), *(minus(f"{v[0]:.6g}") if v else "–" for v in found)))
+    for name in dict.fromkeys(name for entry in sets for name in entry):
+        result = [entry.get(name) for entry in sets]
+        unit = next(value[1] for value in result if value is not None)
+        rows.append((code(name), display_unit(unit), *(minus(f"{v[0]:.6g}") if v else "–" for v in result)))
     whose = [f"{axis}, {whose}" for axis in compensation.frictions for whose in ("compensation", "machine")]
     table = Table("ll" + "r" * len(whose), ("Parameter", "SI unit", *whose), rows)
     given = files_table(friction_files(files)) if files else None
@@ -170,7 +175,7 @@ def rows_of(compensation: Compensation) -> list[Row]:
     return [
         ("none", 0.0, "", compensation.left_before),
         ("as computed", 0.0, "", compensation.left_after),
-        *((each.what, each.change, each.unit, each.quality) for each in compensation.table),
+        *((variation.what, variation.change, variation.unit, variation.quality) for variation in compensation.table),
     ]
 
 
@@ -181,8 +186,8 @@ def table_csv(compensation: Compensation) -> str:
     writer = csv.writer(text, lineterminator="\n")
     columns = [f"{kind}_{axis} [um]" for kind in ("peak", "dip") for axis in axes]
     writer.writerow(["compensation", "error", "unit of the error", *columns, "G [um]"])
-    for what, change, unit, left in rows_of(compensation):
-        numbers = [*left.peak.values(), *left.dip.values(), left.G]
+    for what, change, unit, quality in rows_of(compensation):
+        numbers = [*quality.peak.values(), *quality.dip.values(), quality.G]
         writer.writerow([what, f"{change:.6g}", unit, *(f"{1e6 * number:.6g}" for number in numbers)])
     return text.getvalue()
 
@@ -220,24 +225,24 @@ def summary(compensation: Compensation, files: Mapping[str, Path], written: Sequ
         },
         "effects": [
             {
-                "with": each.words,
-                "G_before": quantity(1e6 * each.before.G, "um"),
-                "G_after": quantity(1e6 * each.after.G, "um"),
+                "with": entry.words,
+                "G_before": quantity(1e6 * entry.before.G, "um"),
+                "G_after": quantity(1e6 * entry.after.G, "um"),
             }
-            for each in compensation.changed
+            for entry in compensation.changed
         ],
         "errors": [
             {
                 "of": what,
                 "change": quantity(change, unit),
-                "G": quantity(1e6 * left.G, "um"),
+                "G": quantity(1e6 * quality.G, "um"),
                 **{
                     f"{kind}_{axis}": quantity(1e6 * value, "um")
-                    for kind, values in (("peak", left.peak), ("dip", left.dip))
+                    for kind, values in (("peak", quality.peak), ("dip", quality.dip))
                     for axis, value in values.items()
                 },
             }
-            for what, change, unit, left in rows_of(compensation)[2:]
+            for what, change, unit, quality in rows_of(compensation)[2:]
         ],
     }
     return content

@@ -86,7 +86,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Told:
+class Marks:
     """What is marked in a column: lines and points of the magnitude, lines and points of the phase, words."""
 
     levels: Sequence[Level] = ()
@@ -99,7 +99,7 @@ class Told:
 def bode_chart(
     columns: Sequence[Column],
     ordinate: Ordinate,
-    reported: Mapping[str, Told],
+    reported: Mapping[str, Marks],
     *,
     phase: bool = True,
     span: tuple[float, float] | None = None,
@@ -118,7 +118,7 @@ def bode_chart(
     magnitude, coherence = [], []
     turns = []
     for column in columns:
-        own = reported.get(column.title, Told())
+        own = reported.get(column.title, Marks())
         curves = [entry for curve in column.curves for entry in _magnitude(curve, column, ordinate)]
         axis = Axis(ordinate.label, ordinate.unit, log=not ordinate.decibel, span=_span(low_high, ordinate, floor))
         panel = Panel(column.title, frequency, axis, curves, own.levels, marks=own.marks, linked="f", note=own.note)
@@ -137,21 +137,21 @@ def bode_chart(
     return Chart([panel for row in rows for panel in row], (1.0,) * len(columns))
 
 
-def told_of_bandwidth(bandwidth: Bandwidth | None) -> Told:
+def bandwidth_marks(bandwidth: Bandwidth | None) -> Marks:
     """The -3 dB line and where a closed loop crosses it."""
     line = Level(-3.0, "−3 dB")
     if bandwidth is None:
-        return Told([line])
+        return Marks([line])
     if not math.isfinite(bandwidth.first):
-        return Told([line], note="stays above −3 dB")
+        return Marks([line], note="stays above −3 dB")
     first = Mark(bandwidth.first, -3.0, "", INK)
     if bandwidth.last < bandwidth.first * CROSSING_RATIO:
-        return Told([line], [first], note=f"−3 dB at {hertz(bandwidth.first)}")
+        return Marks([line], [first], note=f"−3 dB at {hertz(bandwidth.first)}")
     marks = [first, Mark(bandwidth.last, -3.0, "", INK, hollow=True)]
-    return Told([line], marks, note=f"−3 dB, first {hertz(bandwidth.first)}\n−3 dB, last {hertz(bandwidth.last)}")
+    return Marks([line], marks, note=f"−3 dB, first {hertz(bandwidth.first)}\n−3 dB, last {hertz(bandwidth.last)}")
 
 
-def told_of_margins(curve: Curve, margins: Margins) -> Told:
+def margin_marks(curve: Curve, margins: Margins) -> Marks:
     """Where a loop's gain is 1 and what it lacks to its limit there; where its phase is at the limit."""
     marks, levels, phase_marks, phase_levels, lines = [], [Level(0.0)], [], [], []
     crossing, gain = margins.phase_margin, margins.gain_margin
@@ -169,17 +169,17 @@ def told_of_margins(curve: Curve, margins: Margins) -> Told:
         marks.append(Mark(gain.frequency, -decibel, "", INK))
         ends = (min(-decibel, 0.0), max(-decibel, 0.0))
         levels.append(Level(gain.frequency, upright=True, colour=INK, dash="", ends=ends))
-    return Told(levels, marks, phase_levels, phase_marks, "\n".join(lines))
+    return Marks(levels, marks, phase_levels, phase_marks, "\n".join(lines))
 
 
-def told_of_pairs(curve: Curve, pairs: Sequence[Pair]) -> Told:
+def pair_marks(curve: Curve, pairs: Sequence[Pair]) -> Marks:
     """The most marked resonances (full) and their anti-resonances (hollow), in Hz."""
     marks = []
     for pair in pairs:
         peak, dip = pair.resonance.frequency, pair.antiresonance.frequency
         marks.append(Mark(dip, 20 * math.log10(abs(at(curve, dip))), "", INK, hollow=True))
         marks.append(Mark(peak, 20 * math.log10(abs(at(curve, peak))), f"{dip:.1f} / {peak:.1f}", INK))
-    return Told([Level(0.0)], marks)
+    return Marks([Level(0.0)], marks)
 
 
 def at(curve: Curve, frequency: float) -> complex:

@@ -22,12 +22,12 @@ from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import (
     Column,
     Curve,
+    Marks,
     Ordinate,
-    Told,
+    bandwidth_marks,
     bode_chart,
-    told_of_bandwidth,
-    told_of_margins,
-    told_of_pairs,
+    margin_marks,
+    pair_marks,
 )
 from feedsim.report.picture import Picture
 
@@ -74,7 +74,7 @@ def inertia_pictures(
         "moves as one rigid mass, more where the motor feels less inertia. Annotated: the most marked pairs of "
         "anti-resonance (hollow) and resonance (full), in Hz. ",
         phase=False,
-        told=lambda axis, curve: told_of_pairs(curve, pairs.get(axis, ())),
+        marked=lambda axis, curve: pair_marks(curve, pairs.get(axis, ())),
     )  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def loop_pictures(
         f"Loop gain {cut}. Marked: the gain margin (vertical line from the curve to 0 dB) and the phase margin (from "
         "the curve to ±180°, where a loop of gain 1 would be at its limit). ",
         floor=LOWEST_GAIN_DB,
-        told=lambda axis, curve: told_of_margins(curve, margins[axis]) if axis in margins else Told(),
+        marked=lambda axis, curve: margin_marks(curve, margins[axis]) if axis in margins else Marks(),
     )  # fmt: skip
 
 
@@ -141,7 +141,7 @@ def _closed_loops(
         "marker, first crossing; hollow marker, last crossing. "
     )
     return _pictures(columns, stem, Ordinate(ordinate), span, title, caption, floor=LOWEST_CLOSED_DB,
-                     told=lambda axis, _: told_of_bandwidth(bandwidths.get(axis)))  # fmt: skip
+                     marked=lambda axis, _: bandwidth_marks(bandwidths.get(axis)))  # fmt: skip
 
 
 def _pictures(
@@ -152,7 +152,7 @@ def _pictures(
     title: str,
     caption: str,
     *,
-    told: Callable[[str, Curve], Told] | None = None,
+    marked: Callable[[str, Curve], Marks] | None = None,
     phase: bool = True,
     floor: float | None = None,
     of: str = "Axis",
@@ -165,7 +165,7 @@ def _pictures(
 
     def picture(part: Columns, name: str) -> Picture:
         shown = [Column(f"{of} {text}", curves) for text, curves in part.items()]
-        marks = {c.title: told(text, c.curves[0]) for text, c in zip(part, shown, strict=True)} if told else {}
+        marks = {c.title: marked(text, c.curves[0]) for text, c in zip(part, shown, strict=True)} if marked else {}
         chart = bode_chart(shown, ordinate, marks, phase=phase, span=span, floor=floor)
         return Picture(name, title.format(_axes(part)), caption + _kinds(part), chart)
 

@@ -20,7 +20,7 @@ MOST_NAMES, MAX_NAME_CHARACTERS = 9, 16  # names of them side by side in a panel
 
 def pictures_of(comparison: Comparison, marks: Sequence[Mark]) -> list[Picture]:
     """Over time, and what is left as a spectrum and over the position."""
-    return [_over_time(comparison, marks), _left(comparison)]
+    return [_over_time(comparison, marks), _residuals(comparison)]
 
 
 def _over_time(comparison: Comparison, marks: Sequence[Mark]) -> Picture:
@@ -86,7 +86,7 @@ def _panel(title: str, ordinate: str, unit: str, time: Array, **curves: Array) -
     return Panel(title, axis, Axis(ordinate, unit), own, [Level(0.0, dash="")], linked="t", height=0.9)
 
 
-def _left(comparison: Comparison) -> Picture:
+def _residuals(comparison: Comparison) -> Picture:
     names = [name for name in ("position", "torque") if name in comparison.channels]
     title = f"Axis {comparison.axis}: what the replay leaves"
     caption = (

@@ -124,7 +124,7 @@ def files_of(
     """Name -> content of all files besides the report; arguments as of :func:`write`."""
 
     def result(path: Path) -> Path | None:
-        if recorded is None or not recorded.left:
+        if recorded is None or not recorded.has_rows:
             write_csv(path, run.trace)
             return None
         recorded.finished()

@@ -139,7 +139,7 @@ def accuracy_sections(run: JudgedRun) -> list[Section]:
     return [
         accuracy_section(task.prefix, accuracy, place.rstrip("."))
         for task in asked
-        for place, accuracy in task.found(run.trace).items()
+        for place, accuracy in task.accuracies(run.trace).items()
     ]
 
 
@@ -226,7 +226,7 @@ def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Dia
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
         else:
-            pictures.append(accuracy_picture(task.prefix, task.found(run.trace)[""], f"accuracy-{stem}"))
+            pictures.append(accuracy_picture(task.prefix, task.accuracies(run.trace)[""], f"accuracy-{stem}"))
     overview = overview_picture(run.trace, list(run.scenario.machine.axes), signs, "overview")
     return [*pictures, overview] if overview is not None else pictures
 

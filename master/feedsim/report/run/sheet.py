@@ -164,7 +164,7 @@ def _results(
 
 
 def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
-    accuracy, visits = task.found(run.trace)[""], task.visits
+    accuracy, visits = task.accuracies(run.trace)[""], task.visits
     prefix = task.prefix
     rests = [visit.end - visit.begin for visit in visits.visits]
     conditions = [

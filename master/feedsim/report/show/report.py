@@ -77,7 +77,7 @@ def answers(sources: Sequence[Source]) -> list[str]:
     if len(sources) == 2:
         said += [f"{name}: {' -> '.join(map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
     else:
-        said += [f"{name}: {_each(names, map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
+        said += [f"{name}: {_values_by_name(names, map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
     if len(rows) > MOST_DIFFERING:
         said.append(f"{counted(len(rows) - MOST_DIFFERING, 'parameter')} more that differ are listed below.")
     return said or lines(sources)
@@ -142,7 +142,7 @@ def _words(name: str) -> str:
     return LEADING_FIGURES[what].format(key.removeprefix(what))
 
 
-def _each(names: Sequence[str], values: Iterable[str]) -> str:
+def _values_by_name(names: Sequence[str], values: Iterable[str]) -> str:
     return ", ".join(f"{value} in {name}" for name, value in zip(names, values, strict=True))
 
 

@@ -307,7 +307,7 @@ class Measure:
         """Magnitude for parameter k, 0 where there is none."""
         return float(np.nan_to_num(abs(self.values[k])))
 
-    def told(self, k: int) -> bool:
+    def significant(self, k: int) -> bool:
         """Whether the value of parameter k is beyond chance."""
         if self.interval is not None:
             return bool(self.interval[k, 0] > NEGLIGIBLE_INDEX)

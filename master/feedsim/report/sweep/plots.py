@@ -64,7 +64,7 @@ def overview_picture(account: Account) -> Picture | None:
     left_out = len(account.inputs) - len(columns)
     more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
     values = np.array([[float(measure.values[k]) for k in columns] for measure in result])
-    bold = np.array([[measure.told(k) for k in columns] for measure in result])
+    bold = np.array([[measure.significant(k) for k in columns] for measure in result])
     if result[0].kind == TOTAL:
         values = np.where(np.abs(values) < NOTHING, np.nan, values)
     names, figures = [account.inputs[k].name for k in columns], [measure.figure for measure in result]

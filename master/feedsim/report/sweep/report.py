@@ -231,7 +231,7 @@ def _strongest(account: Account, measure: Measure) -> str:
     leading = [
         k
         for k in measure.ranked()
-        if measure.told(k) or (measure.kind == SHARE_HEADING and measure.size(k) > MIN_NAMED_SHARE)
+        if measure.significant(k) or (measure.kind == SHARE_HEADING and measure.size(k) > MIN_NAMED_SHARE)
     ]
     if not leading:
         return "no parameter moves it by more than chance"

@@ -27,15 +27,15 @@ def drawn_intervals(tuned: Tuned) -> dict[str, tuple[float, float]]:
     if drawn is None:
         return {}
     values = {
-        "gain_margin_after": [each.gain for each in drawn.margins],
-        "phase_margin_after": [each.phase for each in drawn.margins],
+        "gain_margin_after": [margin.gain for margin in drawn.margins],
+        "phase_margin_after": [margin.phase for margin in drawn.margins],
     }
     for name in ("peak", "overshoot") if drawn.cases else ():
         values[f"{name}_reduction"] = [float(np.median(reductions(case, name))) for case in drawn.cases]
     return {
-        name: tuple(map(float, interval(np.array(each))))  # type: ignore[misc]
-        for name, each in values.items()
-        if np.isfinite(each).all()
+        name: tuple(map(float, interval(np.array(value))))  # type: ignore[misc]
+        for name, value in values.items()
+        if np.isfinite(value).all()
     }
 
 
@@ -50,16 +50,18 @@ def drawn_findings(tuned: Tuned) -> list[str]:
     drawn, limits = tuned.drawn, tuned.limits
     if drawn is None:
         return []
-    found = []
-    if thin := [each for each in drawn.margins if limits.missing(each) > 0]:
-        least = f"{decibels(min(each.gain for each in thin))} and {min(each.phase for each in thin):.3g} deg"
-        found.append(
+    result = []
+    if thin := [margin for margin in drawn.margins if limits.missing(margin) > 0]:
+        least = (
+            f"{decibels(min(margins.gain for margins in thin))} and {min(margins.phase for margins in thin):.3g} deg"
+        )
+        result.append(
             f"in {len(thin)} of {drawn.count} draws of the machine a margin is below {limits.gain_margin:g} dB or "
             f"{limits.phase_margin:g} deg; the least are {least}"
         )
     if bad := [case for case in drawn.cases if case.worse]:
-        found.append(f"in {len(bad)} of {drawn.count} draws of the machine a motion gets worse than before")
-    return found
+        result.append(f"in {len(bad)} of {drawn.count} draws of the machine a motion gets worse than before")
+    return result
 
 
 def drawn_answer(tuned: Tuned) -> list[str]:
@@ -67,10 +69,10 @@ def drawn_answer(tuned: Tuned) -> list[str]:
     words = {"peak_reduction": "peaks fall by {} to {} %", "overshoot_reduction": "overshoot by {} to {} %",
              "gain_margin_after": "the gain margin is {} to {} dB",
              "phase_margin_after": "the phase margin {} to {} deg"}  # fmt: skip
-    found = drawn_intervals(tuned)
-    if not found or tuned.drawn is None:
+    result = drawn_intervals(tuned)
+    if not result or tuned.drawn is None:
         return []
-    parts = [words[name].format(*(f"{end:.3g}" for end in found[name])) for name in words if name in found]
+    parts = [words[name].format(*(f"{end:.3g}" for end in result[name])) for name in words if name in result]
     return [
         f"With what identification leaves open: {', '.join(parts)} ({share_text(tuned)}, {tuned.drawn.count} draws)."
     ]

@@ -85,9 +85,9 @@ def _shown(change: Changed) -> tuple[str, str, str]:
 
 def lines_of(rows: Iterable[Sequence[str]]) -> list[str]:
     """A line for every value to type, as the terminal shows it. rows: as of :func:`rows` and of sheets."""
-    found = []
+    result = []
     for axis, number, name, old, new, unit, confirmed, parameter in rows:
         what = f"{number} {name} ({parameter})" if number else parameter
         doubt = " (unit not confirmed)" if confirmed == "no" else ""
-        found.append(f"  {axis}: {what} {old} -> {new}{'' if unit in ('', '1') else f' {unit}'}{doubt}")
-    return found
+        result.append(f"  {axis}: {what} {old} -> {new}{'' if unit in ('', '1') else f' {unit}'}{doubt}")
+    return result

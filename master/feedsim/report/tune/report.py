@@ -54,11 +54,11 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 def figures_of(judged: Judged) -> dict[str, Figure]:
     """How much errors at the reversals fall, on the circles that were not used for tuning."""
-    found = judged.reduction(judged.held_before, judged.held_after)
+    values = judged.reduction(judged.held_before, judged.held_after)
     words = "reduction of the error at the reversals, of all axes and of the circles that were not used for tuning"
     figures = {
-        "held_out.median": Figure(100 * float(np.median(found)), "%", f"median {words}"),
-        "held_out.worst": Figure(100 * float(found.min()), "%", f"least {words}"),
+        "held_out.median": Figure(100 * float(np.median(values)), "%", f"median {words}"),
+        "held_out.worst": Figure(100 * float(values.min()), "%", f"least {words}"),
     }
     for effect, (before, after) in judged.changed.items():
         own = judged.reduction(before, after)
@@ -85,9 +85,9 @@ def drawn_intervals(judged: Judged) -> dict[str, tuple[float, float]]:
     """Intervals [%] of the median and of the least reduction over draws of the machine; empty without."""
     if judged.drawn is None:
         return {}
-    each = [100 * judged.reduction(before, after) for before, after in judged.drawn]
-    found = {"median": np.array([np.median(one) for one in each]), "worst": np.array([one.min() for one in each])}
-    return {name: tuple(map(float, interval(values))) for name, values in found.items()}  # type: ignore[misc]
+    entry = [100 * judged.reduction(before, after) for before, after in judged.drawn]
+    result = {"median": np.array([np.median(one) for one in entry]), "worst": np.array([one.min() for one in entry])}
+    return {name: tuple(map(float, interval(values))) for name, values in result.items()}  # type: ignore[misc]
 
 
 def findings(judged: Judged) -> list[str]:
@@ -96,29 +96,33 @@ def findings(judged: Judged) -> list[str]:
         f"{axis} on {pair.text}: {1e6 * before:.3g} -> {1e6 * after:.3g} um"
         for axis, pair, before, after in judged.worse
     ]
-    found: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
+    result: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
     figures = figures_of(judged)
     for effect, (before, after) in judged.changed.items():
         if (judged.reduction(before, after) < 1 - NEVER_WORSE).any():
             most = -figures[f"{effect.name}.worst"].value
-            found.append(f"with {effect.words} a circle gets worse than without compensation, by {most:.0f} %")
+            result.append(f"with {effect.words} a circle gets worse than without compensation, by {most:.0f} %")
     if judged.drawn is not None:
-        worst = 100 * np.array([judged.reduction(*each).min() for each in judged.drawn])
+        worst = 100 * np.array([judged.reduction(*entry).min() for entry in judged.drawn])
         bad = int((worst < 100 * (1 - NEVER_WORSE)).sum())
         if bad:
-            found.append(f"in {bad} of {len(worst)} draws of the machine a circle gets worse than without compensation")
+            result.append(
+                f"in {bad} of {len(worst)} draws of the machine a circle gets worse than without compensation"
+            )
     if others := judged.beyond_friction:
         axis, pair, free, before = others[0]
         more = f" (and {len(others) - 1} more)" if len(others) > 1 else ""
-        found.append(
+        result.append(
             f"{axis} on {pair.text}{more}: {1e6 * free:.3g} of {1e6 * before:.3g} um at the reversals are there "
             "without friction, too: the drives make them, and no friction compensation takes them off"
         )
     if judged.found.kind == "model":
-        found.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
+        result.append(
+            Note("the compensation has the friction of the machine itself; a real one is never known so well")
+        )
     else:
-        found.append(Note(LIMITS_UNKNOWN))
-    return found
+        result.append(Note(LIMITS_UNKNOWN))
+    return result
 
 
 def answers(judged: Judged) -> list[str]:
@@ -135,10 +139,10 @@ def answers(judged: Judged) -> list[str]:
 
 def _drawn_answer(judged: Judged) -> list[str]:
     """What the intervals of identified values make of it."""
-    found = drawn_intervals(judged)
-    if not found or judged.drawn is None:
+    result = drawn_intervals(judged)
+    if not result or judged.drawn is None:
         return []
-    median, worst = ("{:.0f} to {:.0f} %".format(*found[name]) for name in ("median", "worst"))
+    median, worst = ("{:.0f} to {:.0f} %".format(*result[name]) for name in ("median", "worst"))
     share = f"{100 * share_of(len(judged.drawn)):.0f} %, {len(judged.drawn)} draws"
     return [f"With what identification leaves open: median {median}, least {worst} ({share})."]
 
@@ -302,7 +306,7 @@ def pictures_of(judged: Judged) -> list[Picture]:
         )
         for axis, k in zip(judged.axes, judged.columns, strict=True)
     ]  # fmt: skip
-    found = [
+    pictures = [
         Picture(
             "tune-errors", "Errors at the reversals, circles not used for tuning",
             "The larger of peak and dip of the radius, against the median of the turn.",
@@ -316,11 +320,11 @@ def pictures_of(judged: Judged) -> list[Picture]:
             for (axis, values), dash in zip(judged.found.values.items(), DASHES, strict=False)
         ]
         panel = Panel("Amplitude of the pulse", across, Axis("amplitude", "mm/min"), curves)
-        found.append(
+        pictures.append(
             Picture("tune-characteristic", "Characteristic over the acceleration",
                     "As the manual of the control draws it.", Chart([panel]))
         )  # fmt: skip
-    return found
+    return pictures
 
 
 def summary(judged: Judged, names: Sequence[str]) -> Mapping[str, Any]:

@@ -41,7 +41,7 @@ class FiniteElements(Structure):
 
     @field_validator("axes")
     @classmethod
-    def _each_once(cls, axes: tuple[str, ...]) -> tuple[str, ...]:
+    def _unique(cls, axes: tuple[str, ...]) -> tuple[str, ...]:
         for name in axes:
             if axes.count(name) > 1:
                 raise fault(f"axis {name!r} occurs twice")

@@ -52,7 +52,7 @@ class Reader:
         before = len(self.faults)
         try:
             parameter = self._read(name, entry)
-        except _Told:
+        except _Reported:
             return None
         except InputError as error:
             self.faults += error.problems
@@ -130,11 +130,11 @@ class Reader:
                 except InputError as error:
                     self.faults += error.problems
         if len(values) < sum(value is not None for value in written.values()):
-            raise _Told
+            raise _Reported
         distribution, problems = numbers(entry, values, self.grid, whole)
         self.faults += [describe(self.source, self._at(name, *key), message) for key, message in problems]
         if distribution is None:
-            raise _Told
+            raise _Reported
         return distribution
 
     def _factor(self, name: str, entry: ParameterEntry, targets: list[Target]) -> Parameter:
@@ -282,7 +282,7 @@ _WORDS = ("name", "note")  # keys that are there to be read
 RARE = 1e-6  # share of a distribution that no study meets
 
 
-class _Told(Exception):
+class _Reported(Exception):
     """What is wrong is among the faults already."""
 
 

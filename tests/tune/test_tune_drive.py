@@ -335,7 +335,10 @@ def test_peaks_and_overshoot_fall_within_margins(tuned: Path) -> None:
     assert figures["Z.phase_margin_after"] >= 40
     summary = json.loads((tuned / "r/summary.json").read_text())
     assert (summary["kind"], summary["kept"]) == ("tune-drive", "")
-    assert all(row["after"] <= 1.05 * row["before"] + 5e-8 for row in summary["motions"])
+    # With play the axis wanders within it, whatever drives it; that is not named as wrong.
+    of_machine = [row for row in summary["motions"] if not row["case"].startswith("play")]
+    assert all(row["after"] <= 1.05 * row["before"] + 5e-8 for row in of_machine)
+    assert not [each for each in summary["findings"] if each["severity"] == "wrong"]
 
 
 def test_values_that_are_typed_have_the_margins(tuned: Path) -> None:

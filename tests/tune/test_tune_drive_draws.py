@@ -176,8 +176,8 @@ def test_the_draw_that_fails_is_named_by_tune_drive(
     [
         (1, "pulse", "draw 1 of 4 of the machine, which the values are found on"),
         (3, "pulse", "draw 3 of 4 of the machine, which the values are found on"),
-        (16, "model", "draw 1 of 19 of the machine"),  # 2 tuned on, 2 held out, 6 effects twice
-        (19, "model", "draw 2 of 19 of the machine"),
+        (19, "model", "draw 1 of 19 of the machine"),  # 2 tuned on, 3 held out, 7 effects twice
+        (22, "model", "draw 2 of 19 of the machine"),
     ],
 )
 def test_the_draw_that_fails_is_named_by_tune_compensation(

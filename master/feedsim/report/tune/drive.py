@@ -46,6 +46,7 @@ from feedsim.report.tune.drive_draws import (
 from feedsim.report.tune.drive_files import SETTINGS, SHEET, names_for, rows
 from feedsim.tune.drive import NOISE, TORQUE
 from feedsim.tune.drive_result import WORSE, Case, Margins, Point, Tuned, decibels
+from feedsim.tune.effects import EFFECTS
 
 KIND = "tune-drive"
 BINDS = 0.06  # of a limit: a margin that is as near to it binds
@@ -110,11 +111,13 @@ def figures_of(tuned: Tuned) -> dict[str, Figure]:
     return figures
 
 
-def worse(tuned: Tuned) -> list[str]:
-    """Motions that get worse by more than 5 %, in words."""
+def worse(tuned: Tuned, *, effects: bool = False) -> list[str]:
+    """Motions that get worse by more than 5 %, in words: of the machine and its modes, or with other effects."""
+    names = {effect.words for effect in EFFECTS}
     return [
         f"{motion} ({case.name}): {1e6 * before:.3g} -> {1e6 * after:.3g} um"
         for case in tuned.judged
+        if (case.name in names) == effects
         for motion, _, before, after in case.worse
     ]
 
@@ -124,6 +127,8 @@ def findings(tuned: Tuned) -> list[str]:
     found: list[str] = []
     if bad := worse(tuned):
         found.append(Wrong(f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"))
+    if bad := worse(tuned, effects=True):
+        found.append(f"worse than before where the machine has other effects: {'; '.join(bad)}")
     found += present_misses(tuned)
     found += drawn_findings(tuned)
     if not tuned.elastic:

@@ -33,6 +33,7 @@ BY_CHANCE = 3.84
 DIGITS, GROWS = 1e-5, 0.05
 LEAST_TRAVEL = 1e-3  # rad: a motor that turns less does not determine a delay
 STRETCHES = 8  # of a record, each of which is left out once
+DELAY_BETWEEN_ROWS = 1e-4  # of a row: likewise for the delay of the setpoint
 BETWEEN_ROWS = 5e-4  # of K_v: a drive interpolates its feedforward, which weights of rows follow roughly
 FURTHER_ROWS = 4  # of the feedforward, beyond the delay of the setpoint
 MAX_FORWARD_ROWS = 60
@@ -130,6 +131,7 @@ def noisy_delay(records: Sequence[Record], taps: Taps) -> Constant:
         columns.append(lagged[:, 1:] - lagged[:, :1])  # the first weight follows from the sum, which is 1
         right.append(np.asarray(record.deviation)[rows] + np.asarray(record.angle)[rows] - lagged[:, 0])
     further, sigma = _of_stretches(np.vstack(columns), np.concatenate(right), (ages[1:] - ages[0]) * taps.interval)
+    sigma = float(np.hypot(sigma, DELAY_BETWEEN_ROWS * taps.interval))
     return Constant(float(ages[0]) * taps.interval + further, sigma)
 
 

@@ -95,7 +95,8 @@ def estimates_of(
         result["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], delay.sigma), 0.0)
         # The lag that the position shows is the delay and (1 - k_ffw)/K_v.
         further = hypot(values["K_v"] * delay.sigma, (1 - values["k_ffw"]) * result["K_v"].sigma / values["K_v"])
-        result["k_ffw"] = replace(result["k_ffw"], sigma=hypot(result["k_ffw"].sigma, further))
+        for name, own in (("k_ffw", further), ("T_sym", delay.sigma)):
+            result[name] = replace(result[name], sigma=hypot(result[name].sigma, own))
     else:
         put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
         result = shared_lag(result, _without("following error", problem.each.record.deviation))

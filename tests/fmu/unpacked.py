@@ -123,7 +123,8 @@ def _part(part: str, row: dict[str, str], held: bool = False) -> dict[str, str]:
 
 def _own(unit: str) -> Iterator[dict[str, str]]:
     """Rows of variables.def by a parser of our own: one row a line, comma-separated, quotes as in CSV."""
-    for line in (ROOT / "src" / f"{unit}_fmu" / "variables.def").read_text(encoding="utf-8").splitlines():
+    for written in (ROOT / "src" / f"{unit}_fmu" / "variables.def").read_text(encoding="utf-8").splitlines():
+        line = _expanded(written) if "INTEGER_EXPANDED" in written else written
         match = re.fullmatch(r"(AXIS_)?(REAL|INTEGER|BOOLEAN|STRING)(_OF)?\((.*)\)", line)
         if match is None:
             assert re.match(r"\s*(/?\*.*)?$|#", line), f"line not understood: {line}"
@@ -137,6 +138,15 @@ def _own(unit: str) -> Iterator[dict[str, str]]:
             | row
             | {"kind": match[2], "axis": match[1] or ""}
         )
+
+
+def _expanded(line: str) -> str:
+    """A row with the exchange schemes in its text, as C's preprocessor makes it of the rows of cycle.h."""
+    rows = (ROOT / "src" / "machine_fmu" / "cycle.h").read_text(encoding="utf-8")
+    schemes = re.findall(r"ROW\((\d+), (\w+),", rows)
+    words = "".join(f"; {number} {name}" for number, name in schemes)
+    line = line.replace("INTEGER_EXPANDED", "INTEGER_OF").replace("LAST_SCHEME", schemes[-1][0])
+    return line.replace('" SCHEMES(SCHEME_TEXT)', f'{words}"')
 
 
 RESOURCES = {

@@ -34,7 +34,7 @@ FEEDSIM = ["-c", "from feedsim.cli import entry; entry()"]
 RUNS = 3  # in one process
 PROCESSES = 5  # at the most
 PARTS = {
-    "libraries": "numpy, scipy, pydantic, FMPy, matplotlib and feedsim, loaded where they are needed first",
+    "libraries": "numpy, scipy, pydantic, FMPy and feedsim, loaded where they are needed first",
     "read": "scenario and machine files, checked",
     "plan": "motion: path, profile, interpolation",
     "open": "archives unpacked, units instantiated, parameterised and wired",

@@ -168,9 +168,15 @@ def bound(tree: ast.Module) -> Iterator[str]:
             yield node.name.lower().strip("_")
 
 
+def without_a_thing(names: list[str]) -> int:
+    """How many there are; beside a right or a top, left is a side."""
+    sides = {"left"} if {"right", "top"} & set(names) else set()
+    return sum(name in WITHOUT_A_THING - sides for name in names)
+
+
 def test_names_say_what_they_are_of() -> None:
     files = {str(file.relative_to(PACKAGE)): list(bound(ast.parse(file.read_text(encoding="utf-8")))) for file in FILES}
-    counts = {name: sum(word in WITHOUT_A_THING for word in names) for name, names in files.items()}
+    counts = {file: without_a_thing(names) for file, names in files.items()}
     assert sum(counts.values()) <= MAX_NAMES_WITHOUT_A_THING, {name: count for name, count in counts.items() if count}
 
 

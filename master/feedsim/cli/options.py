@@ -185,10 +185,10 @@ def amount(text: str, unit: str, example: str = "", *, positive: bool = False) -
 
 def halves(option: str, text: str, needed: str) -> tuple[str, str]:
     """What stands before and behind the first "=". needed: of the message of InputError, where a half is missing."""
-    remaining, equals, right = (part.strip() for part in text.partition("="))
-    if not (remaining and equals and right):
+    left, equals, right = (part.strip() for part in text.partition("="))
+    if not (left and equals and right):
         raise InputError(f"--{option} {text}: {needed}")
-    return remaining, right
+    return left, right
 
 
 def by_name(

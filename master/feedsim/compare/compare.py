@@ -87,9 +87,9 @@ def _compared(
         return replace(blank, problem=f"no column in common: {wanted}")
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
-    fixed = _bounds_between(between, reference)
+    tubes = _bounds_between(between, reference)
     reach = min(tolerances.of(name).time or 0.0 for name in results)
-    over = Overlap(result, reference, options, reach, bounded=fixed.keys() >= results.keys())
+    over = Overlap(result, reference, options, reach, bounded=tubes.keys() >= results.keys())
     peers = _magnitudes(reference, asked)
     blank = replace(blank, start=over.start, end=over.end)
     if over.problem:
@@ -103,7 +103,7 @@ def _compared(
                 Variable(name, "unusable", results.get(name, ""), reference.units.get(name, ""), reason=fault)
             )
         elif name in results:
-            variable, remarks = _variable(over, name, results[name], tolerances, peers, fixed.get(name))
+            variable, remarks = _variable(over, name, results[name], tolerances, peers, tubes.get(name))
             for remark in remarks:
                 reported.setdefault(remark, []).append(name)
             variables.append(variable)

@@ -34,8 +34,11 @@ WHOLE_ROW_TOLERANCE = 0.01  # of a step; a shift that is so near to whole rows i
 
 @dataclass(frozen=True)
 class _Guess:
-    """What one variable looks like. left: root mean square of what is left of the difference; outside: rows that would
-    still be outside, None where nothing can be put right."""
+    """What one variable looks like.
+
+    remaining: root mean square of what is left of the difference. outside: rows that would still be outside, None where
+    nothing can be put right.
+    """
 
     remaining: float
     words: str
@@ -52,7 +55,7 @@ def likeness(
 ) -> tuple[Proposal, ...]:
     """What the variables that differ look like, those with one explanation together.
 
-    found: with the curves of all variables. again: the same comparison with other options.
+    comparison: with the curves of all variables. again: the same comparison with other options.
     """
     asked = [
         variable

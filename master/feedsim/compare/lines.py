@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from feedsim.compare.files import beside, tolerances_of
 from feedsim.compare.verdict import Comparison, Variable, seconds
-
-if TYPE_CHECKING:
-    pass
 
 MOST_LINES = 10
 

@@ -50,8 +50,8 @@ def bounds(
         first = np.minimum(first, np.searchsorted(time, begin + slack, side="right") - 1).clip(0)
         last = np.maximum(last, np.searchsorted(time, end - slack, side="left")).clip(max=len(time) - 1)
         return extremes(values, first, last)
-    remaining, right = along(time, values, begin), along(time, values, end)
-    low, high = np.minimum(remaining, right), np.maximum(remaining, right)
+    left, right = along(time, values, begin), along(time, values, end)
+    low, high = np.minimum(left, right), np.maximum(left, right)
     if (inside := last >= first).any():
         least, largest = extremes(values, first[inside], last[inside])
         low[inside] = np.minimum(low[inside], least)

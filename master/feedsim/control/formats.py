@@ -336,12 +336,12 @@ def _value_cells(cells: Sequence[tuple[str, int]], heads: Sequence[str], named: 
 
 
 def _linuxcnc(archive: Archive) -> None:
-    section, fixed = "", ""
+    section, continued = "", ""
     scales: dict[str, tuple[float, str]] = {}
     entries: list[tuple[str, str, str, int, tuple[int, int]]] = []
     for number, start, line, _ in _lines(archive.text):
-        if fixed or line.rstrip().endswith("\\"):  # goes on in the next line: names of files, no values of ours
-            fixed = "more" if line.rstrip().endswith("\\") else ""
+        if continued or line.rstrip().endswith("\\"):  # goes on in the next line: names of files, no values of ours
+            continued = "more" if line.rstrip().endswith("\\") else ""
             archive.add_odd(number, line, "a value of several lines")
         elif not line.strip() or line.lstrip().startswith(("#", ";")):
             archive.comments += 1

@@ -77,9 +77,9 @@ class Cycle:
                 )
             elif scheme.speed_ramp and not (role.takes_slopes and role.gives_slopes):
                 known = {"speed": role.takes_slopes, "torque": role.gives_slopes}
-                fixed = " nor of its ".join(name for name, there in known.items() if not there)
+                without = " nor of its ".join(name for name, there in known.items() if not there)
                 warnings.append(
-                    f"{role}: knows no slope of its {fixed}: on this axis the exchange holds what has none, as "
+                    f"{role}: knows no slope of its {without}: on this axis the exchange holds what has none, as "
                     f"gauss_seidel does, and is of first order; coupling.substeps above {self.substeps} make it finer"
                 )
         steps = [(control.role, self.cycle, "cycles.control") for control in self.system.controllers]

@@ -229,7 +229,7 @@ class _Solver:
         *,
         tolerance: float,
     ) -> Fit:
-        """Over `names`, from `started` (default: the values); `held` replaces values that are not free."""
+        """Over `names`, from `started` (default: the values); `kept` replaces values that are not free."""
         values, fixed = self._values, kept or {}
         begin = started or values
         return fit(

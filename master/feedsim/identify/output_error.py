@@ -91,7 +91,7 @@ class _Known:
     open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
 
     def leave_open(self, names: Collection[str], free: Solution, solution: Solution) -> None:
-        """free: the fit with `names`. held: the one without."""
+        """free: the fit with `names`. solution: the one without."""
         self.open[tuple(sorted(names))] = {
             name: free.sigma(name) ** 2 + (free.fit[name] - solution.fit[name]) ** 2
             for name in solution.fit.names

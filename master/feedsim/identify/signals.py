@@ -131,8 +131,8 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
         names = _aliases(recording, axis, axes)
     driving = [role for role in DRIVING if role in names]
     for role in driving[1:]:
-        remaining = names.pop(role)
-        notes.append(Note(f"{recording.path}: {remaining!r} is not used; the {driving[0]} {names[driving[0]]!r} is"))
+        unused = names.pop(role)
+        notes.append(Note(f"{recording.path}: {unused!r} is not used; the {driving[0]} {names[driving[0]]!r} is"))
     missing = [] if driving or not driven else ["torque or current"]
     missing += [] if "position" in names or "speed" in names else ["position or speed"]
     if missing:

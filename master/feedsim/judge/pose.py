@@ -39,12 +39,12 @@ def pose_use(
     ranges = {axis: program.reached(axis) for axis in program.x_s}
     followed = {axis.axis for axis in grid}
     change = pose_change(machine, {axis: reached for axis, reached in ranges.items() if axis not in followed})
-    remaining = tuple(
+    outside = tuple(
         sentence for axis in grid if axis.axis in ranges for sentence in left_grid(axis, ranges[axis.axis], machine)
     )
     doubt = None if grid else table_mismatch(machine)  # a plant that follows has modes of its own
     doubts = () if doubt is None else (doubt,)
-    return PoseUse(change, grid, crossings, (*doubts, *remaining, *warnings(change)))
+    return PoseUse(change, grid, crossings, (*doubts, *outside, *warnings(change)))
 
 
 def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[str]:

@@ -116,13 +116,13 @@ class Candidates:
             for name, axis in machine.axes.items()
         )
         frictions = machine.shipped_frictions
-        fixed = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
+        bristles = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
         plant = ModalPlant.of(modes, axes)
         self._index = axes.index(axis)
         own = drives[self._index].drive
         stiff = own.model_copy(update={"K_p": MAX_GAIN_RATIO * own.K_p, "K_v": MAX_GAIN_RATIO * own.K_v})
-        wide = Sampled(axes, self._with(drives, stiff), fixed, plant)
-        self._base = Structure(axes, drives, fixed, plant, (wide.free_resonances(), wide.locked_resonances()))
+        wide = Sampled(axes, self._with(drives, stiff), bristles, plant)
+        self._base = Structure(axes, drives, bristles, plant, (wide.free_resonances(), wide.locked_resonances()))
 
     def _with(self, drives: tuple[LinearDrive, ...], drive: Drive) -> tuple[LinearDrive, ...]:
         before = drives[self._index]

@@ -96,9 +96,9 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     if not axes:
         return ()
     frictions = machine.shipped_frictions
-    fixed = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
+    bristles = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
     driven = tuple((name, axis.drive, axis.I_P) for name, axis in axes.items() if isinstance(axis.drive, Drive))
-    return _judged_axes(driven, fixed, machine.cycles, modes)
+    return _judged_axes(driven, bristles, machine.cycles, modes)
 
 
 def locked_modes(machine: Machine, modes: Modes) -> tuple[Floats, Floats, Floats]:
@@ -127,12 +127,12 @@ class Bristles(NamedTuple):
 # Most of the time of a short run; in a study many runs have the same loops, whatever else differs.
 @lru_cache(maxsize=8)
 def _judged_axes(
-    driven: tuple[tuple[str, Drive, float], ...], fixed: tuple[Bristles | None, ...], cycles: Cycles, modes: Modes
+    driven: tuple[tuple[str, Drive, float], ...], bristles: tuple[Bristles | None, ...], cycles: Cycles, modes: Modes
 ) -> tuple[Loop, ...]:
-    """`driven`: name, drive and I_P of the axes judged; `held`: what holds each at rest, where that is known."""
+    """`driven`: name, drive and I_P of the axes judged; `bristles`: what holds each at rest, where that is known."""
     axes = tuple(name for name, _, _ in driven)
     drives = tuple(LinearDrive(drive, cycles, I_P) for _, drive, I_P in driven)
-    return Sampled(axes, drives, fixed, ModalPlant.of(modes, axes)).judged()
+    return Sampled(axes, drives, bristles, ModalPlant.of(modes, axes)).judged()
 
 
 def _judged(
@@ -313,7 +313,7 @@ class Sampled:
     def _speed_level(self, asked: Sequence[int], s: Complexes) -> Complexes:
         """(2, 1 + asked, F) determinants of the speed loops, position loops open: all closed, and those of the axes
         asked for open in turn."""
-        return np.stack([_determinants(loop, fixed, asked) for _, loop, fixed in self._speed_loops(s)])
+        return np.stack([_determinants(loop, ports, asked) for _, loop, ports in self._speed_loops(s)])
 
     def _position_level(self, asked: Sequence[int], s: Complexes) -> Complexes:
         """(2, 1 + asked, F) the same of the position loops, speed loops closed."""

@@ -197,12 +197,12 @@ def margins(gain: Gain, frequency: Floats) -> Margins:
     negative = at_real.real < 0
     unit = crossings(lambda f: np.log(np.abs(gain(f))), frequency, np.log(np.abs(values)))
     at_unit = gain(unit) if unit.size else np.empty(0, dtype=np.complex128)
-    remaining = np.degrees(np.angle(-at_unit))  # 0 where the phase is -180 degrees
+    phases = np.degrees(np.angle(-at_unit))  # 0 where the phase is -180 degrees
     return Margins(
         gain=tuple(
             GainCrossing(float(f), float(1 / abs(L))) for f, L in zip(real[negative], at_real[negative], strict=True)
         ),
-        phase=tuple(PhaseCrossing(float(f), float(margin)) for f, margin in zip(unit, remaining, strict=True)),
+        phase=tuple(PhaseCrossing(float(f), float(margin)) for f, margin in zip(unit, phases, strict=True)),
     )
 
 

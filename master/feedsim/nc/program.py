@@ -42,7 +42,7 @@ class _Stretch:
     first: int
     points: dict[str, list[Points]]
 
-    def sampled(self, axis: str, fixed: float, ratio: int, T_ipo: float) -> Sampled:
+    def sampled(self, axis: str, begin: float, ratio: int, T_ipo: float) -> Sampled:
         """An axis on the spline through its points; ``ratio`` position cycles per ``T_ipo`` [s]."""
         # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
         spline = LongSpline(Joined(self.points[axis]))
@@ -53,7 +53,7 @@ class _Stretch:
 
         return at
 
-    def end(self, axis: str, fixed: float) -> float:
+    def end(self, axis: str, begin: float) -> float:
         """Where it leaves an axis [m]."""
         return float(self.points[axis][-1][-1:][0])
 
@@ -65,9 +65,9 @@ class _Inset:
     first: int
     setpoints: Mapping[str, tuple[Array, Array]]
 
-    def sampled(self, axis: str, fixed: float, ratio: int, T_ipo: float) -> Sampled:
-        """An axis as recorded, or where it is ``held`` [m]; at rest behind the recording."""
-        x_s, v_s = self.setpoints.get(axis, (np.array([fixed]), np.zeros(1)))
+    def sampled(self, axis: str, begin: float, ratio: int, T_ipo: float) -> Sampled:
+        """An axis as recorded, or where it is at the beginning (`begin`, m); at rest behind the recording."""
+        x_s, v_s = self.setpoints.get(axis, (np.array([begin]), np.zeros(1)))
 
         def at(instants: NDArray[np.int64]) -> tuple[Array, Array]:
             row = np.minimum(instants, len(x_s) - 1)
@@ -75,9 +75,9 @@ class _Inset:
 
         return at
 
-    def end(self, axis: str, fixed: float) -> float:
+    def end(self, axis: str, begin: float) -> float:
         """Where it leaves an axis [m]."""
-        return float(self.setpoints[axis][0][-1]) if axis in self.setpoints else fixed
+        return float(self.setpoints[axis][0][-1]) if axis in self.setpoints else begin
 
 
 @dataclass
@@ -211,12 +211,12 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
     total = state.instant * ratio + 1
     table = Table(1 + 2 * len(axes), total, scratch)
     starts = [piece.first * ratio for piece in state.pieces]
-    fixed = dict(machine.pose)
+    reached = dict(machine.pose)
     for piece, first, last in zip(state.pieces, starts, [*starts[1:], total], strict=True):
         sampled = {}
         for axis in axes:
-            sampled[axis] = piece.sampled(axis, fixed[axis], ratio, cycles.T_ipo)
-            fixed[axis] = piece.end(axis, fixed[axis])
+            sampled[axis] = piece.sampled(axis, reached[axis], ratio, cycles.T_ipo)
+            reached[axis] = piece.end(axis, reached[axis])
         for begin in range(first, last, SPLINE_POINTS * ratio):
             instants = np.arange(begin, min(begin + SPLINE_POINTS * ratio, last))
             block = np.empty((1 + 2 * len(axes), len(instants)))

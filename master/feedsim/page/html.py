@@ -66,15 +66,15 @@ def page(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
 
 def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
     """The text of the page; arguments and errors as for :func:`page`."""
-    fixed = content(run.scenario, run.program, wanted, fmus)
+    contents = content(run.scenario, run.program, wanted, fmus)
     scenario, machine = run.scenario, run.scenario.machine
     shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
     moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
     figures = evaluate(run)
     planes = [list(task.turn.axes) for task in shown_tasks if isinstance(task, CircleTask)]
-    data = fixed.data | {
+    data = contents.data | {
         "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
-        "signs": fixed.data["machine"]["signs"], "written": _written(figures),
+        "signs": contents.data["machine"]["signs"], "written": _written(figures),
     }  # fmt: skip
     # The axis whose loop is shown at first stands last: that of the circle's ordinate, or the one that moves.
     order = [axis for axis in machine.axes if axis not in moved] + moved
@@ -82,11 +82,11 @@ def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
     parts = {
         "policy": _policy(script), "title": escape(scenario.name), "style": styles(),
         "machine": escape(f"{machine.name}: axes {', '.join(machine.axes)}; {cycle}"),
-        "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, fixed)),
-        "knobs": "\n".join(_groups(fixed.data["knobs"])), "pictures": "\n".join(_pictures(run, shown_tasks)),
+        "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, contents)),
+        "knobs": "\n".join(_groups(contents.data["knobs"])), "pictures": "\n".join(_pictures(run, shown_tasks)),
         "axes": "".join(f"<option{' selected' * (axis == order[-1])}>{escape(axis)}</option>" for axis in order),
         "keys": "".join(_keys(shown_tasks, figures)),
-        "figures": _table(figures), "footer": _footer(fixed), "worker": packed(worker().encode()), "script": script,
+        "figures": _table(figures), "footer": _footer(contents), "worker": packed(worker().encode()), "script": script,
         "charts": _json({"charts": {}, "arrays": [], "palette": {n: c for n, c, _ in PALETTE} | {"ground": "#ffffff"}}),
         "data": _json(data | {"axes": order}),
     }  # fmt: skip
@@ -108,10 +108,10 @@ def _json(data: Mapping[str, Any]) -> str:
     return written.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _notes(run: JudgedRun, fixed: Content) -> Iterable[str]:
+def _notes(run: JudgedRun, contents: Content) -> Iterable[str]:
     yield from filter(None, [run.scenario.machine.note, run.scenario.note])
-    if fixed.left_out:
-        yield "Not in this page: " + "; ".join(fixed.left_out) + "."
+    if contents.left_out:
+        yield "Not in this page: " + "; ".join(contents.left_out) + "."
     if run.warnings:
         yield "As written, a run warns: " + "; ".join(run.warnings) + "."
 
@@ -237,8 +237,8 @@ def _aside(name: str) -> str:
     return ' class="more"' if more else ""
 
 
-def _footer(fixed: Content) -> str:
+def _footer(contents: Content) -> str:
     return (
-        f"feedsim; the unit machine {escape(str(fixed.data['guid']))}, WebAssembly module SHA-256 "
-        f"<code>{fixed.sha256}</code>. It computes here, and nothing leaves this page."
+        f"feedsim; the unit machine {escape(str(contents.data['guid']))}, WebAssembly module SHA-256 "
+        f"<code>{contents.sha256}</code>. It computes here, and nothing leaves this page."
     )

@@ -51,8 +51,8 @@ def sentences(machine: Machine, program: Program, resources: Path) -> list[str]:
     """What a run says of the positions that the program reaches: the page says it in place of it."""
     grid = {axis.axis: axis for axis in _grid(machine, resources)}
     ranges = {axis: program.reached(axis) for axis in program.x_s}
-    remaining = [name for axis in grid if axis in ranges for name in left_grid(grid[axis], ranges[axis], machine)]
-    return [*remaining, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
+    outside = [name for axis in grid if axis in ranges for name in left_grid(grid[axis], ranges[axis], machine)]
+    return [*outside, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
 
 
 def _grid(machine: Machine, resources: Path) -> tuple[GridAxis, ...]:

@@ -101,8 +101,8 @@ def _filtered(frequency: float, damping: float, a: Array, h: float) -> Array:
     """(N, 2) q and dq/dt / w of a resonance, by its exact answer to steps of `a`."""
     w = 2 * pi * frequency
     A, B = np.array([[0.0, 1.0], [-(w**2), -2 * damping * w]]), np.array([[0.0], [w**2]])
-    fixed = cont2discrete((A, B, np.diag([1.0, 1.0 / w]), np.zeros((2, 1))), h, "zoh")
-    numerators, denominator = ss2tf(*fixed[:4])
+    discrete = cont2discrete((A, B, np.diag([1.0, 1.0 / w]), np.zeros((2, 1))), h, "zoh")
+    numerators, denominator = ss2tf(*discrete[:4])
     return np.column_stack([lfilter(numerator, denominator, a) for numerator in numerators])
 
 

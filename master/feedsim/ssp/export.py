@@ -192,14 +192,12 @@ def _box(instance: str, axes: tuple[str, ...]) -> tuple[float, float, float, flo
         return 0.0, -COMPONENT_HEIGHT, COMPONENT_WIDTH, 0.0
     rows = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}
     kind = instance if instance not in rows else "friction" if instance.startswith("friction") else "controller"
-    remaining = (COMPONENT_WIDTH + COMPONENT_GAP) * (SETPOINT_INSTANCE, "controller", wiring.PLANT, "friction").index(
-        kind
-    )
+    left = (COMPONENT_WIDTH + COMPONENT_GAP) * (SETPOINT_INSTANCE, "controller", wiring.PLANT, "friction").index(kind)
     first, last = (rows[instance],) * 2 if instance in rows else (0, len(axes) - 1)
     return (
-        remaining,
+        left,
         -(COMPONENT_HEIGHT + COMPONENT_GAP) * last - COMPONENT_HEIGHT,
-        remaining + COMPONENT_WIDTH,
+        left + COMPONENT_WIDTH,
         -(COMPONENT_HEIGHT + COMPONENT_GAP) * first,
     )
 

@@ -141,14 +141,14 @@ def _grouped(
         raise InputError(f"{path}: {time.size} rows of values; at least 2 are needed")
     order = [k for own in groups.values() for k in own[1]]
     titles = dict(zip(order, unique(channels[k] for k in order), strict=True))
-    columns, units, notes, fixed, unknown, scaled = {"time": time}, {"time": "s"}, [], [], [], []
+    columns, units, notes, resampled, unknown, scaled = {"time": time}, {"time": "s"}, [], [], [], []
     for times, values in groups.values():
         same = times.size == time.size and bool(np.all(np.abs(times - time) <= 1e-9 + 1e-9 * time))
         for k, signal in values.items():
             name = titles[k]
             rows = np.searchsorted(times, time + 1e-9, side="right") - 1
             columns[name] = signal if same else signal[rows.clip(0)]
-            fixed += [] if same else [name]
+            resampled += [] if same else [name]
             unit = _cell(header, "Unit", k)
             known = bool(unit) and known_unit(unit)
             units[name] = spelled(unit) if known else ""
@@ -156,7 +156,7 @@ def _grouped(
             factor = _cell(header, "ScaleFactor", k).replace(",", ".")
             scaled += [name] if factor not in ("", "1", "1.0") else []
     for names, words in (
-        (fixed, "has another sampling time: its values are kept until its next one"),
+        (resampled, "has another sampling time: its values are kept until its next one"),
         (unknown, "is in a unit that is not known"),
         (scaled, "has a scale factor; the file does not say whether its values are scaled"),
     ):

@@ -105,12 +105,12 @@ def stretches(*arrays: Array, rows: int = STRETCH) -> Iterator[tuple[Array, ...]
 
 def unchangeable(array: Array) -> bool:
     """Whether nobody can change the array, be it through another that shares its memory."""
-    fixed: object = array
-    while isinstance(fixed, np.ndarray):
-        if fixed.flags.writeable:
+    base: object = array
+    while isinstance(base, np.ndarray):
+        if base.flags.writeable:
             return False
-        fixed = fixed.base
-    return fixed is None or (isinstance(fixed, memoryview) and fixed.readonly)
+        base = base.base
+    return base is None or (isinstance(base, memoryview) and base.readonly)
 
 
 def least_and_largest(values: Array) -> tuple[float, float]:
@@ -120,8 +120,8 @@ def least_and_largest(values: Array) -> tuple[float, float]:
 
 
 def _mapping(array: Array) -> mmap.mmap | None:
-    fixed: object = array
-    while isinstance(fixed, np.ndarray):
-        fixed = fixed.base
-    owner = fixed.obj if isinstance(fixed, memoryview) else fixed
+    base: object = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    owner = base.obj if isinstance(base, memoryview) else base
     return owner if isinstance(owner, mmap.mmap) else None

@@ -72,11 +72,11 @@ def _platforms() -> tuple[str, ...]:
 
 def _units(archives: Path, version: str) -> bytes:
     """The archives, with what people want to see without opening one."""
-    fixed = shipped.taken(archives)
+    units = shipped.taken(archives)
     content: dict[str, bytes] = {"LICENSE": (PROJECT / "LICENSE").read_bytes()}
     content |= {path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in files("ci")}
     lines = []
-    for name, data in fixed.items():
+    for name, data in units.items():
         content[name] = data
         unit = name.removesuffix(".fmu")
         described = (PROJECT / "src" / f"{unit}_fmu" / "README.md").read_text(encoding="utf-8").splitlines()[0]

@@ -46,10 +46,10 @@ def for_platform(name: str, compiler: Sequence[str], archives: Path | None = Non
     """
     if name not in (*TAGS, ANY):
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
-    fixed = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
+    units = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
     loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
     page = _page(zig_for_pages())
-    return Shipped(fixed | loop | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
+    return Shipped(units | loop | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
 
 
 def _documentation(site: Path | None) -> dict[str, bytes]:

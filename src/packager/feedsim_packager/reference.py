@@ -129,9 +129,9 @@ def _manifest(cases: Iterable[_Case], result: Mapping[str, bytes]) -> bytes:
     for path in sorted(result):
         stem = path.removeprefix(HELD)
         case = re.sub(r"_(in|ref|par)(\.tolerances|\.bounds)?\.(csv|opt|ssv|yaml)$", "", stem)
-        fixed = ", inputs held over each step" if path.startswith(HELD) else ""
+        held_inputs = ", inputs held over each step" if path.startswith(HELD) else ""
         kind, role, what = _what(stem)
-        description = f"{what}{': ' + about[case] if case in about else ''}{fixed}"
+        description = f"{what}{': ' + about[case] if case in about else ''}{held_inputs}"
         related.append(
             f'  <Related type="{kind}" source="{path}" role="{role}" description={quoteattr(description)}/>\n'
         )

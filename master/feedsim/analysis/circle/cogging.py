@@ -116,7 +116,7 @@ def without(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequenc
 
 
 def strongest(circle: CircleUnderTest, result: Fit) -> Wave | None:
-    """The wave that explains most of what ``found`` leaves between the reversals; None where none stands out."""
+    """The wave that explains most of what the model leaves between the reversals; None where none stands out."""
     rest = _Rest(result, few=True)
     if circle.response is None or rest.deviation < MIN_REMAINDER:
         return None
@@ -140,7 +140,7 @@ def stand_out(before: Fit, after: Fit) -> bool:
 
 
 def settled(circle: CircleUnderTest, results: Fit, waves: Sequence[Wave]) -> list[Wave]:
-    """Waves with what ``found`` leaves of them, and their intervals."""
+    """Waves with what the model leaves of them, and their intervals."""
     rest = _Rest(results)
     matrix = np.hstack([rest.outside(rest.columns(wave, circle)) for wave in waves])
     change = np.linalg.lstsq(matrix, rest.left, rcond=None)[0]

@@ -80,7 +80,7 @@ def fading_tails(
 ) -> Tails:
     """Tails of the peaks at the half axes; both senses share one: the axis reverses there from the same way.
 
-    left: what each peak leaves at the end of its window [m], and the angle in which that falls to 1/e [rad].
+    remaining: what each peak leaves at the end of its window [m], and the angle in which that falls to 1/e [rad].
     """
     columns, spread = [], []
     for k, (size, decay) in enumerate(remaining):

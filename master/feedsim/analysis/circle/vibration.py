@@ -38,7 +38,7 @@ class Vibration:
 def vibrations(circle: CircleUnderTest, fit: Fit, paths: Sequence[TurnedPath]) -> tuple[Vibration, ...]:
     """The strongest vibration of each axis (of the radius, where the axes' positions are not known) that stands out.
 
-    paths: all their samples, of whose turns ``found`` is the fitted model. The largest amplitude first.
+    paths: all their samples, of whose turns ``fit`` is the model. The largest amplitude first.
     """
     best: dict[str, Vibration] = {}
     for k, path in enumerate(paths):

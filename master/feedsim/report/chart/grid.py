@@ -19,17 +19,17 @@ def grid_height(grid: Grid) -> float:
 
 def draw_grid(grid: Grid, width: float) -> str:
     """The grid with its names and its title."""
-    remaining, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
-    wide, count = width - remaining - 8, len(grid.columns)
+    left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
+    wide, count = width - left - 8, len(grid.columns)
     cell = min(wide / count, (wide - SLANTED * len(grid.columns[-1])) / (count - 0.5))
     parts = [heading(grid.title, 4, width - 4)]
     for j in range(0, count, math.ceil(CELL_WITH_NAME / cell)):
-        parts.append(turned(remaining + (j + 0.5) * cell, top - 6, grid.columns[j], -40, 'font-size="11"'))
+        parts.append(turned(left + (j + 0.5) * cell, top - 6, grid.columns[j], -40, 'font-size="11"'))
     for i, name in enumerate(grid.rows):
         y = top + ROW * i
-        parts.append(text(remaining - 8, y + 16, name, 'font-size="11"', anchor="end"))
+        parts.append(text(left - 8, y + 16, name, 'font-size="11"', anchor="end"))
         for j in range(count):
-            x, value = remaining + j * cell, float(grid.values[i, j])
+            x, value = left + j * cell, float(grid.values[i, j])
             edge = f'stroke="{fill(GRID)}" stroke-width="0.6"'
             if not math.isfinite(value):
                 parts.append(rectangle(x, y, cell, ROW, edge))
@@ -42,7 +42,7 @@ def draw_grid(grid: Grid, width: float) -> str:
     if grid.best is not None:
         i, j = grid.best
         frame = f'stroke="{fill(INK)}" stroke-width="2.2"'
-        parts.append(rectangle(remaining + j * cell, top + ROW * i, cell, ROW, frame))
+        parts.append(rectangle(left + j * cell, top + ROW * i, cell, ROW, frame))
     if cell < CELL_WITH_NUMBER:
         parts.append(_scale(grid, width))
     return "".join(parts)

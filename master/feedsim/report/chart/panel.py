@@ -40,9 +40,9 @@ class Frame:
     heights: Ticks
     left: float
 
-    def beginning(self, remaining: float) -> Frame:
+    def beginning(self, left: float) -> Frame:
         """With the curves from there on."""
-        return replace(self, left=remaining)
+        return replace(self, left=left)
 
 
 def above(panel: Panel) -> float:
@@ -64,11 +64,11 @@ def draw_panel(panel: Panel, box: Box, frame: Frame, aside: float, clip: str) ->
     """The panel in its box; aside: room at the right; clip: an id of its own."""
     _, _, width, height = box
     inner: Box = (frame.left, above(panel), width - frame.left - aside, height - above(panel) - BOTTOM)
-    remaining, top, wide, tall = inner
-    right, bottom = remaining + wide, top + tall
-    across = _scale(panel.x, frame.across, remaining, right)
+    left, top, wide, tall = inner
+    right, bottom = left + wide, top + tall
+    across = _scale(panel.x, frame.across, left, right)
     up = _scale(panel.y, frame.up, bottom, top)
-    begin = 0.0 if panel.y.names else max(0.0, min(remaining, width - 7.4 * len(panel.title)))
+    begin = 0.0 if panel.y.names else max(0.0, min(left, width - 7.4 * len(panel.title)))
     parts = [heading(panel.title, begin, width - begin), *_axes(panel, frame, inner, across, up, box)]
     inside: list[str] = []
     has_words = bool(panel.note or any(mark.text for mark in panel.marks) or any(level.text for level in panel.levels))
@@ -78,7 +78,7 @@ def draw_panel(panel: Panel, box: Box, frame: Frame, aside: float, clip: str) ->
     for curve in sorted(panel.curves, key=lambda curve: not curve.dots):  # a line through its points, not below them
         inside.append(_curve(curve, panel, frame, (across, up, bottom), covered))
     marks = [(mark, float(across(mark.x)), float(up(mark.y))) for mark in panel.marks]
-    marks = [mark for mark in marks if remaining - 1 <= mark[1] <= right + 1]
+    marks = [mark for mark in marks if left - 1 <= mark[1] <= right + 1]
     for mark, x, y in marks:
         colour = fill(mark.colour)
         look = f'fill="{"none" if mark.hollow else colour}" stroke="{colour}" stroke-width="1.4"'
@@ -101,8 +101,8 @@ def _scale(axis: Axis, span: Range, first: float, last: float) -> Scaled:
 
 def _axes(panel: Panel, frame: Frame, inner: Box, across: Scaled, up: Scaled, box: Box) -> list[str]:
     """Grid, ticks and names of the axes, on all sides that have a scale."""
-    (remaining, top, wide, tall), (_, _, width, height) = inner, box
-    right, bottom, parts = remaining + wide, top + tall, []
+    (left, top, wide, tall), (_, _, width, height) = inner, box
+    right, bottom, parts = left + wide, top + tall, []
     most = max(2, int(wide / max([TICK_WIDTH, *(7 * len(name) + 14 for name in panel.x.names)])))
     along = apart(lambda n: ticks(panel.x, frame.across, n), lambda at: float(across(at)), most, width)
     ways: dict[bool, list[str]] = {True: [], False: []}  # of the grid: with a text, and without
@@ -112,15 +112,15 @@ def _axes(panel: Panel, frame: Frame, inner: Box, across: Scaled, up: Scaled, bo
         parts.append(text(min(x, width - 3.6 * len(words)), bottom + 16, words, anchor="middle"))  # the last one inside
     for at, words in frame.heights.marks:
         y = float(up(at))
-        ways[bool(words)].append(f"M{remaining:g} {y:.1f}H{right:g}")
-        parts.append(text(remaining - 6, y + 4, words, anchor="end"))
+        ways[bool(words)].append(f"M{left:g} {y:.1f}H{right:g}")
+        parts.append(text(left - 6, y + 4, words, anchor="end"))
     for with_text, way in ways.items():
         if way:
             parts.append(
                 f'<path d="{"".join(way)}" stroke="{fill(GRID)}" stroke-width="{0.8 if with_text else 0.35}"/>'
             )
     title = along.title(panel.x)
-    parts.append(text(min(remaining + wide / 2, width - 3.4 * len(title)), bottom + 34, title, anchor="middle"))
+    parts.append(text(min(left + wide / 2, width - 3.4 * len(title)), bottom + 34, title, anchor="middle"))
     if not panel.y.names:
         parts.append(_upright(frame.heights.title(panel.y), 13, inner, height - 8))
     if panel.x.also is not None:
@@ -129,7 +129,7 @@ def _axes(panel: Panel, frame: Frame, inner: Box, across: Scaled, up: Scaled, bo
         result = apart(lambda n: ticks(axis, span, n), lambda at: float(across(at / factor)),
                       max(2, int(wide / TICK_WIDTH)), math.inf)  # fmt: skip
         parts += [text(float(across(at / factor)), top - 5, words, anchor="middle") for at, words in result.marks]
-        parts.append(text(remaining + wide / 2, top - 20, result.title(axis), anchor="middle"))
+        parts.append(text(left + wide / 2, top - 20, result.title(axis), anchor="middle"))
     if panel.y.also is not None:
         axis, factor = _second(panel.y)
         result = ticks(axis, (frame.up[0] * factor, frame.up[1] * factor), max(2, int(tall / TICK_HEIGHT)))
@@ -169,12 +169,12 @@ def _band(band: Band, span: Range, across: Scaled, up: Scaled, bottom: float) ->
 
 
 def _level(level: Level, inner: Box, across: Scaled, up: Scaled) -> str:
-    remaining, top, wide, tall = inner
+    left, top, wide, tall = inner
     at = float((across if level.upright else up)(level.at))
     if not math.isfinite(at):
         return ""
     ends = [float((up if level.upright else across)(end)) for end in level.ends or ()]
-    first, last = ends or ([top, top + tall] if level.upright else [remaining, remaining + wide])
+    first, last = ends or ([top, top + tall] if level.upright else [left, left + wide])
     dash = f' stroke-dasharray="{DASHES[level.dash]}"' if level.dash else ""
     points = (at, first, at, last) if level.upright else (first, at, last, at)
     return line(*points, f'stroke="{fill(level.colour)}"{dash}')
@@ -211,26 +211,26 @@ def _words(
     panel: Panel, inner: Box, across: Scaled, up: Scaled, marks: Sequence[tuple[Mark, float, float]], covered: Covered
 ) -> tuple[list[str], list[str]]:
     """What is said of marks and levels, and the note, where no curve is; and lines from points to words far away."""
-    remaining, top, wide, tall = inner
-    right, bottom = remaining + wide, top + tall
+    left, top, wide, tall = inner
+    right, bottom = left + wide, top + tall
     words, leaders = [], []
     for level in panel.levels:
         if not level.upright and not level.text and math.isfinite(y := float(up(level.at))):
-            covered.box(remaining, y, wide, 0)
+            covered.box(left, y, wide, 0)
     for mark, x, y in marks:
         if not mark.text:
             continue
-        a, b = covered.put(mark.text, _beside(x, y, width_of(mark.text), remaining, right))
+        a, b = covered.put(mark.text, _beside(x, y, width_of(mark.text), left, right))
         words.append(text(a, b, mark.text))
         to = (min(max(x, a), a + width_of(mark.text)), b + 3 if b < y else b - 10)
         if math.hypot(to[0] - x, to[1] - y) > LEADER:
             leaders.append(line(x, y, *to, f'stroke="{fill(MUTED)}" stroke-width="0.7"'))
     for level in panel.levels:
         at = float((across if level.upright else up)(level.at))
-        first, last = (remaining, right) if level.upright else (top, bottom)
+        first, last = (left, right) if level.upright else (top, bottom)
         if level.text and first - 1 <= at <= last + 1:
             places = _along_upright(at, level.text, top, bottom) if level.upright else _along(
-                at, level, remaining, right, across)  # fmt: skip
+                at, level, left, right, across)  # fmt: skip
             words.append(text(*covered.put(level.text, places), level.text, "", MUTED))
     if panel.note:
         lines = panel.note.split("\n")
@@ -239,16 +239,16 @@ def _words(
         corners: list[Place] = []  # the lower left, another corner, else somewhere between
         for foot in np.arange(high, low + 1e-9, LINE).tolist():
             far = 3 + min(low - foot, foot - high)
-            corners += [(remaining + 8, foot, far), (beyond, foot, far + 1)]
-        x, y = covered.put(panel.note, [*corners, (remaining + 8, low, 0.0), (beyond, low, 1.0)])
+            corners += [(left + 8, foot, far), (beyond, foot, far + 1)]
+        x, y = covered.put(panel.note, [*corners, (left + 8, low, 0.0), (beyond, low, 1.0)])
         words += [text(x, y + LINE * k, value) for k, value in enumerate(lines)]
     return words, leaders
 
 
-def _beside(x: float, y: float, wide: float, remaining: float, right: float) -> list[Place]:
+def _beside(x: float, y: float, wide: float, left: float, right: float) -> list[Place]:
     """Places for the label of a point."""
     sides = ((x + 7, 0), (x - 7 - wide, 2), (x - wide / 2, 4), (x - 1.6 * wide, 40), (x + 0.6 * wide, 40))
-    return [(min(max(from_, remaining + 3), right - wide - 3), y - 6 + 13 * k, far + abs(13 * k))
+    return [(min(max(from_, left + 3), right - wide - 3), y - 6 + 13 * k, far + abs(13 * k))
             for k in range(-9, 10) for from_, far in sides]  # fmt: skip
 
 
@@ -259,12 +259,10 @@ def _along_upright(x: float, words: str, top: float, bottom: float) -> list[Plac
     return [(side, foot, foot - top + far) for foot in feet for side, far in sides]
 
 
-def _along(y: float, level: Level, remaining: float, right: float, across: Scaled) -> list[Place]:
+def _along(y: float, level: Level, left: float, right: float, across: Scaled) -> list[Place]:
     """Places for the label of a level: above or below it, as far right as may be."""
-    begin, end = (
-        (min(max(float(across(end)), remaining), right) for end in level.ends) if level.ends else (remaining, right)
-    )
-    last = max(end - 4 - width_of(level.text), remaining + 4)
+    begin, end = (min(max(float(across(end)), left), right) for end in level.ends) if level.ends else (left, right)
+    last = max(end - 4 - width_of(level.text), left + 4)
     return [
         (x, y - 4 - 12 * k if over else y + 12 + 12 * k, 0.2 * (last - x) + 12 * k + (0 if over else 3))
         for x in np.arange(last, min(begin + 4, last) - 1e-9, -12).tolist()

@@ -40,8 +40,8 @@ class Covered:
 
     def box(self, x: float, y: float, wide: float, tall: float) -> None:
         """Cover a rectangle."""
-        top, bottom, remaining, right = self._squares(x, y, wide, tall)
-        self.squares[max(0, top) : max(0, bottom), max(0, remaining) : max(0, right)] = True
+        top, bottom, left, right = self._squares(x, y, wide, tall)
+        self.squares[max(0, top) : max(0, bottom), max(0, left) : max(0, right)] = True
 
     def path(self, x: Array, y: Array, *, dots: bool = False) -> None:
         """Cover points (N,), and unless they are dots the lines between them."""
@@ -64,21 +64,16 @@ class Covered:
 
     def put(self, text: str, places: Sequence[Place]) -> tuple[float, float]:
         """The place that covers least and is least far, which is covered then: left, and foot of the first line."""
-        remaining, top, width, height = self.inner
+        left, top, width, height = self.inner
         wide, tall = width_of(text), 12 + LINE * text.count("\n")
 
-        best = (math.inf, 0, remaining + 4, top + 12)
+        best = (math.inf, 0, left + 4, top + 12)
         for k in sorted(range(len(places)), key=lambda k: places[k][2]):
             x, y, far = places[k]
             if far > best[0]:
                 break
             begin, end, first, last = self._squares(x, y - ASCENT, wide, tall)
-            if (
-                y - ASCENT < top
-                or y - ASCENT + tall > top + height
-                or x < remaining
-                or x + wide > remaining + width + 1
-            ):
+            if y - ASCENT < top or y - ASCENT + tall > top + height or x < left or x + wide > left + width + 1:
                 far += OUTSIDE
             elif count := int(np.count_nonzero(self.squares[begin:end, first:last])):
                 far += COVERING + COVERED * count

@@ -77,10 +77,8 @@ def _aside(chart: Chart) -> float:
 
 def _shared(frames: dict[int, Frame], boxes: list[Box], k: int) -> Frame:
     """The frame of a panel; those below one another begin alike."""
-    remaining = max(
-        frame.left for j, frame in frames.items() if (boxes[j][0], boxes[j][2]) == (boxes[k][0], boxes[k][2])
-    )
-    return frames[k].beginning(remaining)
+    left = max(frame.left for j, frame in frames.items() if (boxes[j][0], boxes[j][2]) == (boxes[k][0], boxes[k][2]))
+    return frames[k].beginning(left)
 
 
 def _legend(chart: Chart) -> tuple[list[str], float]:

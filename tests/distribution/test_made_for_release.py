@@ -147,6 +147,10 @@ def test_an_index_learns_whose_and_what_for_it_is() -> None:
     assert any(line.startswith("Keywords: machine tool,feed drive,friction") for line in lines)
     assert {"Classifier: Programming Language :: Python :: 3.11", "Classifier: Typing :: Typed"} <= set(lines)
     assert not [line for line in lines if line.startswith("Classifier: License")]  # the licence has its own field
+    assert "License-Expression: MIT AND Bitstream-Vera" in lines  # the latter: the font of pictures
+    named = [line.partition(": ")[2] for line in lines if line.startswith("License-File: ")]
+    assert named == ["LICENSE", "master/feedsim/report/fonts/LICENSE"]
+    assert all((ROOT / name).is_file() for name in named)
     assert not [line for line in lines if "example" in line or "OWNER" in line]
 
 

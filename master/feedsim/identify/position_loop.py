@@ -33,8 +33,8 @@ BY_CHANCE = 3.84
 DIGITS, GROWS = 1e-5, 0.05
 LEAST_TRAVEL = 1e-3  # rad: a motor that turns less does not determine a delay
 STRETCHES = 8  # of a record, each of which is left out once
-DELAY_BETWEEN_ROWS = 1e-4  # of a row: likewise for the delay of the setpoint
 BETWEEN_ROWS = 5e-4  # of K_v: a drive interpolates its feedforward, which weights of rows follow roughly
+DELAY_BETWEEN_ROWS = 1e-4  # of a row: likewise for the delay of the setpoint
 FURTHER_ROWS = 4  # of the feedforward, beyond the delay of the setpoint
 MAX_FORWARD_ROWS = 60
 

@@ -48,7 +48,7 @@ class Exported:
 def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Exported:
     """Write `scenario` to the SSP file `out`, whole or not at all; the same bytes for the same scenario and archives.
 
-    fmus: folder with the archives of the four units; default :func:`feedsim.cosim.fmus_directory`.
+    fmus: folder with the archives of the units; default :func:`feedsim.cosim.fmus_directory`.
 
     Raises:
         InputError: the motion violates a limit, an archive is missing, a unit refuses its parameters, or there are

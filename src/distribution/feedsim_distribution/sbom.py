@@ -27,7 +27,7 @@ def describe() -> bytes:
                 "name": project["name"],
                 "version": project["version"],
                 "purl": reference,
-                "licenses": [{"license": {"id": project["license"]}}],
+                "licenses": [{"expression": project["license"]}],
             }
         },
         "components": parts,

@@ -51,8 +51,8 @@ class Reading:
 
 def _without_examples(schema: dict[str, Any]) -> None:
     """Schemas say what docstrings say; their examples are for a Python prompt."""
-    if reported := schema.get("description"):
-        schema["description"] = reported.partition("\n\n>>> ")[0]
+    if description := schema.get("description"):
+        schema["description"] = description.partition("\n\n>>> ")[0]
 
 
 class Model(BaseModel):

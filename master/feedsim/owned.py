@@ -101,11 +101,11 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
         locks = [lock]
         if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
-            reported = lock.content()
-            if reported and f" on {platform.node()} since " not in reported:
+            holder = lock.content()
+            if holder and f" on {platform.node()} since " not in holder:
                 lock.close()
                 raise OutputError(
-                    f"{directory}: another process writes its results there, as {lock.path} says: {reported}. If it is "
+                    f"{directory}: another process writes its results there, as {lock.path} says: {holder}. If it is "
                     "not at work any more, remove that file; or take another directory"
                 )
             unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]
@@ -114,11 +114,11 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
         if all(lock.state is not False for lock in locks):
             lock.tell(_self())
             return locks
-        reported = lock.content()
+        holder = lock.content()
         for entry in locks:
             entry.close()
         if time.monotonic() >= until:
-            who = f": {reported}" if reported else ""
+            who = f": {holder}" if holder else ""
             raise OutputError(
                 f"{directory}: another process writes its results there{who}; wait until it has ended, or take another "
                 "directory"

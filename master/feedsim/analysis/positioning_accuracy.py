@@ -72,11 +72,11 @@ class Accuracy:
             "E": um(np.ptp(mean), "bidirectional systematic deviation of positioning (ISO 230-2)"),
         }
         for side, m, d in zip(SIDES, mean, s, strict=True):
-            reported = f"of approaches {side}wards (ISO 230-2)"
+            approaches = f"of approaches {side}wards (ISO 230-2)"
             result |= {
-                f"A_{side}": um(np.max(m + 2 * d) - np.min(m - 2 * d), f"accuracy {reported}"),
-                f"R_{side}": um(4 * np.max(d), f"repeatability {reported}"),
-                f"E_{side}": um(np.ptp(m), f"systematic deviation {reported}"),
+                f"A_{side}": um(np.max(m + 2 * d) - np.min(m - 2 * d), f"accuracy {approaches}"),
+                f"R_{side}": um(4 * np.max(d), f"repeatability {approaches}"),
+                f"E_{side}": um(np.ptp(m), f"systematic deviation {approaches}"),
             }
         return result
 

@@ -115,14 +115,14 @@ def _read(path: Path, name: str) -> Source:
     if curves.name != RESULT or not summary.is_file():
         return Source(name, path, recording, time)
     try:
-        reported = json.loads(summary.read_text(encoding="utf-8"))
+        content = json.loads(summary.read_text(encoding="utf-8"))
         return Source(
             name, path, recording, time,
-            figures=_figures(reported),
-            parameters=_parameters(reported),
-            circles={prefix: tuple(map(_turn, turns)) for prefix, turns in reported.get("circles", {}).items()},
-            answer=tuple(map(str, reported.get("answer", ()))),
-            notes=tuple(str(reported.get(part, {}).get("note") or "") for part in ("machine", "scenario")),
+            figures=_figures(content),
+            parameters=_parameters(content),
+            circles={prefix: tuple(map(_turn, turns)) for prefix, turns in content.get("circles", {}).items()},
+            answer=tuple(map(str, content.get("answer", ()))),
+            notes=tuple(str(content.get(part, {}).get("note") or "") for part in ("machine", "scenario")),
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{summary}: is no summary of `feedsim run`: {type(error).__name__}: {error}") from None
@@ -141,12 +141,12 @@ def _figures(summary: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     return {f"{label}.{key.removeprefix('after.')}" if key.startswith("after.") else key: e for key, e in kept.items()}
 
 
-def _turn(reported: Mapping[str, Any]) -> Turn:
-    first, second = map(str, reported["axes"])
-    x, y = map(float, reported["centre"]["value"])
-    span = float(reported["begin"]["value"]), float(reported["end"]["value"])
-    sense = {word: sense for sense, word in SENSE_WORDS.items()}[reported["direction"]]
-    return Turn((first, second), (x, y), float(reported["radius"]["value"]), sense, *span)
+def _turn(turn: Mapping[str, Any]) -> Turn:
+    first, second = map(str, turn["axes"])
+    x, y = map(float, turn["centre"]["value"])
+    span = float(turn["begin"]["value"]), float(turn["end"]["value"])
+    sense = {word: sense for sense, word in SENSE_WORDS.items()}[turn["direction"]]
+    return Turn((first, second), (x, y), float(turn["radius"]["value"]), sense, *span)
 
 
 def _parameters(summary: Mapping[str, Any]) -> dict[str, str]:
@@ -167,11 +167,11 @@ def _flat(name: str, value: Any) -> dict[str, str]:
 
 def differing(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:
     """Parameters in which the results among the sources differ: name, and the value of every source, "" of records."""
-    reported = [source.parameters for source in sources]
-    names = dict.fromkeys(name for entry in reported for name in entry)
-    rows = [(name, [entry.get(name, "") for entry in reported]) for name in names]
+    parameters = [source.parameters for source in sources]
+    names = dict.fromkeys(name for entry in parameters for name in entry)
+    rows = [(name, [entry.get(name, "") for entry in parameters]) for name in names]
     return [
         (name, values)
         for name, values in rows
-        if len({v for v, value in zip(values, reported, strict=True) if value}) > 1
+        if len({v for v, value in zip(values, parameters, strict=True) if value}) > 1
     ]

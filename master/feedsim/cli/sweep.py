@@ -107,11 +107,11 @@ def _dry_run(study: Study, planned: Design, options: Namespace) -> int:
     for i, parameter in enumerate(planned.parameters):
         column = planned.values[:, i]
         if parameter.worded:
-            reported = ", ".join(choice.label for choice in parameter.choices)
+            values = ", ".join(choice.label for choice in parameter.choices)
         else:
-            reported = f"{column.min():.6g} to {column.max():.6g} {parameter.unit}".removesuffix(" 1")
+            values = f"{column.min():.6g} to {column.max():.6g} {parameter.unit}".removesuffix(" 1")
         times = "factor " if parameter.factor else ""
-        print(f"  {parameter.name}: {times}{reported} ({', '.join(parameter.keys)})")
+        print(f"  {parameter.name}: {times}{values} ({', '.join(parameter.keys)})")
     result = trial(study, planned, options.fmus)
     warn(f"run {run} fails: {why}" for run, why in result.failed.items())
     names = ", ".join(chosen(result.figures, study.figures))

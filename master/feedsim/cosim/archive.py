@@ -151,10 +151,10 @@ class Archive(Closing):
         except Exception as error:
             os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
             folder = f"binaries/{path.parent.name}"
-            reported = str(error).replace(f"{self.directory.absolute()}{os.sep}", "")
+            reason = str(error).replace(f"{self.directory.absolute()}{os.sep}", "")
             there = ", ".join(self.platforms)
             raise InputError(
-                f"{self.path}: its binary for this platform, in {folder}, cannot be loaded: {reported}; it has "
+                f"{self.path}: its binary for this platform, in {folder}, cannot be loaded: {reason}; it has "
                 f"binaries for {there}"
             ) from error
 

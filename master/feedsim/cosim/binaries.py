@@ -93,10 +93,10 @@ def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = No
     """
     folder = fmus or fmus_directory()
     parts = _parts(machine, folder, coupling)
-    reported = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
+    sentences = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
     if (digest := _loop(folder, fmus_directory())) is not None:
-        reported.append(f"executes {folder / exchange.LIBRARY_NAME} as cycle loop, SHA-256 {digest}")
-    return reported
+        sentences.append(f"executes {folder / exchange.LIBRARY_NAME} as cycle loop, SHA-256 {digest}")
+    return sentences
 
 
 def executing(path: Path, who: str) -> list[str]:

@@ -106,8 +106,8 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
     bare = [name for name, alias in signals.items() if role.signals[name].unit not in (BOOLEAN, "1")
             and archive.declared_unit(alias.name) is None]  # fmt: skip
     if bare:
-        reported = ", ".join(f"{signals[name].name} ({role.signals[name].unit})" for name in bare)
-        warnings.append(f"{where}: modelDescription.xml gives no unit for {reported}: taken to be in SI units")
+        listed = ", ".join(f"{signals[name].name} ({role.signals[name].unit})" for name in bare)
+        warnings.append(f"{where}: modelDescription.xml gives no unit for {listed}: taken to be in SI units")
     parameters: dict[str, Parameter] = {}
     for name, given in unit.parameters.items():
         try:
@@ -138,10 +138,10 @@ def _alias(signal: Signal, is_input: bool, name: str, archive: Archive) -> Alias
     variable = archive.variables.get(name)
     causalities = ("input",) if is_input else ("output",) if signal.needed else ("output", "local")
     if variable is None:
-        fitting = [variable.name for variable in archive.variables.values() if variable.causality in causalities]
+        fitting = [other.name for other in archive.variables.values() if other.causality in causalities]
         raise InputError(f"is no variable of the archive{_named(name, fitting, ' or '.join(causalities))}")
     if variable.causality not in causalities:
-        fitting = [variable.name for variable in archive.variables.values() if variable.causality in causalities]
+        fitting = [other.name for other in archive.variables.values() if other.causality in causalities]
         raise InputError(
             f"is {variable.causality}, {' or '.join(causalities)} is needed{_listed(fitting, causalities[0])}"
         )
@@ -183,7 +183,7 @@ def start_value(archive: Archive, name: str, given: Parameter, driven: Mapping[s
     """What `given` is for the variable `name`, in the unit and type that it declares. `driven`: variables that stand
     for signals. InputError: it is no parameter, cannot be set, or not to that."""
     variable = archive.variables.get(name)
-    known = [variable.name for variable in archive.variables.values() if variable.causality == "parameter"]
+    known = [other.name for other in archive.variables.values() if other.causality == "parameter"]
     if variable is None:
         raise InputError(f"is no variable of the archive{_named(name, known, 'parameter')}")
     if name in driven:

@@ -96,8 +96,8 @@ class Record:
 
     def between(self, first: int, last: int) -> Record:
         """Rows first <= i < last."""
-        reported = {role: values for role in ("time", *RECORD_SIGNALS) if (values := getattr(self, role)) is not None}
-        return replace(self, **{role: values[first:last] for role, values in reported.items()})
+        signals = {role: values for role in ("time", *RECORD_SIGNALS) if (values := getattr(self, role)) is not None}
+        return replace(self, **{role: values[first:last] for role, values in signals.items()})
 
 
 # A step of more than that many usual ones is a gap, where rows are missing; the least gap has 2.

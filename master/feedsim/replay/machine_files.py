@@ -28,9 +28,9 @@ ASSUMED = "assumed: the record does not show it"
 def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
     """A drive with what a record determines, and without what it does not: no reference model, no filters, an ideal
     current loop. values: K_v, k_ffw, T_dyn, T_sym, K_p, K_i = K_p/T_n. torque: limit [N.m]."""
-    reported = {name: values[name] for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p")}
+    same = {name: values[name] for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p")}
     assumed = {"ramp_speed_setpoint": False, "reference_model": False, "ideal_current_loop": True, "K_t": 1.0}
-    return Drive.model_validate({**reported, "T_n": values["K_p"] / values["K_i"], "M_max": torque, **assumed})
+    return Drive.model_validate({**same, "T_n": values["K_p"] / values["K_i"], "M_max": torque, **assumed})
 
 
 @dataclass(frozen=True)
@@ -214,10 +214,10 @@ def _remark(estimate: Estimate | None) -> str:
     if estimate is None:
         return ""
     interval = interval_text(estimate)
-    reported = f"95 %: {interval}" if interval else ""
+    remark = f"95 %: {interval}" if interval else ""
     if estimate.status == "undetermined":
-        reported = f"not determined: {estimate.reason}" + (f" ({reported})" if reported else "")
-    return f"  # {reported}" if reported else ""
+        remark = f"not determined: {estimate.reason}" + (f" ({remark})" if remark else "")
+    return f"  # {remark}" if remark else ""
 
 
 def _number(value: float) -> str:

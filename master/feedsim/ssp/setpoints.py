@@ -44,7 +44,7 @@ class Table:
         rounding = np.maximum(1e-9 * np.abs(time), max(2e-9, 2 * UNEVEN * self.cycle))
         slack = np.maximum(ulps, np.minimum(rounding, 0.01 * min(step, self.cycle)))
         rows = np.floor((time - self.time[0] + slack) / self.cycle).astype(np.int64)
-        return np.clip(rows, 0, len(self.time) - 1)
+        return np.asarray(np.clip(rows, 0, len(self.time) - 1), dtype=np.int64)
 
 
 def pack_setpoints(base: Path, out: Path, program: Program, *, name: str, note: str) -> None:

@@ -138,9 +138,14 @@ CONTROL = Option(
 )  # fmt: skip
 
 
+_COUNT = "(N: 19 or more, 39 hold 95 %%; default: none)"
 UNCERTAIN = Option(
     "--uncertain", "N", "repeat with N draws of the machine from the intervals of its identified values; figures get "
-    "intervals, curves bands (N: 19 or more, 39 hold 95 %%; default: none)", type=int, default=0,
+    f"intervals, curves bands {_COUNT}", type=int, default=0,
+)  # fmt: skip
+JUDGED_ON_DRAWS = Option(
+    "--uncertain", "N", "find values that suit a few draws of the machine, too, and judge them on N others, from the "
+    f"intervals of its identified values; figures get intervals {_COUNT}", type=int, default=0,
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, names, out, settings
+from feedsim.cli.options import FIGURES, FMUS, JUDGED_ON_DRAWS, QUIET_OPTION, Command, Option, names, out, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Find the values of a friction compensation: a pulse on the speed setpoint, constant or with a
@@ -50,7 +50,7 @@ COMPENSATION = Command(
                default="pulse_characteristic"),
         Option("--axes", "NAMES", "axes of the plane that are compensated (default: both)", type=names),
         Option("--objective", "NAME", "what is minimised: ratio, worst or largest (default: ratio)", default="ratio"),
-        UNCERTAIN,
+        JUDGED_ON_DRAWS,
         out("tune_<name of the file>"), FIGURES, settings(), FMUS, QUIET_OPTION,
     ),
     DESCRIPTION,

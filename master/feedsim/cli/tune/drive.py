@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, out, settings
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, JUDGED_ON_DRAWS, QUIET_OPTION, Command, Option, out, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Find better values of K_p, T_n, K_v, T_sym, T_dyn, the reference model and the current setpoint filters
@@ -59,7 +59,7 @@ DRIVE = Command(
         Option("--at", "POSE", "a further pose at which the margins hold, such as X=100mm,Z=600mm; may be given "
                "several times", many=True),
         Option("--evaluations", "N", "candidates per start of the search (default: 130)", type=int, default=130),
-        UNCERTAIN,
+        JUDGED_ON_DRAWS,
         out("tune_drive_<name of the file>_<axis>"), FIGURES, settings(), CONTROL, FMUS, QUIET_OPTION,
     ),
     DESCRIPTION,

@@ -47,7 +47,11 @@ def estimates() -> dict[str, Estimate]:
     }
     for name, reason in (("beta", "usual value"), ("v_log", "only the ratio to F_log would be seen")):
         found[name] = replace(found[name], status="held", reason=reason)
-    found |= {name: parameters.estimate(name, parameters.NO_EFFECT[name], status="held") for name in parameters.FIXED}
+    found |= {
+        name: parameters.estimate(name, parameters.NO_EFFECT[name], status="held")
+        for name in parameters.FIXED
+        if name in TRUE
+    }
     found["J"] = replace(found["J"], status="given", reason="of the machine's modes")
     return found
 

@@ -86,9 +86,9 @@ def test_modes_are_changed_behind_a_transmission(monkeypatch: pytest.MonkeyPatch
         joined = checked_modes(changed)
         assert len(joined.frequency) == len(structure.frequency) + 1
         for name in ("pose of the machine file", "another"):
-            own = search.judges[f"{name}, modes 10 % higher"].modes
+            own = search.judges[f"{name}, modes 10 % higher"].candidates.modes
             assert own.frequency == pytest.approx(joined.frequency, rel=1e-12)
-            assert search.judges[name].modes.J_inf("Z") == pytest.approx(0.004, rel=1e-9)
+            assert search.judges[name].candidates.modes.J_inf("Z") == pytest.approx(0.004, rel=1e-9)
 
 
 @pytest.mark.parametrize(("K_p", "T_n", "K_v"), [(0.25, 0.02, 60.0), (1.2, 0.004, 120.0)])

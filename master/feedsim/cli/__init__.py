@@ -84,8 +84,8 @@ COMMANDS = (
 )  # fmt: skip
 
 
-def parser() -> Parser:
-    """The command line's grammar."""
+def parser(only: str = "") -> Parser:
+    """The command line's grammar; of `only` one command, where there is one of that name."""
     top = Parser(
         prog="feedsim",
         description="Simulate machine-tool feed drives with non-linear friction.",
@@ -95,7 +95,7 @@ def parser() -> Parser:
     top.add_argument("--version", action=_Version, help="show program's version number and exit")
     top.set_defaults(known=COMMANDS)
     commands = top.add_subparsers(dest="command", metavar="COMMAND")
-    for command in COMMANDS:
+    for command in [command for command in COMMANDS if command.name == only] or COMMANDS:
         command.add_to(commands)
     return top
 
@@ -115,7 +115,8 @@ class _Version(argparse.Action):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    options = parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    options = parser(given[0] if given else "").parse_args(given)
     if options.command is None:
         print(START_TEXT, end="")
         return 0

@@ -112,19 +112,21 @@ def prepare_streams() -> None:
 @contextmanager
 def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[Progress]:
     """A progress bar; none if ``quiet`` or where nobody watches. shortened: large numbers of the `unit` (12.3k)."""
-    from tqdm import tqdm
-
-    with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
+    with _bar(quiet, unit, shortened) as bar:
         yield Progress(bar)
 
 
 @contextmanager
 def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[TerminalWatch]:
     """Who watches a job for the person at the terminal. unit, shortened: as of :func:`progress_bar`."""
+    with _bar(quiet, unit, shortened) as bar:
+        yield TerminalWatch(bar, quiet)
+
+
+def _bar(quiet: bool, unit: str, shortened: bool) -> Any:
     from tqdm import tqdm
 
-    with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
-        yield TerminalWatch(bar, quiet)
+    return tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty())
 
 
 COLOURS = {"red": 31, "yellow": 33}

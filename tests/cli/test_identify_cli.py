@@ -22,11 +22,12 @@ from feedsim.identify.friction_file import Line, friction_text
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate, Plateau
-from feedsim.identify.stages import RESULT_ORDER, begins, merged_correlation, transitions
+from feedsim.identify.stages import begins, merged_correlation, transitions
 from feedsim.identify.torque import RecordTorque
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
 from feedsim.trace import write_csv
+from feedsim.variables import parameters
 from identification_helpers import (
     I_P,
     TRUE,
@@ -47,6 +48,8 @@ MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
 MOVES = ((5e-6, 10.0, 20), (20e-6, 5.0, 12), (100e-6, 2.0, 7), (200e-6, 1.0, 5))
 FILES = {"friction.yaml", "plateaus.csv", "residuals.csv", "report.html", "summary.json"}
+LUGRE = tuple(parameters("friction"))
+RESULT_ORDER = (*LUGRE, "M_0", "J", "delay")
 
 
 @pytest.fixture(scope="module")
@@ -245,8 +248,16 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return asked
 
 
-def no_law(*words: Any, **more: Any) -> Any:
-    raise AssertionError("no law is needed")
+class NoLaw:
+    """Has LuGre's parameters, and is not called."""
+
+    names = LUGRE
+
+    def __call__(self, *words: Any, **more: Any) -> Any:
+        raise AssertionError("no law is needed")
+
+
+no_law: Any = NoLaw()
 
 
 def test_stages_are_merged(calls: dict[str, Any]) -> None:
@@ -399,14 +410,14 @@ def test_files_count_one_after_the_other_and_pieces_by_their_time() -> None:
 def test_correlation_of_both_stages() -> None:
     whole = identification()
     first, second = whole.stationary, whole.dynamic
-    merged = merged_correlation(first, second)
+    merged = merged_correlation(first, second, LUGRE)
     assert first is not None
     assert second is not None
     for part in (first.correlation, second.correlation):
         at = [merged.names.index(name) for name in part.names]
         assert merged.matrix[np.ix_(at, at)] == pytest.approx(part.matrix, abs=1e-15)
     assert np.isnan(merged.matrix[merged.names.index("F_C"), merged.names.index("W")])
-    assert merged_correlation(None, None).names == Correlation((), np.eye(0)).names
+    assert merged_correlation(None, None, LUGRE).names == Correlation((), np.eye(0)).names
 
 
 def test_names_take_as_many_folders_as_needed(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ PAGES = sorted(
     for path in ROOT.glob(pattern)
 )
 MEDIAN = 14  # words of a sentence
+TOGETHER = 30_000  # words of prose on all pages: whoever adds a paragraph takes one away
 
 
 def named(page: Path) -> str:
@@ -32,6 +33,10 @@ def test_page_keeps_to_the_style(page: Path) -> None:
 def test_sentences_are_short_in_the_middle() -> None:
     lengths = [words for page in PAGES for words in prose.lengths(page.read_text(encoding="utf-8"))]
     assert median(lengths) <= MEDIAN
+
+
+def test_pages_together_can_be_read() -> None:
+    assert sum(words for page in PAGES for words in prose.lengths(page.read_text(encoding="utf-8"))) <= TOGETHER
 
 
 def test_readme_fits_on_two_screens() -> None:

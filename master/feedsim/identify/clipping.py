@@ -4,12 +4,13 @@ friction.
 A range of the recording, or of what the drive hands out, cuts the torque off. Its rows then heap at one value. So they
 do where an axis accelerates evenly, or where the drive itself has no more to give: such rows are right. The difference
 is the motion: where inertia and friction (inertia.py, of the other rows) need clearly more than the value at which the
-rows heap, the record is cut off there.
+rows heap, the record is cut off there. What they need is known while the axis moves, in a direction in which other rows
+have shown its friction and load.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -17,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.averages import resolution, white
-from feedsim.identify.inertia import Inertia, inertia, smooth_speed
+from feedsim.identify.inertia import REST_SPEED_SHARE, Inertia, inertia, smooth_speed
+from feedsim.identify.parameters import RIGID_AXIS_NAMES
 from feedsim.identify.record import Array, Record, runs
 
 MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the heap
@@ -42,6 +45,14 @@ class _Heap:
         return abs(self.limit - other.limit) <= self.reach + other.reach
 
 
+@dataclass(frozen=True)
+class _Needed:
+    """Torque that the motion of a record needs, and its standard deviation (N,) [N.m]; nan where it is not known."""
+
+    torque: Array
+    sigma: Array
+
+
 def without_clipped(
     records: Sequence[Record],
     J: float | None = None,
@@ -50,7 +61,8 @@ def without_clipped(
 ) -> tuple[tuple[Record, ...], tuple[str, ...]]:
     """The records with the rows marked at which their torque is cut off, and a sentence for each such record.
 
-    J: inertia [kg.m2] for records whose other rows determine none. left_out: what the caller does with such rows.
+    J: inertia [kg.m2] for records whose other rows determine none, or roughly only; at most the true one.
+    left_out: what the caller does with such rows.
     simulated: (N,) of each record: torque [N.m] of a machine on this motion, in place of inertia and simple friction.
     """
     heaps = [tuple(_heap(record, side) for side in (1.0, -1.0)) for record in records]
@@ -58,33 +70,36 @@ def without_clipped(
         replace(record, clipped=np.any([heap.rows for heap in both], axis=0))
         for record, both in zip(records, heaps, strict=True)
     ]
-    rigid: Inertia | None = None
-    if simulated is None:
-        with suppress(InputError):
-            rigid = inertia(trial)
-    if rigid is None and J is None and simulated is None:
-        return tuple(records), ()
-    needed = simulated or [_needed(record, rigid, J or 0.0) for record in records]
-    left = rigid.rms if rigid is not None else 0.0
+    left = 0.0
+    models: list[list[_Needed]] = []
     if simulated is not None:  # another machine than that of the record needs another torque everywhere
         off = [(torque - each.torque)[~each.clipped] for each, torque in zip(trial, simulated, strict=True)]  # type: ignore[operator]
         left = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+        models.append([_Needed(torque, np.zeros(len(torque))) for torque in simulated])
+    else:
+        slow = REST_SPEED_SHARE * max((float(np.max(np.abs(smooth_speed(record)))) for record in records), default=0.0)
+        with suppress(InputError):
+            rigid = inertia(trial)
+            left = rigid.rms
+            models.append([_of_line(record, rigid, slow) for record in records])
+        if J is not None:
+            models.append([_of_inertia(record, J, slow) for record in trial])
     shortest = 1 if simulated is not None else MIN_HEAP_ROWS
     proven = [
         heap
-        for both, torque in zip(heaps, needed, strict=True)
-        for heap in both
-        if _beyond(heap, torque, CLIPPING_SIGMAS * left, shortest)
+        for needed in models
+        for record, both, one in zip(records, heaps, needed, strict=True)
+        for heap in _proven(record, both, one, CLIPPING_SIGMAS * left, shortest)
     ]
     result, said = [], []
-    for record, both, torque in zip(records, heaps, needed, strict=True):
+    for k, (record, both) in enumerate(zip(records, heaps, strict=True)):
         # What one record shows of a limit holds for all that end at it.
         kept = [heap for heap in both if any(heap.like(other) for other in proven)]
         if not kept:
             result.append(record)
             continue
         result.append(replace(record, clipped=np.any([heap.rows for heap in kept], axis=0)))
-        said.append(_words(result[-1], kept, torque, left_out))
+        said.append(_words(result[-1], kept, [needed[k] for needed in models], left_out))
     return tuple(result), tuple(said)
 
 
@@ -108,34 +123,88 @@ def _heap(record: Record, side: float) -> _Heap:
     return _Heap(side, limit, reach, wide)
 
 
-def _needed(record: Record, rigid: Inertia | None, J: float) -> Array:
-    """(N,) torque that inertia, simple friction and known load need [N.m]."""
+def _ways(record: Record, slow: float) -> dict[float, NDArray[np.bool_]]:
+    """Direction (1 or -1) -> (N,) rows that move in it: near rest friction may be anything up to F_C."""
     speed = smooth_speed(record)
-    torque = J * np.gradient(speed, record.interval)
-    if rigid is not None:
-        J, viscous, friction, constant = (rigid.estimates[name].value for name in ("J", "sigma_2", "F_C", "M_0"))
-        torque = J * np.gradient(speed, record.interval) + viscous * speed + friction * np.sign(speed) + constant
-    return torque if record.load is None else torque + record.load
+    return {way: way * speed > slow for way in (1.0, -1.0)}
 
 
-def _beyond(heap: _Heap, needed: Array, margin: float, shortest: int) -> bool:
-    """Whether the motion needs clearly more than the limit over some run of the heap, of so many means at least."""
+def _of_line(record: Record, rigid: Inertia, slow: float) -> _Needed:
+    """By a rigid axis with simple friction.
+
+    Rows in one direction determine constant load and friction as one sum, which is no torque of the other direction.
+    """
+    speed = smooth_speed(record)
+    columns = np.gradient(speed, record.interval), speed, np.sign(speed), np.ones(len(record))
+    names = rigid.correlation.names
+    X = np.column_stack([column for name, column in zip(RIGID_AXIS_NAMES, columns, strict=True) if name in names])
+    torque = X @ np.array([rigid.estimates[name].value for name in names])
+    seen = np.unique(np.sign(rigid.speeds))
+    known = np.any([rows for way, rows in _ways(record, slow).items() if way in seen], axis=0)
+    return _Needed(
+        np.where(known, torque if record.load is None else torque + record.load, np.nan),
+        np.sqrt(np.einsum("ij,jk,ik->i", X, rigid.covariance, X)),
+    )
+
+
+def _of_inertia(record: Record, J: float, slow: float) -> _Needed:
+    """By an inertia that is known, with the friction and load of either direction as its rows beside the heaps have
+    them. record: with its heaps marked."""
+    assert record.clipped is not None
+    accelerating = J * np.gradient(smooth_speed(record), record.interval)
+    if record.load is not None:
+        accelerating = accelerating + record.load
+    torque, sigma = np.full(len(record), np.nan), np.zeros(len(record))
+    for way in _ways(record, slow).values():
+        free = way & ~record.clipped
+        if np.count_nonzero(free) >= MIN_HEAP_ROWS:
+            off = (_smooth(record) - accelerating)[free]
+            torque[way] = accelerating[way] + float(np.median(off))
+            sigma[way] = float(np.std(off)) * np.sqrt(MEAN / len(off))  # neighbours share their means
+    return _Needed(torque, sigma)
+
+
+def _proven(record: Record, both: Sequence[_Heap], needed: _Needed, margin: float, shortest: int) -> Sequence[_Heap]:
+    """The heaps of a record at which its torque is cut off.
+
+    A range is as wide to either side: where both were cut off, at unlike limits, what is needed is wrong.
+    """
+    proven = [heap for heap in both if _beyond(heap, record, needed, margin, shortest)]
+    return proven if len(proven) < 2 or proven[0].like(proven[1]) else []
+
+
+def _beyond(heap: _Heap, record: Record, needed: _Needed, margin: float, shortest: int) -> bool:
+    """Whether the motion needs clearly more than the limit, and than the torque there, over some run of the heap, of so
+    many means at least."""
     limit, side = heap.limit, heap.side
-    inner = [(first, last) for first, last in runs(heap.rows) if last - first >= shortest + MEAN - 1]
-    most = max((float(np.median(side * needed[first:last])) for first, last in inner), default=-np.inf)
-    return most > limit + max(CLIPPED_EXCESS * abs(limit), margin)
+    least = side * needed.torque - NORMAL_95 * needed.sigma
+
+    def beyond() -> Iterator[float]:
+        for first, last in runs(heap.rows):
+            rows = first + np.flatnonzero(np.isfinite(least[first:last]))
+            if last - first >= shortest + MEAN - 1 and len(rows) >= shortest:
+                yield float(np.median(least[rows])) - max(limit, float(np.median(side * record.torque[rows])))
+
+    return max(beyond(), default=-np.inf) > max(CLIPPED_EXCESS * abs(limit), margin)
 
 
-def _words(record: Record, heaps: Sequence[_Heap], needed: Array, left_out: str) -> str:
+def _words(record: Record, heaps: Sequence[_Heap], models: Sequence[_Needed], left_out: str) -> str:
     assert record.clipped is not None
     limits = " and ".join(f"{heap.side * heap.limit:+.4g} N.m" for heap in heaps)
     parts = runs(record.clipped)
     times = [f"{record.time[first]:.4g} to {record.time[last - 1]:.4g} s" for first, last in parts[:MOST_SHOWN]]
     rest = f" and {len(parts) - MOST_SHOWN} times more" if len(parts) > MOST_SHOWN else ""
     share = 100 * float(np.mean(record.clipped))
-    most = max(float(np.max(heap.side * needed[heap.rows])) for heap in heaps)
+    beyond = [
+        (float(np.max(heap.side * each)), heap.side)
+        for heap in heaps
+        for needed in models
+        if len(each := needed.torque[heap.rows & np.isfinite(needed.torque)])
+    ]
+    # A heap at the limit of another record need not show any such row itself.
+    most = f", where inertia and friction need {np.prod(max(beyond)):+.3g} N.m" if beyond else ""
     return (
-        f"{record.name}: the torque is cut off at {limits}, where inertia and friction need up to {most:.3g} N.m: "
+        f"{record.name}: the torque is cut off at {limits}{most}: "
         f"{share:.2g} % of the rows, at {', '.join(times)}{rest}; {left_out}; record with a "
         "wider range, or drive more gently"
     )

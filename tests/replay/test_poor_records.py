@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drive_helpers import COLUMNS, MACHINES, SCENARIO
+from drive_helpers import COLUMNS, MACHINES, SCENARIO, logged
 from feedsim.cli import main
 from feedsim.cosim import run
 from feedsim.files.columns import load_columns
@@ -92,6 +92,26 @@ def test_a_record_of_the_position_alone(tmp_path: Path, monkeypatch: pytest.Monk
     lag = one["T_dyn"].value + one["T_sym"].value + (1 - one["k_ffw"].value) / one["K_v"].value
     assert lag == pytest.approx(own.T_dyn + own.T_sym + (1 - own.k_ffw) / own.K_v, abs=5e-6)
     assert one["J"].interval[0] <= checked_modes(true).J_tot("X") <= one["J"].interval[1]
+
+
+@pytest.mark.parametrize("torque", [True, False], ids=["torque", "no torque"])
+def test_a_record_of_the_position_alone_on_a_known_machine(torque: bool, tmp_path: Path) -> None:
+    """The structure is known, and the lag is shared as it is without: T_sym and k_ffw were called estimated."""
+    known = MACHINES / "one_axis"
+    path = logged(tmp_path, "X", "M_a: 2 %, x_a: 0.1 um", machine=known)
+    columns = COLUMNS.replace("deviation: {column: X.x_e}\n", "")
+    (tmp_path / "columns.yaml").write_text(columns if torque else columns.replace("torque: {column: X.M_a}\n", ""))
+    words = [str(path), "--axes", "X", "--columns", str(tmp_path / "columns.yaml"), "--machine", str(known)]
+    assert main(["identify-drive", *words, "--quiet", "--out", str(tmp_path / "own")]) == 0
+    found = json.loads((tmp_path / "own" / "summary.json").read_text())["axes"]["X"]["parameters"]
+    true = load_machine(known).axes["X"].drive
+    for name in ("k_ffw", "T_sym", "T_dyn"):
+        assert found[name]["status"] == "undetermined", name
+        assert found[name]["reason"].startswith("without the control's own following error only the lag shows"), name
+        assert abs(found[name]["value"] - getattr(true, name)) <= 2 * found[name]["sigma"], name
+    value = {name: found[name]["value"] for name in found}
+    lag = value["T_dyn"] + value["T_sym"] + (1 - value["k_ffw"]) / value["K_v"]
+    assert lag == pytest.approx(true.T_dyn + true.T_sym + (1 - true.k_ffw) / true.K_v, abs=20e-6)
 
 
 ONE_WAY = """

@@ -19,13 +19,14 @@ from typing import Any
 
 from feedsim.errors import InputError, few, no_such_file
 from feedsim.installation import version
-from feedsim.scenario import Base
+from feedsim.scenario import Base, FrictionParameters
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, FRICTION_UNITS
 from feedsim.scenario.study import Parameter, Study
 from feedsim.sweep.design import Design
 
 # What a worker is asked, in words that every Python knows, whatever is installed there.
 QUESTION = "__import__('feedsim.sweep.provenance', fromlist=['versions']).versions()"
-UNIT_NAMES = ("plant", "controller", "friction")
+UNIT_NAMES = ("plant", DRIVE.shipped, FRICTION_ROLE.shipped)
 # Methods of which a study with more runs has those of a smaller one, with the same seed, as its first ones: points of a
 # Sobol sequence, and for indices what is made of them sample by sample.
 PREFIXED = ("sobol", "sensitivity")
@@ -49,8 +50,18 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
 
 def units_of(base: Base, parameters: Iterable[Parameter] = ()) -> tuple[str, ...]:
     """Shipped units that runs of a scenario may need, where `parameters` change it."""
-    varied = any(key.startswith("coupling") for parameter in parameters for key in parameter.keys)
-    return (*UNIT_NAMES, "machine") if varied or base.scenario.coupling.units == "one" else UNIT_NAMES
+    keys = [key for parameter in parameters for key in parameter.keys]
+    axes = base.scenario.machine.axes.values()
+    laws = {axis.friction.law for axis in axes if isinstance(axis.friction, FrictionParameters)}
+    varied = any(_may_change_law(key.split(".")) for key in keys)
+    others = [unit for law, unit in FRICTION_UNITS.items() if varied or law in laws]
+    together = base.scenario.coupling.units == "one" or any(key.startswith("coupling") for key in keys)
+    return (*UNIT_NAMES, *others, *(["machine"] if together else []))
+
+
+def _may_change_law(key: list[str]) -> bool:
+    """Whether a value may be a friction as a whole: machine, .axes, .Z, .friction, or its law."""
+    return key[0] == "machine" and (len(key) <= 3 or key[3:] in (["friction"], ["friction", "law"]))
 
 
 def fingerprint(result: Mapping[str, str]) -> str:

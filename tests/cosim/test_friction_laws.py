@@ -52,7 +52,15 @@ def test_a_file_may_say_its_law(fmus: Path, tmp_path: Path) -> None:
     ("change", "words"),
     [
         (f"axes.Z.friction={gms().replace('gms', 'dahl')}", "'dahl' is no friction law; allowed: lugre, gms"),
-        (f"axes.Z.friction={gms(W='2 deg')}", "W: unknown key; allowed: law, sigma_0"),
+        ("axes.Z.friction={law: [gms]}", "axes.Z.friction.law: a list is no friction law; allowed: lugre, gms"),
+        (f"axes.Z.friction={gms(W='2 deg')}", "axes.Z.friction.law: the law gms has no W, but spread, skew, C"),
+        ("axes.Z.friction.law=dahl", "axes.Z.friction.law: 'dahl' is no friction law; allowed: lugre, gms"),
+        (
+            "axes.Z.friction.law=gms",
+            "--set axes.Z.friction.law=gms: axes.Z.friction.law: the law gms has no W, gamma, "
+            "but spread, skew, C; another law needs the whole group anew, friction: {law: gms, sigma_0: ..., sigma_1: ",
+        ),
+        ("axes.Z.friction.spread=5", "unknown key 'spread' in axes.Z.friction; allowed: sigma_0"),
         (f"axes.Z.friction={gms(spread='0.5')}", "spread"),
         (f"axes.Z.friction={gms(F_S='1 N.m')}", "F_S 1 N.m is smaller than F_C 1.6 N.m"),
     ],
@@ -61,6 +69,28 @@ def test_what_is_no_such_law_is_refused(change: str, words: str) -> None:
     with pytest.raises(InputError) as raised:
         fs.load_machine(SCENARIOS / "machines" / "test_centre", [change])
     assert words in str(raised.value)
+
+
+def test_lugre_by_name_has_its_own_keys() -> None:
+    """A value of it can be set, and one of the other law cannot."""
+    centre, named = SCENARIOS / "machines" / "test_centre", "axes.Z.friction.law=lugre"
+    machine = fs.load_machine(centre, [named, "axes.Z.friction.W=3 deg"])
+    assert pytest.approx(np.radians(3)) == machine.axes["Z"].friction.W
+    with pytest.raises(InputError, match="unknown key 'spread'"):
+        fs.load_machine(centre, [named, "axes.Z.friction.spread=3"])
+    with pytest.raises(
+        InputError, match=r"--set axes\.Z\.friction\.law=lugre: .* the law lugre has no spread, C, but W"
+    ):
+        fs.load_machine(centre, [f"axes.Z.friction={gms()}", named])
+
+
+def test_a_law_is_no_other_by_a_word_alone() -> None:
+    """What a machine file with pure LuGre gives suits another law, which then has its own values beside it."""
+    pure = "{" + ", ".join(f"{n}: {v}" for n, v in PARAMETERS.items() if n not in ("spread", "C")) + "}"
+    machine = fs.load_machine(
+        SCENARIOS / "machines" / "test_centre", [f"axes.Z.friction={pure}", "axes.Z.friction.law=gms"]
+    )
+    assert machine.axes["Z"].friction.law == "gms"
 
 
 def test_the_guide_takes_no_share_of_it() -> None:

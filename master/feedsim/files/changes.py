@@ -91,7 +91,7 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         raise InputError(f"{mark.where}: {here} is {brief(data)}, which has no {part!r} inside")
     annotation = shape.expected(model, source.data, place)
     known = shape.keys(annotation)
-    if known is not None and part not in known:
+    if known is not None and part not in (*known, *shape.separating(model, source.data, place)):
         raise InputError(f"{mark.where}: unknown key {part!r} in {here}{did_you_mean(part, known)}")
     if rest and not isinstance(data.get(part), (dict, list)):
         inner = shape.child(annotation, part)

@@ -47,7 +47,7 @@ def resolve(annotation: Any, data: Any) -> Any:
             if any(isinstance(note, ExistingFile) for note in arguments[1:]):
                 return annotation
             annotation = arguments[0]
-        elif origin in (Union, UnionType):
+        elif _is_union(annotation):
             options = [option for option in arguments if option is not NoneType]
             if len(options) > 1:
                 if all(map(kind_of, options)):
@@ -55,9 +55,7 @@ def resolve(annotation: Any, data: Any) -> Any:
                     options = [option for option in options if kind_of(option) == kind]
                 elif all(is_group(resolve(part, None)) for part in options):  # a key separates them
                     given = data if isinstance(data, dict) else {}
-                    options = [
-                        part for part in options if getattr(resolve(part, None), "TOLD_BY", None) in given
-                    ] or options
+                    options = [part for part in options if _fits(resolve(part, None), given)] or options
                 else:  # a group or something else, as the data is
                     options = [part for part in options if is_group(resolve(part, None)) == isinstance(data, dict)]
                 if not options:
@@ -73,6 +71,15 @@ def kind_of(model: Any) -> str | None:
     return info.default if info is not None else None
 
 
+def separating(model: Any, data: Any, place: Place) -> list[str]:
+    """Keys that decide which of several models stands at `place` of a tree `data` that is read as `model`."""
+    annotation = child(expected(model, data, place[:-1]), place[-1]) if place else None
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    parts = [resolve(part, None) for part in get_args(annotation)] if _is_union(annotation) else []
+    return [part.TOLD_BY for part in parts if is_model(part) and getattr(part, "TOLD_BY", None)]
+
+
 def keys(annotation: Any) -> list[str] | None:
     """Keys that a group may hold; None where keys are free (axis names) or it is no group."""
     return [info.alias or name for name, info in annotation.model_fields.items()] if is_model(annotation) else None
@@ -81,6 +88,15 @@ def keys(annotation: Any) -> list[str] | None:
 def field(model: Any, key: str | int) -> FieldInfo | None:
     """The field of a model that a file's `key` fills; None where there is none."""
     return next((info for name, info in model.model_fields.items() if (info.alias or name) == key), None)
+
+
+def _is_union(annotation: Any) -> bool:
+    return get_origin(annotation) in (Union, UnionType)
+
+
+def _fits(model: Any, given: dict[str, Any]) -> bool:
+    """Whether the keys of a group choose this one of several models."""
+    return is_model(model) and model.TOLD_BY in given and given[model.TOLD_BY] not in model.BUT_FOR
 
 
 def is_model(annotation: Any) -> bool:

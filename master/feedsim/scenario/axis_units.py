@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
-    BeforeValidator,
     Field,
     StrictBool,
     StrictInt,
@@ -22,7 +21,17 @@ from pydantic import (
 from feedsim import variables
 from feedsim.fields import Quantity, Reading, brief, fault, parameter
 from feedsim.scenario.parameter_group import Parameter, ParameterGroup, effects, group
-from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, FRICTION_UNITS, GMS, ForeignUnit, filled, mapping
+from feedsim.scenario.roles import (
+    ANOTHER_LAW,
+    DRIVE,
+    FRICTION_ROLE,
+    FRICTION_UNITS,
+    GMS,
+    LUGRE,
+    ForeignUnit,
+    filled,
+    mapping,
+)
 
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
 FILTER_TYPES: dict[str, int] = {"off": 0, "second_order": 1, "band_stop": 1, "low_pass": 2}
@@ -32,6 +41,11 @@ FILTER_TYPES: dict[str, int] = {"off": 0, "second_order": 1, "band_stop": 1, "lo
 # parameter of the unit is held at its start value then.
 _FRICTION_NEEDED = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "v_s")
 _FRICTION_WITHOUT = {"F_log": 0.0, "W": 0.0, "gamma": 1.0}
+_PARAMETERS_BY_LAW = {
+    LUGRE: variables.parameters(FRICTION_ROLE.shipped),
+    **{law: variables.parameters(unit) for law, unit in FRICTION_UNITS.items()},
+}
+_NAMES_OF_LAWS = {name for names in _PARAMETERS_BY_LAW.values() for name in names}
 _IDENTIFIED = (
     "Where the parameters come from, as feedsim identify writes it: kept and shown, never calculated with. Its keys "
     "are free, but names of parameters are refused: they would have no effect here"
@@ -46,6 +60,29 @@ class FrictionParameters(ParameterGroup):
         identified: dict[str, Any]
 
         def __getattr__(self, parameter: str) -> float: ...
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_law(cls, data: Any) -> Any:
+        """Values of one law say nothing of another: sigma_0 acts at once in one, on a share of the bristles in
+        another."""
+        if not isinstance(data, Mapping):
+            return data
+        law = data.get("law", LUGRE)
+        if law not in [*_PARAMETERS_BY_LAW]:
+            allowed = ", ".join(_PARAMETERS_BY_LAW)
+            raise fault(f"{brief(law)} is no friction law; allowed: {allowed}", beside=("friction", "law"))
+        own = _PARAMETERS_BY_LAW[law]
+        other = [name for name in data if name not in own and name in _NAMES_OF_LAWS]
+        if other:
+            instead = [name for name in own if any(name not in names for names in _PARAMETERS_BY_LAW.values())]
+            raise fault(
+                f"the law {law} has no {', '.join(other)}, but {', '.join(instead)}; another law needs the whole group "
+                f"anew, friction: {{law: {law}, {', '.join(f'{name}: ...' for name in _FRICTION_NEEDED)}}} at least",
+                beside=("friction", "law" if "law" in data else other[0]),
+            )
+        # A file may say LuGre as any other law.
+        return {key: value for key, value in data.items() if key != "law"} if law == LUGRE else data
 
     @field_validator("identified", check_fields=False)
     @classmethod
@@ -75,27 +112,15 @@ class FrictionParameters(ParameterGroup):
 class _Friction(FrictionParameters):
     """Friction of an axis on the motor side: LuGre with the transmission engaging model (Eqs. 1-7)."""
 
-    law: ClassVar[str] = "lugre"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _law_by_name(cls, data: Any) -> Any:
-        """A file may say its law, LuGre as any other."""
-        named = isinstance(data, Mapping) and data.get("law") == cls.law
-        return {key: value for key, value in data.items() if key != "law"} if named else data
+    law: ClassVar[str] = LUGRE
 
 
 class _GmsFriction(FrictionParameters):
     """Friction of an axis on the motor side: generalised Maxwell slip."""
 
     TOLD_BY: ClassVar[str] = "law"
+    BUT_FOR: ClassVar[tuple[str, ...]] = (LUGRE,)
     not_shown: ClassVar[tuple[str, ...]] = ("c", "lambda")  # it has no engaging zone
-
-
-def _known_law(law: Any) -> Any:
-    if law not in FRICTION_UNITS:
-        raise fault(f"{brief(law)} is no friction law; allowed: {', '.join((Friction.law, *FRICTION_UNITS))}")
-    return law
 
 
 def _friction_fields(unit: str) -> dict[str, Any]:
@@ -120,7 +145,7 @@ else:
     GmsFriction = create_model(
         "GmsFriction", __base__=_GmsFriction, __module__=__name__, __doc__=_GmsFriction.__doc__,
         law=(
-            Annotated[Literal[GMS], BeforeValidator(_known_law)],
+            Literal[GMS],
             Field(description="Law of the friction; without it LuGre"),
         ),
         **_friction_fields(FRICTION_UNITS[GMS]),
@@ -129,8 +154,8 @@ else:
 
 def friction_filled(data: Any) -> str:
     """Which friction stands there, as the tag of a pydantic union: the shipped LuGre, another law or another unit."""
-    law = data.get("law", Friction.law) if isinstance(data, Mapping) else getattr(data, "law", Friction.law)
-    return filled(data) if law == Friction.law else GMS
+    law = data.get("law", LUGRE) if isinstance(data, Mapping) else getattr(data, "law", LUGRE)
+    return filled(data) if law == LUGRE else ANOTHER_LAW
 
 
 CONTROLLER_TABLE = variables.parameters("controller")

@@ -36,7 +36,7 @@ from feedsim.scenario.axis_units import (
     friction_filled,
 )
 from feedsim.scenario.parameter_group import Parameter, ParameterGroup, group
-from feedsim.scenario.roles import FOREIGN, GMS, SHIPPED, ForeignUnit, filled
+from feedsim.scenario.roles import ANOTHER_LAW, FOREIGN, SHIPPED, ForeignUnit, filled
 
 
 class Axis(Model):
@@ -70,7 +70,9 @@ class Axis(Model):
         Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
     )
     friction: Annotated[
-        Annotated[Friction, Tag(SHIPPED)] | Annotated[GmsFriction, Tag(GMS)] | Annotated[ForeignFriction, Tag(FOREIGN)],
+        Annotated[Friction, Tag(SHIPPED)]
+        | Annotated[GmsFriction, Tag(ANOTHER_LAW)]
+        | Annotated[ForeignFriction, Tag(FOREIGN)],
         Discriminator(friction_filled),
     ] = Field(
         description="Parameters of the shipped friction (law: gms for generalised Maxwell slip), or another unit (fmu) "

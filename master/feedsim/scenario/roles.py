@@ -22,7 +22,8 @@ from pydantic import (
 from feedsim import variables
 from feedsim.fields import File, Model, brief, fault
 
-SHIPPED, FOREIGN = "[shipped]", "[foreign]"
+SHIPPED, FOREIGN, ANOTHER_LAW = "[shipped]", "[foreign]", "[law]"  # tags of unions, in brackets, being no keys
+LUGRE = "lugre"  # the law of friction.fmu
 GMS = "gms"  # generalised Maxwell slip, a friction law besides LuGre
 FRICTION_UNITS = {GMS: "friction_gms"}  # law -> unit that has it
 BOOLEAN = ""  # the unit of a signal that is true or false

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from feedsim.identify import Options, Record, identify
 from feedsim.identify.parameters import estimate
 
 I_P, J, M_0, H = 0.02 / (2 * pi), 0.0164, 0.2, 2e-3
-TRUE = Z_AXIS | {"spread": 35.0, "skew": 0.4, "sigma_1": 0.5}
+TRUE = Z_AXIS | {"spread": 35.0, "skew": 0.4, "sigma_1": 0.5, "C": 70.0}
 MOVES = ((5e-6, 10.0, 1.0), (20e-6, 5.0, 1.6), (100e-6, 2.0, 3.0), (400e-6, 1.0, 4.0))  # [m], [Hz], [s]
 
 
@@ -28,9 +29,8 @@ def law(fmus: Path) -> Iterator[FrictionLaw]:
 
 
 @pytest.fixture(scope="module")
-def records() -> list[Record]:
-    """Sines from rest, and a stroke each way; white noise of 10 mN.m."""
-    random = np.random.default_rng(3)
+def solutions() -> list[Record]:
+    """Sines from rest that go from pre-sliding to sliding, without noise."""
     made = []
     for k, (amplitude, frequency, stop) in enumerate(MOVES):
         w = 2 * pi * frequency
@@ -39,8 +39,7 @@ def records() -> list[Record]:
         friction = np.append(0.0, solved(TRUE, motion, t[1:]))
         speed = amplitude / I_P * w * np.sin(w * t)
         torque = friction + J * amplitude / I_P * w**2 * np.cos(w * t) + M_0
-        angle = amplitude / I_P * (1 - np.cos(w * t))
-        made.append(Record(f"sine {k}", t, torque + 0.01 * random.standard_normal(len(t)), speed=speed, angle=angle))
+        made.append(Record(f"sine {k}", t, torque, speed=speed, angle=amplitude / I_P * (1 - np.cos(w * t))))
     return made
 
 
@@ -49,22 +48,27 @@ def options(**more: object) -> Options:
     return Options("Z", I_P, **{**known, **more})  # type: ignore[arg-type]
 
 
-def test_pre_sliding_comes_back(law: FrictionLaw, records: list[Record]) -> None:
-    """The curve over speed is held, as strokes at constant speed would determine it."""
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_pre_sliding_comes_back(law: FrictionLaw, solutions: list[Record], noise: float) -> None:
+    """The curve over speed is held, as strokes at constant speed would determine it. White noise [N.m].
+
+    Without noise nothing hides what is wrong: the intervals hold the model's own errors. The attraction is not the
+    usual one; held there, it would bend damping, spread and skew beyond their intervals.
+    """
+    random = np.random.default_rng(3)
+    records = [replace(one, torque=one.torque + noise * random.standard_normal(len(one.time))) for one in solutions]
     curve = {name: TRUE[name] for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry")}
     found = identify(records, law, options(hold=curve))
     assert not {"W", "gamma"} & set(found.estimates)
     assert found.dynamic is not None
-    assert found.dynamic.rms == pytest.approx(0.01, rel=0.1)  # what is left is the noise
-    for name, share in (("sigma_0", 0.01), ("spread", 0.03), ("sigma_1", 0.1)):
-        each = found.estimates[name]
-        assert each.status == "estimated", each
-        assert each.value == pytest.approx(TRUE[name], rel=share), name
-    assert found.estimates["skew"].value == pytest.approx(TRUE["skew"], abs=0.03)
-    for name in ("sigma_0", "spread", "skew", "M_0"):
+    assert found.dynamic.rms == pytest.approx(noise, rel=0.1, abs=3e-5)  # what is left is the noise
+    shares = {"sigma_0": 0.015, "spread": 0.03, "sigma_1": 0.1, "skew": 0.05, "C": 0.1, "M_0": 0.05}
+    for name, share in shares.items():
         each, true = found.estimates[name], {**TRUE, "M_0": M_0}[name]
-        # twice the interval: four of them at once, and what a log every 2 ms makes of kinks
-        assert abs(each.value - true) < 2 * 1.96 * each.sigma, each
+        assert each.status == "estimated", each
+        assert each.value == pytest.approx(true, rel=share), name
+        assert 1.96 * each.sigma < share * true, each
+        assert abs(each.value - true) < 1.96 * each.sigma, each
 
 
 def test_a_parameter_of_another_law_is_none() -> None:

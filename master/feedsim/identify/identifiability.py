@@ -53,7 +53,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
         return None
     result.sort(key=lambda pair: -pair[0])
     # Damping and engagement first: they lean on the others.
-    order = ("asymmetry", "gamma", "W", "skew", "spread", "F_log", "F_S", "v_s", "sigma_1", "sigma_2")
+    order = ("asymmetry", "gamma", "W", "C", "skew", "spread", "F_log", "F_S", "v_s", "sigma_1", "sigma_2")
     for name in order:
         for _, candidate in result:
             if name in candidate.held:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,6 +52,9 @@ Progress = Callable[[str, float], None]
 FINAL = 1e-9  # tolerance of cost and step for the result
 # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
 MIN_GAIN_PER_PARAMETER = 12.0
+# Of Maxwell slip: no value of them is without effect, so that a fit without them is none with less in it. They are free
+# where the records determine them, also where the usual value happens to be the best one.
+WITHOUT_NEUTRAL = frozenset({"spread", "skew", "C"})
 # In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
 # Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
 REFINEMENTS = (
@@ -63,6 +66,7 @@ REFINEMENTS = (
     ("W", "gamma"),
     ("spread",),
     ("skew",),
+    ("C",),
     ("F_S", "v_s"),  # once more: what engages passed for it, or hid it
     ("F_log",),
 )
@@ -321,7 +325,7 @@ def _refined(
     general = not has_sines(search.models)
     if (
         general
-        and {"sigma_1", "W", "spread", "skew"} & set(added)
+        and {"sigma_1", "W", "spread", "skew", "C"} & set(added)
         and (rows := turnover_rows(search.models, solution)) < MIN_TURNOVER_ROWS
     ):
         reason = f"bristles turn over within {rows:.0f} rows of the log"
@@ -344,7 +348,8 @@ def _refined(
     judged = verdict(tried, added)
     gain = search.cost(solution) - search.cost(tried)
     share = explained(search.models, solution, tried) if general else 1.0
-    if judged is None and gain >= MIN_GAIN_PER_PARAMETER * len(added) and share >= LEAST_EXPLAINED:
+    needed = -inf if not general and set(added) <= WITHOUT_NEUTRAL else MIN_GAIN_PER_PARAMETER * len(added)
+    if judged is None and gain >= needed and share >= LEAST_EXPLAINED:
         for name in added:
             fixed.pop(name, None)
         known.open.pop(tuple(sorted(added)), None)

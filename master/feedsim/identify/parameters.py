@@ -30,7 +30,7 @@ _TABLE = {**variables.parameters("friction"), **{name: row for unit in FRICTION_
           for name, row in variables.parameters(unit).items() if name not in FRICTION_NAMES}}  # fmt: skip
 # What reversals determine (stage 2), and what plateaus of constant speed determine (stage 1), in the order in which it
 # is shown.
-PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma", "spread", "skew")
+PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma", "spread", "skew", "C")
 CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
 RIGID_AXIS_NAMES = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
 # Held at the unit's start values unless they are freed: no record of friction alone determines them well.
@@ -178,7 +178,7 @@ def plateau_ranges(slow: float, fast: float, top: float) -> dict[str, Range]:
 
 # Stage 2, likewise.
 # either way from their start, which is of the right order
-DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5, "spread": 1.5}
+DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5, "spread": 1.5, "C": 1.5}
 DELAYS = (-5e-3, 20e-3)  # [s]: filters and buses make the torque late; what makes it early is less
 MOST_EXCESS = 2.0  # of the friction: static friction beyond three times Coulomb's is none
 MOST_ASYMMETRY = 0.6  # beyond, it plays the constant load's part

@@ -146,6 +146,17 @@ def test_a_record_with_a_peak_keeps_it(record: Record) -> None:
     assert len(said) == 1
 
 
+def test_the_end_of_a_loop_of_friction_is_no_limit() -> None:
+    """A sine within pre-sliding of an axis with a load: its torque is flat where the axis turns, on one side of 0."""
+    t, w = H * np.arange(500), 2 * np.pi * 10.0
+    path = 1.5e-3 * (1 - np.cos(w * t))
+    torque = 0.15 + 250 * path + J * 1.5e-3 * w**2 * np.cos(w * t)
+    torque += 0.01 * np.random.default_rng(2).standard_normal(len(t))
+    (found,), said = without_clipped([Record("small", t, torque, path, 1.5e-3 * w * np.sin(w * t))], J)
+    assert said == ()
+    assert found.clipped is None
+
+
 def test_what_clipping_leaves_open_is_not_determined() -> None:
     """A limit just above the break-away torque leaves the slow plateaus alone. sigma_2 came out as 0, estimated, with
     an interval of six times the truth; the rise with the logarithm as 0.44 N.m +- 112 %. What is offered holds."""

@@ -10,6 +10,8 @@ import pytest
 import feedsim as fs
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
+from feedsim.identify.options import Asked
+from feedsim.identify.read import Provenance
 from feedsim.linear.judgement import Bristles
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
@@ -106,6 +108,24 @@ def test_what_needs_lugre_says_so(fmus: Path) -> None:
         fs.run(scenario, set=[change, "coupling.units=one"], fmus=fmus)
     with pytest.raises(InputError, match=r"axis Z: its friction has the law gms; .* needs LuGre"):
         fs.tune_drive(scenario, "Z", set=[change], fmus=fmus)
+
+
+def test_a_compensation_takes_the_file_of_lugre_alone(tmp_path: Path) -> None:
+    file = tmp_path / "friction.yaml"
+    file.write_text(f"# a remark\n{gms()}\n")
+    with pytest.raises(InputError, match=r"friction\.yaml:2: law: gms is not taken here; allowed: lugre$"):
+        fs.compensate(SCENARIOS / "xz_circle.yaml", friction={"Z": file}, out=tmp_path / "out")
+
+
+@pytest.mark.parametrize(("law", "shared"), [("gms", True), ("lugre", False)])
+def test_identification_falls_back_to_values_of_its_own_law(law: str, shared: bool) -> None:
+    """sigma_0 of another law is another number; the torque over speed is the same."""
+    centre = SCENARIOS / "machines" / "test_centre"
+    machine = fs.load_machine(centre, [f"axes.Z.friction={gms()}"])
+    trace = Provenance(Path("log.csv"), "", "Z", {}, pitch=0.02)
+    fallback = Asked(law=law).with_traces([trace], machine).fallback
+    assert ("sigma_0" in fallback, "spread" in fallback) == (shared, shared)
+    assert (fallback["F_C"], fallback["sigma_2"]) == (1.6, 0.006)
 
 
 def test_at_rest_all_elements_are_springs() -> None:

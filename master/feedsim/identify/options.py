@@ -9,10 +9,10 @@ from pathlib import Path
 
 from feedsim import variables
 from feedsim.errors import InputError
-from feedsim.identify.parameters import PARAMETER_KINDS, Kind, check_fixed, estimate
+from feedsim.identify.parameters import CONSTANT_SPEED, PARAMETER_KINDS, Kind, check_fixed, estimate
 from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
-from feedsim.scenario import Friction, Machine
+from feedsim.scenario import Friction, FrictionParameters, Machine
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
 from feedsim.structure import Modes
 from feedsim.structure.modes import checked_modes
@@ -124,7 +124,7 @@ class Asked:
             hold=self.hold,
             free=self.free,
             # The friction that the machine file has: for parameters that the traces do not determine.
-            fallback={name: float(value) for name, value in friction.parameters().items()} if friction else {},
+            fallback=_of_law(friction, self.law) if friction is not None else {},
             stages=self.stages,
             law=self.law,
         )
@@ -150,3 +150,9 @@ class Asked:
         if not of_mapping or "inertia" in self.estimated:
             return None
         return estimate("J", of_mapping[0], status="given", reason="of the mapping")
+
+
+def _of_law(friction: FrictionParameters, law: str) -> dict[str, float]:
+    """The parameters of a friction that mean the same in a law: of another one the torque over speed."""
+    same = friction.law == law
+    return {name: float(value) for name, value in friction.parameters().items() if same or name in CONSTANT_SPEED}

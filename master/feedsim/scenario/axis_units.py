@@ -72,6 +72,8 @@ class FrictionParameters(ParameterGroup):
         if law not in [*_PARAMETERS_BY_LAW]:
             allowed = ", ".join(_PARAMETERS_BY_LAW)
             raise fault(f"{brief(law)} is no friction law; allowed: {allowed}", beside=("friction", "law"))
+        if law != getattr(cls, "law", law):  # a file that is read for what has one law alone
+            raise fault(f"{law} is not taken here; allowed: {cls.law}", beside=("law",))
         own = _PARAMETERS_BY_LAW[law]
         other = [name for name in data if name not in own and name in _NAMES_OF_LAWS]
         if other:

@@ -13,6 +13,7 @@ from feedsim.errors import InputError
 from feedsim.identify.options import Asked
 from feedsim.identify.read import Provenance
 from feedsim.linear.judgement import Bristles
+from feedsim.report.provenance import axis_parameters
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 PARAMETERS = {
@@ -33,6 +34,9 @@ def test_a_run_is_of_that_law(fmus: Path) -> None:
     assert not {"Z.c", "Z.lambda"} & set(trace.columns)
     friction = result.scenario.machine.axes["Z"].friction
     assert friction.law == "gms"
+    shown = {name: axis_parameters(axis)["friction"] for name, axis in result.scenario.machine.axes.items()}
+    assert shown["Z"]["law"] == ("gms", "")
+    assert "law" not in shown["X"]  # LuGre needs no word
     with FrictionLaw(fmus, "friction_gms") as law:
         parameters = {name: float(value) for name, value in friction.parameters().items()}
         expected = law(parameters, trace["Z.n_a"], float(trace.time[1] - trace.time[0]))

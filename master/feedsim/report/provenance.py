@@ -18,6 +18,7 @@ from feedsim.fields import Quantity
 from feedsim.files.regular import digest
 from feedsim.installation import version
 from feedsim.scenario import Axis, Drive, ForeignUnit, FrictionParameters, Machine, Scenario
+from feedsim.scenario.roles import LUGRE
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
@@ -119,7 +120,9 @@ def _with_units(group: Drive | FrictionParameters | ForeignUnit) -> dict[str, tu
     if isinstance(group, ForeignUnit):  # what it declares, and has not been given here, only its archive knows
         return {"fmu": (group.fmu.name, ""), **{name: (value, "") for name, value in group.parameters.items()}}
     units = dict(_units(type(group)))
-    return {name: (value, units.get(name, "")) for name, value in group.parameters().items()}
+    law = getattr(group, "law", LUGRE)
+    named: dict[str, tuple[Parameter, str]] = {"law": (law, "")} if law != LUGRE else {}
+    return named | {name: (value, units.get(name, "")) for name, value in group.parameters().items()}
 
 
 def _units(model: Any) -> Iterator[tuple[str, str]]:

@@ -49,6 +49,17 @@ recording: {{interval: 1 ms}}
 logging: {{axes: [Z], interval: 2 ms}}
 set: {{machine.structure: null}}
 """
+# Axis Z by another friction law than all else here.
+GMS = """
+name: short move by Maxwell slip
+machine: {machine}
+motions:
+  - {{kind: move, by: {{Z: 0.8 mm}}, feed: 3000 mm/min}}
+  - {{kind: dwell, duration: 60 ms}}
+recording: {{interval: 1 ms}}
+evaluate: [{{kind: positioning, axis: Z}}]
+set: {{machine.structure: null}}
+"""
 BALLBAR = "X [mm],Y [mm]\n{}"
 # What a command cannot do without, besides what is handed to it and --out.
 NEEDED = {
@@ -110,6 +121,13 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             short_scenario(folder)
         else:
             (folder / file).write_text(text.format(machine=centre), encoding="utf-8")
+    gms = folder / "machines" / "gms"
+    shutil.copytree(centre, gms)
+    text, _, group = (gms / "machine.yaml").read_text(encoding="utf-8").rpartition("    friction:")
+    assert "axes:" in text  # Z is the last axis, and its friction the last group
+    assert "drive:" not in group
+    (gms / "machine.yaml").write_text(f"{text}    friction: {folder / 'maxwell' / 'friction.yaml'}\n", encoding="utf-8")
+    (folder / "gms.yaml").write_text(GMS.format(machine=gms), encoding="utf-8")
     (folder / "study.yaml").write_text(STUDY, encoding="utf-8")
     points = "".join(f"{50 - k % 2 * 1e-3},{k * 1e-2}\n" for k in range(40))
     (folder / "line.csv").write_text(BALLBAR.format(points), encoding="utf-8")
@@ -132,6 +150,8 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "run short.yaml --out run", "run logged.yaml --out logged", "run circle.yaml --out circle",
         "ssp short.yaml --out wired.ssp", "ssp short.yaml --one --out one.ssp", "pack short.yaml --out machine.fmu",
         "machine pack machines/test_centre --out plant.fmu", "machine build machines/one_axis --out built",
+        "identify logged/log.csv --axis Z --machine machines/test_centre --law gms --out maxwell",
+        "run gms.yaml --out slip",
         "frf machines/one_axis --no-measure --out frf", "compensate circle.yaml --out compensated",
         "sweep study.yaml --workers 1 --out swept", "show run circle --out shown",
         "compare run/result.csv run/result.csv --report compared.html --json compared.json --junit compared.xml",
@@ -151,7 +171,8 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 SUBJECTS = (
     "capture.json", "capture.csv", "identified", "identified/friction.yaml", "driven", "driven/machine.yaml",
-    "replayed", "replayed/replay.csv",
+    "replayed", "replayed/replay.csv", "maxwell", "maxwell/friction.yaml", "machines/gms", "gms.yaml", "slip",
+    "slip/result.csv",
     "short.yaml", "circle.yaml", "study.yaml", "list.yaml", "open.json", "machines/test_centre", "machines/one_axis",
     "machines/sinumerik_840d", "machines/emps", "machines/test_centre/machine.yaml",
     "machines/test_centre/structure.yaml", "machines/test_centre/modes.csv", "run", "run/result.csv",

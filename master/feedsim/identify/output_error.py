@@ -55,6 +55,8 @@ MIN_GAIN_PER_PARAMETER = 12.0
 # Of Maxwell slip: no value of them is without effect, so that a fit without them is none with less in it. They are free
 # where the records determine them, also where the usual value happens to be the best one.
 WITHOUT_NEUTRAL = frozenset({"spread", "skew", "C"})
+# Also beside a stage 1 sought last: free from the start it leads astray where the axis is of another law.
+LATE = frozenset({"C"})
 # In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
 # Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
 REFINEMENTS = (
@@ -151,12 +153,15 @@ def dynamic(
     search = Search(fine, known.prior, _weights(fine, results, weights))
     fixed = dict(known.held)
     results, base = _told(search, results, base, known, fixed)
-    if prior is None:
-        groups = [group for group in REFINEMENTS if set(group) <= set(law.names)]
-        for k, group in enumerate(groups):
-            tell("refinements", 0.4 + 0.48 * k / len(groups))
-            results, base = _refined(search, coarse, results, base, group, known, fixed)
-            search = Search(fine, known.prior, _weights(fine, results, weights))
+    groups = [group for group in REFINEMENTS if set(group) <= set(law.names)]
+    if WITHOUT_NEUTRAL & set(law.names):
+        groups.append(("sigma_1",))  # once more: beside the usual spread it may not have shown
+    if prior is not None:
+        groups = [group for group in groups if LATE & set(group)]
+    for k, group in enumerate(groups):
+        tell("refinements", 0.4 + 0.48 * k / len(groups))
+        results, base = _refined(search, coarse, results, base, group, known, fixed)
+        search = Search(fine, known.prior, _weights(fine, results, weights))
     tell("final fit", 0.9)
     results = search.solve(results.values, results.states, base, tolerance=FINAL, limit=40)
     results, base = _told(search, results, base, known, fixed)
@@ -256,7 +261,8 @@ def _base(known: _Known, names: Collection[str], with_prior: bool, with_delay: b
     """What is free at first."""
     wanted = ["sigma_0", "J", *(["delay"] if with_delay else [])]
     if with_prior:
-        wanted += [*(name for name in PRE_SLIDING if name not in wanted and name in names), *STATIONARY]
+        own = (name for name in PRE_SLIDING if name not in wanted and name in names and name not in LATE)
+        wanted += [*own, *STATIONARY]
         wanted += [name for name in DEFAULT_SHAPES if name in known.told]
     else:
         wanted += ["F_C", "sigma_2", "M_0", *(name for name in DEFAULT_SHAPES if name not in known.held)]

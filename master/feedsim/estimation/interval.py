@@ -50,7 +50,7 @@ def reason(value: float, half: float, of: str = "") -> str:
     return f"{whose} is +-{100 * half / max(abs(value), 1e-300):.0f} % of the value"
 
 
-def student(free: int) -> float:
+def student(free: float) -> float:
     """Quantile 0.975 of Student's distribution of so many degrees of freedom, to 2e-7 of its value.
 
     Many: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 1964, 26.7.5. Few: SciPy, whose special

@@ -317,6 +317,7 @@ def test_on_paper_panels_stand_side_by_side(pages: dict[str, Any]) -> None:
     page = pages["circle"]
     size = page.viewport_size
     page.set_viewport_size({"width": 680, "height": 900})
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     across = page.evaluate(
         "() => [...document.querySelectorAll('figure.chart')].map(each => "

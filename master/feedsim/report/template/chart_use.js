@@ -420,6 +420,7 @@ addEventListener("resize", () => {
 const SHEET = 0.9; // height of a chart against its width
 const opened = []; // what is folded is printed
 addEventListener("beforeprint", () => {
+  cancelAnimationFrame(frame); // of a window that was resized a moment ago
   for (const part of document.querySelectorAll("details:not([open])")) { opened.push(part); part.open = true; }
   while (waiting.length) begin(waiting.shift());
   for (const live of lives) {

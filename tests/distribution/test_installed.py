@@ -45,7 +45,7 @@ class Installation:
         self.python = self.home / ("Scripts" if os.name == "nt" else "bin") / Path(sys.executable).name
         into = ["--python", str(self.python), "install", "--no-index", "--no-deps", str(wheel)]
         subprocess.run([*PIP, *into], check=True)
-        (packages,) = {path.parent for path in self.home.rglob("feedsim") if path.is_dir()}
+        (packages,) = {path.parents[1] for path in self.home.rglob("feedsim/__init__.py")}
         # A .pth file in a folder that a .pth file names counts for nothing: the checkout's own is not followed.
         borrowed = [path for path in sys.path if path.endswith("site-packages")]
         (packages / "borrowed.pth").write_text("\n".join(borrowed))
@@ -206,6 +206,6 @@ def test_results_say_nothing_of_where_it_is_installed(installed: Installation) -
 def test_nothing_is_written_into_the_installation(wheel: Path, installed: Installation) -> None:
     with zipfile.ZipFile(wheel) as opened:
         names = {name for name in opened.namelist() if name.startswith("feedsim/shipped/")}
-    (package,) = (path for path in installed.home.rglob("feedsim") if path.is_dir())
+    (package,) = (path.parent for path in installed.home.rglob("feedsim/__init__.py"))
     there = {path.relative_to(package.parent).as_posix() for path in (package / "shipped").rglob("*") if path.is_file()}
     assert there == names

@@ -70,7 +70,7 @@ typedef struct Plant {
     bool driven; /* a motor with a transmission */
     Transmission *transmissions;
 
-    /* What follows counts where one of both is. */
+    /* What follows counts where there is a guide or a transmission. */
     Forecast *forecasts;                  /* [PORTS_SHOWN][axes], for */
     const Modal *foretold;                /* this modal system */
     double foretold_h;                    /* and this step */

@@ -56,7 +56,7 @@ def test_what_differs_is_told(results: tuple[Path, Path], tmp_path: Path, capsys
 def test_a_compensated_run_lies_beside_a_run(
     results: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its turn with compensation has the names of a run; what only one of both has stands in the table."""
+    """Its turn with compensation has the names of a run; what only one result has stands in the table."""
     compensated = tmp_path / "compensated"
     shutil.copytree(results[0], compensated)
     told = json.loads((compensated / "summary.json").read_text())

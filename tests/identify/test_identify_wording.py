@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.identify.identifiability import GOES_WITH, verdict
-from feedsim.identify.output_error import _doubts
+from feedsim.identify.identifiability import GOES_WITH, doubts, verdict
 from feedsim.identify.parameters import EXCESS
 from identification_helpers import TRUE, estimates, stationary
 
@@ -79,9 +78,9 @@ def test_each_reason_is_said_once() -> None:
     }
     said = ("sigma_1: its 95 % interval is +-135 % of the value", "M_0 and asymmetry: one direction only",
             "gamma: its 95 % interval is +-278 % of the value")  # fmt: skip
-    assert _doubts(held, None) == said
+    assert doubts(held, None) == said
     # What stage 1 hands on it has said itself.
     first = stationary(estimates())
     load = replace(first.estimates["M_0"], status="undetermined", reason="one direction only")
     prior = replace(first, estimates={**first.estimates, "M_0": load})
-    assert _doubts(held, prior) == (said[0], "asymmetry: one direction only", said[2])
+    assert doubts(held, prior) == (said[0], "asymmetry: one direction only", said[2])

@@ -9,6 +9,7 @@ import numpy as np
 
 from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason, shows
 from feedsim.identify.parameters import NO_EFFECT, PARAMETER_KINDS, inner, outer
+from feedsim.identify.result import Stationary, Status
 from feedsim.identify.search import Solution
 from feedsim.identify.torque import RecordTorque, deflection
 
@@ -169,3 +170,26 @@ def _reversals(model: RecordTorque) -> list[int]:
         between = n[fast[k] : fast[k + 1] + 1] * sides[k]
         indexes.append(int(fast[k] + np.argmax(between <= 0)))
     return indexes
+
+
+def extrapolated(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[str, ...]:
+    """A warning where sines alone determine the friction over speed."""
+    if prior is not None or not has_sines(fine):
+        return ()
+    top = max(float(np.max(np.abs(model.moved(0.0)[1]))) for model in fine)
+    shown = f"{top:.3g} rad/s" if I_P is None else f"{60e3 * top * I_P:.3g} mm/min"
+    return (
+        f"the records of sines determine the friction up to {shown}, their highest speed: above it is extrapolated and "
+        "not to be relied on; strokes at constant speed determine the curve",
+    )
+
+
+def doubts(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[str, ...]:
+    """What is undetermined and why, a sentence per reason; what stage 1 hands on it has said itself."""
+    names: dict[str, list[str]] = {}
+    for name, (status, why) in fixed.items():
+        before = prior.estimates.get(name) if prior is not None else None
+        handed_on = before is not None and (before.status, before.reason) == (status, why)
+        if status == "undetermined" and why and not handed_on and not why.startswith(GOES_WITH):
+            names.setdefault(why, []).append(name)
+    return tuple(f"{' and '.join(name)}: {why}" for why, name in names.items())

@@ -19,7 +19,9 @@ from feedsim.identify.identifiability import (
     LEAST_REVERSALS,
     MIN_TURNOVER_ROWS,
     Verdict,
+    doubts,
     explained,
+    extrapolated,
     has_sines,
     no_delay,
     reversals,
@@ -423,31 +425,8 @@ def _result(
         rms,
         without,
         advice(pieces, estimates, without, deflection(result.values), I_P),
-        (*_doubts(fixed, prior), *limits(honest, names, fine), *_speeds(fine, prior, I_P)),
+        (*doubts(fixed, prior), *limits(honest, names, fine), *extrapolated(fine, prior, I_P)),
     )
-
-
-def _speeds(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[str, ...]:
-    """A warning where sines alone determine the friction over speed."""
-    if prior is not None or not has_sines(fine):
-        return ()
-    top = max(float(np.max(np.abs(model.moved(0.0)[1]))) for model in fine)
-    shown = f"{top:.3g} rad/s" if I_P is None else f"{60e3 * top * I_P:.3g} mm/min"
-    return (
-        f"the records of sines determine the friction up to {shown}, their highest speed: above it is extrapolated and "
-        "not to be relied on; strokes at constant speed determine the curve",
-    )
-
-
-def _doubts(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[str, ...]:
-    """What is undetermined and why, a sentence per reason; what stage 1 hands on it has said itself."""
-    names: dict[str, list[str]] = {}
-    for name, (status, reason) in fixed.items():
-        before = prior.estimates.get(name) if prior is not None else None
-        handed_on = before is not None and (before.status, before.reason) == (status, reason)
-        if status == "undetermined" and reason and not handed_on and not reason.startswith(GOES_WITH):
-            names.setdefault(reason, []).append(name)
-    return tuple(f"{' and '.join(name)}: {reason}" for reason, name in names.items())
 
 
 def _stretches(model: RecordTorque, weight: Array, values: Mapping[str, float], z: float, c: float) -> list[Stretch]:

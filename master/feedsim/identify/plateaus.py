@@ -82,7 +82,7 @@ class _Motion:
             self.travel = np.concatenate([[0.0], np.cumsum(steps)])
             self.blocks = uniform_filter1d(record.speed, self.rows, mode="nearest")
         else:
-            assert record.angle is not None  # the record makes sure of one of both
+            assert record.angle is not None  # the record has a speed or an angle
             self.signal = self.travel = record.angle
             spread = np.pad(record.angle, half, mode="reflect", reflect_type="odd")
             self.blocks = (spread[2 * half :] - spread[: len(spread) - 2 * half]) / (2 * half * self.interval)

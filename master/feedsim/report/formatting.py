@@ -141,3 +141,19 @@ def three(value: float) -> str:
         return "–"
     whole = abs(value) >= 100 or 0 < abs(value) < EXPONENT_BELOW
     return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
+
+
+def with_interval(value: float, ends: tuple[float, float]) -> str:
+    """A value with its interval, both with the digits that the interval leaves."""
+    low, high = ends
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return number(value, 3)
+    width = max(value - low, high - value)
+    return " ".join([rounded(value, width), f"({rounded(low, width)} to {rounded(high, width)})"])
+
+
+def rounded(value: float, doubt: float) -> str:
+    """A number to the second digit of its doubt."""
+    if not (math.isfinite(value) and math.isfinite(doubt) and doubt > 0):
+        return number(value)
+    return minus(f"{value:.{max(0, 1 - math.floor(math.log10(doubt)))}f}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.report.content import FOLDER, LEAD_ROWS, Paragraph, Part, Report, Section, Table, Text, Tile, code, typed
-from feedsim.report.formatting import counted, minus, number, three
+from feedsim.report.formatting import counted, minus, number, rounded, three, with_interval
 from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.sections import parameters_section, provenance_section
@@ -291,22 +291,6 @@ def _statistics(account: Account) -> Section | None:
     reported += " Nominal: the scenario without changes." if nominal else ""
     table = Table("ll" + "r" * (len(heads) - 2), heads, rows, f"Over the runs that have the figure. {reported}")
     return Section("Figures of all runs", [table], "figures") if rows else None
-
-
-def with_interval(value: float, ends: tuple[float, float]) -> str:
-    """A value with its interval, both with the digits that the interval leaves."""
-    low, high = ends
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return number(value, 3)
-    width = max(value - low, high - value)
-    return " ".join([rounded(value, width), f"({rounded(low, width)} to {rounded(high, width)})"])
-
-
-def rounded(value: float, doubt: float) -> str:
-    """A number to the second digit of its doubt."""
-    if not (math.isfinite(value) and math.isfinite(doubt) and doubt > 0):
-        return number(value)
-    return minus(f"{value:.{max(0, 1 - math.floor(math.log10(doubt)))}f}")
 
 
 def _sensitivities(account: Account) -> Section | None:

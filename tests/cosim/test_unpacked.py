@@ -31,7 +31,7 @@ def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder = tmp_path / "scratch"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    STORE.clear()
+    monkeypatch.setattr(STORE, "_contents", {})  # what other tests of this process may still use stays out of it
     yield folder
     STORE.clear()
 

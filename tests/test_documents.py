@@ -64,12 +64,12 @@ def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypat
     for command in commands:
         options = cli.parser().parse_args(command)
         if command[0] == "ssp":
-            scenario.load(options.scenario, options.overrides)
+            scenario.load(options.scenario, options.set)
             options.out.symlink_to(written)
             continue
         if options.scenario.name == "x.ssp":  # what the page calls any such file
             options.scenario = written
-        with ssp.opened(options.scenario, options.overrides) as found:
+        with ssp.opened(options.scenario, options.set) as found:
             assert found.scenario.machine.axes
 
 

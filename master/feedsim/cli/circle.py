@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import CONTROL, FIGURES, QUIET_OPTION, Command, Option, names, out, pairs
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch
 errors, each with interval and share of G, in words. Files are CSV with units in the header, with positions of both axes
@@ -24,19 +24,9 @@ def circle(options: Namespace) -> None:
     from feedsim.jobs.circle import circle
 
     out: Path = options.out or Path("results") / f"circle_{options.records[0].stem}"
-    with watching(options.quiet) as watch:
-        result = circle(
-            options.records,
-            options.axes,
-            radius=options.radius,
-            feed=options.feed,
-            centre=pairs("centre", options.centre, "AXIS=POSITION is needed, e.g. X=10mm"),
-            pitch=pairs("pitch", options.pitch, "AXIS=LENGTH is needed, e.g. X=10mm"),
-            out=out,
-            figures=options.figures,
-            control=options.control,
-            watch=watch,
-        )
+    centre = pairs("centre", options.centre, "AXIS=POSITION is needed, e.g. X=10mm")
+    pitch = pairs("pitch", options.pitch, "AXIS=LENGTH is needed, e.g. X=10mm")
+    result = call(circle, options, out=out, centre=centre, pitch=pitch)
     finish(options.quiet, result.findings, *result.lines, f"-> {out / 'report.html'}")
 
 

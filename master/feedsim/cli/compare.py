@@ -7,7 +7,7 @@ import traceback
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import Command, Group, Option
+from feedsim.cli.options import Command, Group, Option, arguments
 from feedsim.cli.terminal import visible
 
 DESCRIPTION = """Compare results of any simulator, or measured records, with references: every row of the result must
@@ -33,34 +33,7 @@ def compare(options: Namespace) -> int:
     from feedsim.jobs.compare import compare
 
     try:
-        result = compare(
-            *options.files,
-            tol=options.tol,
-            tolerances=options.tolerances,
-            column=options.column,
-            only=options.only,
-            ignore=options.ignore,
-            common=options.common,
-            hold=options.hold,
-            unit=options.unit,
-            time=options.time,
-            columns=options.columns,
-            reference_unit=options.reference_unit,
-            reference_time=options.reference_time,
-            reference_columns=options.reference_columns,
-            axis=options.axis,
-            machine=options.machine,
-            start=options.start,
-            end=options.end,
-            shift=options.shift,
-            max_shift=options.max_shift,
-            cover=options.cover,
-            max_gap=options.max_gap,
-            at=options.at,
-            report=options.report,
-            junit=options.junit,
-            json=options.json,
-        )
+        result = compare(*options.files, **arguments(compare, options))
         lines = [] if options.quiet else result.listed(everything=options.all)
     except FeedsimError as error:
         print(*(visible(line) for line in f"feedsim: {error}".split("\n")), sep="\n", file=sys.stderr)

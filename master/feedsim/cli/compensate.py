@@ -6,7 +6,7 @@ from argparse import BooleanOptionalAction, Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, out, pairs, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Run a circle without and with friction compensation. A friction model, driven by the speed setpoint
 with the lag of the axis, gives a torque that is added to the torque setpoint of every axis that moves. Without
@@ -25,19 +25,9 @@ def compensate(options: Namespace) -> None:
     from feedsim.jobs.compensate import compensate
 
     out: Path = options.out or Path("results") / f"compensate_{options.scenario.stem}"
-    with watching(options.quiet, "it", shortened=True) as watch:
-        result = compensate(
-            options.scenario,
-            friction=pairs("friction", options.frictions, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml"),
-            delay=pairs("delay", options.delays, "[AXIS=]VALUE is needed, such as Z='4.2 ms'", common=True),
-            table=options.table,
-            uncertain=options.uncertain,
-            set=options.overrides,
-            fmus=options.fmus,
-            out=out,
-            figures=options.figures,
-            watch=watch,
-        )
+    friction = pairs("friction", options.friction, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
+    delay = pairs("delay", options.delay, "[AXIS=]VALUE is needed, such as Z='4.2 ms'", common=True)
+    result = call(compensate, options, "it", shortened=True, out=out, friction=friction, delay=delay)
     name = result.compensation.scenario.name
     finish(options.quiet, result.findings, f"{name}: friction compensation -> {out / 'report.html'}", *result.lines)
 
@@ -51,10 +41,10 @@ COMMAND = Command(
         out("compensate_<name of the file>"), FIGURES,
         Option("--friction", "AXIS=FILE.yaml",
                "friction parameters that the compensation of an axis uses (default: the machine's own, which the "
-               "machine keeps in any case); may be given several times", many=True, dest="frictions"),
+               "machine keeps in any case); may be given several times", many=True),
         Option("--delay", "[AXIS=]VALUE",
                "delay of the feedforward behind the speed setpoint, e.g. '4.2 ms' (default: from the parameters of the "
-               "drive); may be given several times", many=True, dest="delays"),
+               "drive); may be given several times", many=True),
         Option("--table", "",
                "with the runs that show what errors of the delay and of the parameters cost (default: yes)",
                action=BooleanOptionalAction, default=True),

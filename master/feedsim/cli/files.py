@@ -7,7 +7,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import Command, Option
+from feedsim.cli.options import Command, Option, arguments
 
 
 def schema(options: Namespace) -> None:
@@ -22,7 +22,7 @@ def convert(options: Namespace) -> None:
     """feedsim convert."""
     from feedsim.jobs.convert import convert
 
-    print(f"{options.out}: {convert(options.file, options.out, column=options.column).answers[0]}")
+    print(f"{options.out}: {convert(**arguments(convert, options)).answers[0]}")
 
 
 FILE_KINDS = ("scenario", "machine", "structure", "columns", "tolerances", "study")

@@ -6,7 +6,7 @@ from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Group, Option, names, out, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Frequency responses of a machine's feed drives: speed-controlled system n/M, reference frequency
 response of the speed controller, position loop, loop gains with their margins, x/M, and the compliance at the tool. In
@@ -26,30 +26,7 @@ def frf(options: Namespace) -> None:
 
     named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name
     out: Path = options.out or Path("results") / f"frf_{named}"
-    with watching(options.quiet, " cycles", shortened=True) as watch:
-        result = frf(
-            options.subject,
-            options.axes,
-            set=options.overrides,
-            band=options.band,
-            tool=options.tool,
-            overlay=options.overlays,
-            full_model=options.full_model,
-            measure=options.measure,
-            excitation=options.excitation,
-            inject=options.inject,
-            amplitude=options.amplitude,
-            periods=options.periods,
-            settle=options.settle,
-            realisations=options.realisations,
-            seed=options.seed,
-            friction=options.friction,
-            offset_speed=options.offset_speed,
-            fmus=options.fmus,
-            out=out,
-            figures=options.figures,
-            watch=watch,
-        )
+    result = call(frf, options, " cycles", shortened=True, out=out)
     finish(options.quiet, result.findings, *result.lines, f"-> {out / 'report.html'}")
 
 
@@ -75,7 +52,7 @@ COMMAND = Command(
                action=BooleanOptionalAction, default=True),
         Option("--overlay", "FILE[:RESPONSE[=NAME]]",
                "lay a curve from a CSV or UFF58 file over, e.g. measured.csv:Z.n_a/Z.M_a; may be given several times",
-               many=True, dest="overlays"),
+               many=True),
         Option("--full-model", "",
                "where the machine names its structure: compare with all modes of the finite-element model "
                "(default: yes)", action=BooleanOptionalAction, default=True),

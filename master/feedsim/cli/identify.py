@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FIGURES, FMUS, Command, Group, Option, names, out, pairs
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Friction parameters of an axis from recorded traces: the Stribeck curve from stretches at constant
 speed, pre-sliding from moves that reverse, with confidence intervals. Leaves friction.yaml, which scenarios and machine
@@ -29,24 +29,9 @@ def identify(options: Namespace) -> None:
     from feedsim.report.identify import terminal_lines, terminal_warnings
 
     out: Path = options.out or Path("results") / f"identify_{AXIS}"
-    with watching(options.quiet) as watch:
-        result = identify(
-            options.traces,
-            options.axis,
-            options.machine,
-            columns=options.columns,
-            inertia=options.inertia,
-            mass=options.mass,
-            delay=options.delay,
-            hold=pairs("hold", [part for text in options.hold for part in names(text)], HOLD_NEEDS),
-            free=[name for text in options.free for name in names(text)],
-            stages=options.stages,
-            law=options.law,
-            fmus=options.fmus,
-            out=out,
-            figures=options.figures,
-            watch=watch,
-        )
+    hold = pairs("hold", [part for text in options.hold for part in names(text)], HOLD_NEEDS)
+    free = [name for text in options.free for name in names(text)]
+    result = call(identify, options, out=out, hold=hold, free=free)
     folder = Path(str(out).replace(AXIS, result.found.axis.lower()))
     # Without the table, all warnings: it holds the reasons that some only repeat.
     warnings = result.findings if options.quiet else terminal_warnings(result.identified)

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FIGURES, QUIET_OPTION, Command, Option, out, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Elastic modes of an axis from a measured response: time signals (--input, --motor) or a file of
 frequency responses (--motor). Rigid motion, delays and modes, whose number cross-validation decides; written as the
@@ -24,25 +24,7 @@ def identify_modes(options: Namespace) -> None:
     from feedsim.jobs.identify_modes import identify_modes
 
     out: Path = options.out or Path("results") / f"modes_{options.response.stem}"
-    with watching(options.quiet) as watch:
-        result = identify_modes(
-            options.response,
-            options.machine,
-            options.axis,
-            input=options.input,
-            motor=options.motor,
-            scale=options.scale,
-            sensor=options.sensors,
-            modes=options.modes,
-            band=options.band,
-            period=options.period,
-            time=options.time,
-            interval=options.interval,
-            set=options.overrides,
-            out=out,
-            figures=options.figures,
-            watch=watch,
-        )
+    result = call(identify_modes, options, out=out)
     where = f"modes of {result.axis.axis} from {options.response.name} -> {out / 'report.html'}"
     finish(options.quiet, result.findings, where, *result.lines)
 
@@ -59,7 +41,7 @@ COMMAND = Command(
         Option("--input", "NAME[:UNIT]", "of time signals: torque or current; of several runs NAME,NAME:UNIT"),
         Option("--motor", "NAME[:UNIT]", "angle, speed or acceleration of the motor (default: the only response)"),
         Option("--scale", "NAME[:UNIT]", "position, speed or acceleration at the scale, or at the load"),
-        Option("--sensor", "NAME[:UNIT]", "a further sensor; may be given several times", many=True, dest="sensors"),
+        Option("--sensor", "NAME[:UNIT]", "a further sensor; may be given several times", many=True),
         Option("--modes", "0..5|auto", "how many modes (default: auto, by cross-validation)", default="auto"),
         Option("--band", "LOW..HIGH", "lines that are used, e.g. 11Hz..250Hz (default: all that are excited)"),
         Option("--period", "SAMPLES", "period of the excitation (default: looked for)", type=int),

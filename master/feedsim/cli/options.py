@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from feedsim.errors import InputError
-
-T = TypeVar("T")
 
 
 class Option:
@@ -160,32 +158,14 @@ def typed(text: str) -> str:
 def settings(example: str = "machine.axes.Z.friction.F_C='1.8 N.m'") -> Option:
     """--set, with an example of KEY=VALUE."""
     words = f"override one entry, e.g. {example}, or those of a YAML file with a group set; may be given several times"
-    return Option("--set", "KEY=VALUE", words, dest="overrides", many=True, type=typed)
+    return Option("--set", "KEY=VALUE", words, many=True, type=typed)
 
 
-@contextmanager
-def given(option: str, text: str) -> Iterator[None]:
-    """Have a fault that the block finds say which option it is of: "--delay 3 kg: ..."."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"--{option} {text}: {error}") from None
-
-
-def quantity(option: str, text: str, unit: str, example: str = "", *, positive: bool = False) -> float:
-    """The value of a text in `unit`; positive: above 0. Raises InputError."""
-    with given(option, text):
-        return amount(text, unit, example, positive=positive)
-
-
-def amount(text: str, unit: str, example: str = "", *, positive: bool = False) -> float:
-    """As :func:`quantity`, of a text that is a part of what was typed."""
-    from feedsim import units
-
-    value = units.parse(text, unit, example)
-    if positive and value <= 0:
-        raise InputError(f"more than zero is needed, e.g. {example}")
-    return value
+def arguments(job: Callable[..., Any], options: Namespace) -> dict[str, Any]:
+    """What the options of a command say of the parameters of its job, which have their names."""
+    said = vars(options)
+    parameters = inspect.signature(job).parameters.values()
+    return {each.name: said[each.name] for each in parameters if each.name in said and each.kind != each.VAR_POSITIONAL}
 
 
 def halves(option: str, text: str, needed: str) -> tuple[str, str]:
@@ -196,33 +176,19 @@ def halves(option: str, text: str, needed: str) -> tuple[str, str]:
     return left, right
 
 
-def by_name(
-    option: str, texts: Sequence[str], needed: str, read: Callable[[str, str], T], *, common: bool = False
-) -> dict[str, T]:
-    """Name -> what `read` makes of name and value, of texts NAME=VALUE, such as AXIS=POSITION.
+def pairs(option: str, texts: Sequence[str], needed: str, *, common: bool = False) -> dict[str, str]:
+    """Name -> text of texts NAME=TEXT, such as AXIS=POSITION.
 
-    needed: as for :func:`halves`. common: a value without a name is allowed, and stands under "".
-    Raises InputError, which names the option and the text: no such form, a name twice, what `read` finds.
+    needed: as for :func:`halves`. common: a text without a name is allowed, and stands under "".
+    Raises InputError, which names the option and the text: no such form, a name twice.
     """
-    result: dict[str, T] = {}
+    result: dict[str, str] = {}
     for text in texts:
         name, value = ("", text) if common and "=" not in text else halves(option, text, needed)
-        with given(option, text):
-            if name in result:
-                raise InputError(f"{name or 'that of all axes'} is given twice")
-            result[name] = read(name, value)
+        if name in result:
+            raise InputError(f"--{option} {text}: {name or 'that of all axes'} is given twice")
+        result[name] = value
     return result
-
-
-def pairs(option: str, texts: Sequence[str], needed: str, *, common: bool = False) -> dict[str, str]:
-    """Name -> text of texts NAME=TEXT; needed, common, errors: as of :func:`by_name`."""
-    return by_name(option, texts, needed, lambda _, text: text, common=common)
-
-
-def lengths(option: str, texts: Sequence[str], value: str, example: str, *, positive: bool = False) -> dict[str, float]:
-    """Axis -> length [m] of texts such as X=800mm; value: what it is called. Raises InputError as :func:`by_name`."""
-    needed = f"AXIS={value} is needed, e.g. X={example}"
-    return by_name(option, texts, needed, lambda _, text: amount(text, "m", example, positive=positive))
 
 
 def names(text: str) -> tuple[str, ...]:

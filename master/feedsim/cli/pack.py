@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FMUS, Command, Option, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 TEXT = """Pack structure, drives and friction of all axes, coupled at the control cycle, into one FMI 2.0 co-simulation
 unit; no compiler is needed. Of a scenario the motion is inside, so that the unit needs no inputs; of a machine, and
@@ -24,16 +24,7 @@ def pack(options: Namespace) -> None:
     """feedsim pack."""
     from feedsim.jobs.pack import pack
 
-    with watching(quiet=False) as watch:
-        made = pack(
-            options.subject,
-            options.out,
-            inputs=options.inputs,
-            base=options.base,
-            fmus=options.fmus,
-            set=options.overrides,
-            watch=watch,
-        )
+    made = call(pack, options)
     finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FMUS, Command, Option, names, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 TEXT = """Write one file of HTML that holds the scenario's machine: the compiled unit as WebAssembly, its modes, drives
 and frictions, and knobs. It opens from disk, in a mail, on a phone; contour, stop, torque and frequency response follow
@@ -22,15 +22,7 @@ def page(options: Namespace) -> None:
     """feedsim page."""
     from feedsim.jobs.write_page import write_page
 
-    with watching(quiet=False, unit=" cycles", shortened=True) as watch:
-        made = write_page(
-            options.scenario,
-            options.out,
-            knobs=options.knobs or (),
-            fmus=options.fmus,
-            set=options.overrides,
-            watch=watch,
-        )
+    made = call(write_page, options, " cycles", shortened=True, knobs=options.knobs or ())
     finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET_OPTION, Command, Option, out, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 REPLAY_DESCRIPTION = """Run the position setpoints of a record through the simulated axes, in closed loop, and show
 what is left of position, torque and speed setpoint: over time, as figures, as a spectrum and over the position."""
@@ -33,21 +33,7 @@ def replay(options: Namespace) -> None:
     from feedsim.jobs.replay import replay
 
     out: Path = options.out or Path("results") / f"replay_{options.record.stem}"
-    with watching(options.quiet) as watch:
-        result = replay(
-            options.record,
-            options.machine,
-            options.axes,
-            columns=options.columns,
-            window=options.window,
-            open_loop=options.open_loop,
-            set=options.overrides,
-            fmus=options.fmus,
-            out=out,
-            figures=options.figures,
-            control=options.control,
-            watch=watch,
-        )
+    result = call(replay, options, out=out)
     head = f"{result.replayed.subject.machine.name} on {options.record.name} -> {out / 'report.html'}"
     finish(options.quiet, result.findings, head, *result.lines)
 
@@ -57,23 +43,7 @@ def identify_drive(options: Namespace) -> None:
     from feedsim.jobs.identify_drive import identify_drive
 
     out: Path = options.out or Path("results") / f"drive_{options.record.stem}"
-    with watching(options.quiet) as watch:
-        result = identify_drive(
-            options.record,
-            options.axes,
-            options.machine,
-            columns=options.columns,
-            window=options.window,
-            position_cycle=options.position_cycle,
-            modes=options.modes,
-            name=options.name,
-            set=options.overrides,
-            fmus=options.fmus,
-            out=out,
-            figures=options.figures,
-            control=options.control,
-            watch=watch,
-        )
+    result = call(identify_drive, options, out=out)
     drives_found = result.drives.found
     head = f"drive of {', '.join(drives_found.drives)} from {options.record.name} -> {out / 'report.html'}"
     written = (

@@ -5,8 +5,19 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, out, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.options import (
+    CONTROL,
+    FIGURES,
+    FMUS,
+    QUIET_OPTION,
+    UNCERTAIN,
+    Command,
+    Option,
+    arguments,
+    out,
+    settings,
+)
+from feedsim.cli.terminal import call, finish, watching
 from feedsim.errors import InputError
 
 SSP_TEXT = """Write a scenario as one SSP file (System Structure and Parameterization 1.0): the plant packed with the
@@ -29,17 +40,7 @@ def run(options: Namespace) -> None:
     if options.trial:
         _check_trial(options.scenario, out)
     with watching(options.quiet, " cycles", shortened=True) as watch:
-        result = run(
-            options.scenario,
-            set=options.overrides,
-            page=options.page,
-            uncertain=options.uncertain,
-            fmus=options.fmus,
-            out=out,
-            figures=options.figures,
-            control=options.control,
-            watch=watch,
-        )
+        result = run(**arguments(run, options) | {"out": out}, watch=watch)
         trial: tuple[str, ...] = ()
         if options.trial:
             from feedsim.jobs.tried import tried
@@ -63,7 +64,7 @@ def validate(options: Namespace) -> None:
     """feedsim validate."""
     from feedsim.jobs.validate import validate
 
-    done = validate(options.scenario, set=options.overrides, fmus=options.fmus)
+    done = validate(**arguments(validate, options))
     finish(False, done.findings, *done.answers)
 
 
@@ -71,10 +72,7 @@ def write_ssp(options: Namespace) -> None:
     """feedsim ssp."""
     from feedsim.jobs.write_ssp import write_ssp
 
-    with watching(quiet=False) as watch:
-        made = write_ssp(
-            options.scenario, options.out, one=options.one, fmus=options.fmus, set=options.overrides, watch=watch
-        )
+    made = call(write_ssp, options)
     finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 

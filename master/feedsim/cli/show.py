@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from functools import partial
 from pathlib import Path
 
 from feedsim.cli.options import CONTROL, FIGURES, QUIET_OPTION, Command, Option, out
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Lay results of feedsim run, recorded CSV files and runs of studies over each other: contours of
 circles, stops, following error, torque, speed, position and spectra, a table of their figures with differences, and
@@ -28,8 +29,7 @@ def show(options: Namespace) -> None:
     from feedsim.jobs.show import show
 
     out: Path = options.out or Path("results") / "show"
-    with watching(options.quiet) as watch:
-        over = show(*options.results, out=out, figures=options.figures, control=options.control, watch=watch)
+    over = call(partial(show, *options.results), options, out=out)
     finish(options.quiet, over.findings, *over.lines, f"-> {out / 'report.html'}")
 
 

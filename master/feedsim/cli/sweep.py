@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Option, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Option, arguments, out, settings
 from feedsim.cli.terminal import announce, finish, warn, watching
 
 if TYPE_CHECKING:
@@ -45,19 +45,7 @@ def sweep(options: Namespace) -> int:
     begun = perf_counter()
     with watching(options.quiet, " runs") as watch:
         try:
-            result = sweep(
-                options.study,
-                out,
-                set=options.overrides,
-                runs=options.runs,
-                workers=options.workers,
-                scheduler=options.scheduler,
-                format=options.format,
-                restart=options.restart,
-                fmus=options.fmus,
-                figures=options.figures,
-                watch=watch,
-            )
+            result = sweep(**arguments(sweep, options) | {"out": out}, watch=watch)
         except KeyboardInterrupt:
             done = (
                 f"{watch.done} of {watch.total} runs are done and kept in" if watch.total else "what is done is kept in"
@@ -75,7 +63,7 @@ def _described(options: Namespace) -> int:
     from feedsim.scenario.study import load_study
     from feedsim.sweep import design
 
-    study = load_study(options.study, options.overrides, runs=options.runs)
+    study = load_study(options.study, options.set, runs=options.runs)
     warn(study.warnings)
     planned = design(study)
     if options.row is not None:

@@ -5,27 +5,34 @@ from __future__ import annotations
 import io
 import os
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from feedsim.cli.options import arguments
 from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.jobs.watch import Watch
 
 if TYPE_CHECKING:
     from feedsim.scenario import Coupling, Machine
 
+T = TypeVar("T")
 
-class Progress:
-    """A progress bar that names what is being done."""
 
-    def __init__(self, bar: Any) -> None:
-        self._bar = bar
+class TerminalWatch(Watch):
+    """Shows what a job reports: a progress bar, and sentences on standard error."""
+
+    def __init__(self, bar: Any, quiet: bool) -> None:
+        self._bar, self._quiet = bar, quiet
         self._what: str | None = None
+        self.command = ("feedsim", *sys.argv[1:])  # not where it is installed: records are sent to others
+        self.done, self.total = 0, 0
 
-    def __call__(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
+    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
         """How many of its steps are done, of how many. before: done earlier, which do not count for the rate."""
+        self.done, self.total = done, total
         if what != self._what:
             self._what = what
             self._bar.reset(total)
@@ -36,25 +43,6 @@ class Progress:
         if note:
             self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
-
-    def of(self, what: str) -> Any:
-        """The same for those who report how much is done, and not of what."""
-        return lambda done, total: self(what, done, total)
-
-
-class TerminalWatch(Watch):
-    """Shows what a job reports: a progress bar, and sentences on standard error."""
-
-    def __init__(self, bar: Any, quiet: bool) -> None:
-        self._bar, self._quiet = bar, quiet
-        self._progress = Progress(bar)
-        self.command = ("feedsim", *sys.argv[1:])  # not where it is installed: records are sent to others
-        self.done, self.total = 0, 0
-
-    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
-        """How many of its steps are done, of how many."""
-        self.done, self.total = done, total
-        self._progress(what, done, total, before, note)
 
     def announce(self, sentence: str) -> None:
         """Whose programs the job executes."""
@@ -110,23 +98,24 @@ def prepare_streams() -> None:
 
 
 @contextmanager
-def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[Progress]:
-    """A progress bar; none if ``quiet`` or where nobody watches. shortened: large numbers of the `unit` (12.3k)."""
-    with _bar(quiet, unit, shortened) as bar:
-        yield Progress(bar)
-
-
-@contextmanager
 def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[TerminalWatch]:
-    """Who watches a job for the person at the terminal. unit, shortened: as of :func:`progress_bar`."""
-    with _bar(quiet, unit, shortened) as bar:
+    """Who watches a job for the person at the terminal: with a progress bar, unless `quiet` or where nobody looks.
+
+    unit: what the bar counts; shortened: in large numbers (12.3k).
+    """
+    from tqdm import tqdm
+
+    with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
         yield TerminalWatch(bar, quiet)
 
 
-def _bar(quiet: bool, unit: str, shortened: bool) -> Any:
-    from tqdm import tqdm
+def call(job: Callable[..., T], options: Namespace, unit: str = "", *, shortened: bool = False, **read: Any) -> T:
+    """What a job makes of the options of its command, with its progress shown.
 
-    return tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty())
+    read: arguments that the command has read from its options itself. unit, shortened: as of :func:`watching`.
+    """
+    with watching(getattr(options, "quiet", False), unit, shortened=shortened) as watch:
+        return job(**arguments(job, options) | read, watch=watch)
 
 
 COLOURS = {"red": 31, "yellow": 33}
@@ -162,14 +151,6 @@ def announce(
 
     for sentence in cosim.executed(machine, fmus, coupling):
         print(f"feedsim: {named(sentence)}", file=sys.stderr)
-
-
-def announce_archive(path: Path | None, who: str) -> None:
-    """The same of one archive that a user names; None: a shipped one."""
-    from feedsim import cosim
-
-    for sentence in cosim.executing(path, who) if path is not None else ():
-        print(f"feedsim: {sentence}", file=sys.stderr)
 
 
 def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import QUIET_OPTION, Command, Option, out
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 IMPORT_DESCRIPTION = """Drive, limits, filters and compensations of a machine file from the files of a control. A value
 is taken where the file has it once, where it acts, and where a public source states its unit. All others are named with
@@ -24,18 +24,7 @@ def import_(options: Namespace) -> None:
     from feedsim.jobs.machine_import import machine_import
 
     out: Path = options.out or Path("results") / f"machine_{options.files[0].stem}"
-    with watching(options.quiet) as watch:
-        result = machine_import(
-            options.files,
-            options.axes,
-            options.machine,
-            drives=options.drives,
-            assume=options.assume,
-            checked=options.checked,
-            name=options.name,
-            out=out,
-            watch=watch,
-        )
+    result = call(machine_import, options, out=out)
     head = f"{', '.join(archive.name for archive in result.archives)} -> {out / 'machine.yaml'}"
     finish(options.quiet, result.findings, head, *result.lines)
 
@@ -53,17 +42,7 @@ def export(options: Namespace) -> None:
     from feedsim.jobs.machine_export import machine_export
 
     out: Path = options.out or Path("results") / f"export_{options.machine.stem}"
-    with watching(options.quiet) as watch:
-        result = machine_export(
-            options.machine,
-            options.like,
-            options.axes,
-            drives=options.drives,
-            assume=options.assume,
-            checked=options.checked,
-            out=out,
-            watch=watch,
-        )
+    result = call(machine_export, options, out=out)
     finish(options.quiet, result.findings, f"{result.machine.name} -> {out / 'sheet.csv'}", *result.lines)
 
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import Command, Option, pairs
-from feedsim.cli.terminal import finish, warn, watching
+from feedsim.cli.terminal import call, finish, warn
 
 POSITION = "AXIS=POSITION is needed, e.g. X=800mm"
 
@@ -15,15 +15,7 @@ def build(options: Namespace) -> None:
     """feedsim machine build: write modes.csv and build.json."""
     from feedsim.jobs.machine import TABLE_FILE, machine_build
 
-    with watching(options.quiet) as watch:
-        result = machine_build(
-            options.machine,
-            options.out,
-            at=pairs("at", options.at, POSITION),
-            cutoff=options.cutoff,
-            static_correction=options.static_correction,
-            watch=watch,
-        )
+    result = call(machine_build, options, at=pairs("at", options.at, POSITION))
     finish(options.quiet, result.findings, f"{result.lines[0]} -> {options.out / TABLE_FILE}")
 
 
@@ -31,16 +23,7 @@ def info(options: Namespace) -> None:
     """feedsim machine info: print the figures."""
     from feedsim.jobs.machine import machine_info
 
-    with watching(quiet=False) as watch:
-        result = machine_info(
-            options.machine,
-            at=pairs("at", options.at, POSITION),
-            cutoff=options.cutoff,
-            static_correction=options.static_correction,
-            step=options.step,
-            modes=options.modes,
-            watch=watch,
-        )
+    result = call(machine_info, options, at=pairs("at", options.at, POSITION))
     warn(result.findings)
     described = result.described
     if options.json:

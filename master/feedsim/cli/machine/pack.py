@@ -7,24 +7,15 @@ from pathlib import Path
 
 from feedsim.cli.machine.figures import AT, POSITION
 from feedsim.cli.options import Command, Option, pairs
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 
 def pack(options: Namespace) -> None:
     """feedsim machine pack."""
     from feedsim.jobs.machine_pack import POSITIONS_EXAMPLE, machine_pack
 
-    with watching(False, " poses") as watch:
-        made = machine_pack(
-            options.machine,
-            options.out,
-            at=pairs("at", options.at, POSITION),
-            poses=pairs("poses", options.poses, f"{POSITIONS_EXAMPLE} is the form"),
-            name=options.name,
-            note=options.note,
-            base=options.base,
-            watch=watch,
-        )
+    poses = pairs("poses", options.poses, f"{POSITIONS_EXAMPLE} is the form")
+    made = call(machine_pack, options, " poses", at=pairs("at", options.at, POSITION), poses=poses)
     finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 

@@ -7,26 +7,14 @@ from pathlib import Path
 
 from feedsim.cli.machine.figures import POSITION, QUIET_OPTION, SOURCE, STEP_OPTION
 from feedsim.cli.options import Command, Option, pairs
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 
 def show(options: Namespace) -> None:
     """feedsim machine show: compute, draw, write."""
     from feedsim.jobs.machine import machine_show
 
-    with watching(options.quiet) as watch:
-        result = machine_show(
-            options.machine,
-            options.out,
-            at=pairs("at", options.at, POSITION),
-            cutoff=options.cutoff,
-            static_correction=options.static_correction,
-            step=options.step,
-            mode=options.mode,
-            animate=options.animate,
-            scale=options.scale,
-            watch=watch,
-        )
+    result = call(machine_show, options, at=pairs("at", options.at, POSITION))
     info = result.info
     drawn = [f"mode {k}: {info.modes.frequency[k]:.2f} Hz, {info.moving[k]}" for k in result.modes]
     finish(options.quiet, result.findings, f"{info.title} -> {options.out / 'report.html'}", *drawn)

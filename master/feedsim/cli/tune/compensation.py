@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FIGURES, FMUS, JUDGED_ON_DRAWS, QUIET_OPTION, Command, Option, names, out, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Find the values of a friction compensation: a pulse on the speed setpoint, constant or with a
 characteristic over the acceleration (SINUMERIK), a torque over the commanded speed (TwinCAT CNC), or the friction model
@@ -24,19 +24,7 @@ def compensation(options: Namespace) -> None:
     from feedsim.jobs.tune_compensation import tune_compensation
 
     directory: Path = options.out or Path("results") / f"tune_{options.scenario.stem}"
-    with watching(options.quiet, " runs") as watch:
-        result = tune_compensation(
-            options.scenario,
-            kind=options.kind,
-            axes=options.axes,
-            objective=options.objective,
-            uncertain=options.uncertain,
-            set=options.overrides,
-            fmus=options.fmus,
-            out=directory,
-            figures=options.figures,
-            watch=watch,
-        )
+    result = call(tune_compensation, options, " runs", out=directory)
     finish(options.quiet, result.findings, *result.lines, f"-> {directory / 'report.html'}")
 
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import CONTROL, FIGURES, FMUS, JUDGED_ON_DRAWS, QUIET_OPTION, Command, Option, out, settings
-from feedsim.cli.terminal import finish, watching
+from feedsim.cli.terminal import call, finish
 
 DESCRIPTION = """Find better values of K_p, T_n, K_v, T_sym, T_dyn, the reference model and the current setpoint filters
 of an axis. Gain and phase margin of its speed and position loop hold at every pose given and for elastic modes 10 %
@@ -25,23 +25,7 @@ def drive(options: Namespace) -> None:
     from feedsim.jobs.tune_drive import tune_drive
 
     directory: Path = options.out or Path("results") / f"tune_drive_{options.scenario.stem}_{options.axis}"
-    with watching(options.quiet, " runs") as watch:
-        result = tune_drive(
-            options.scenario,
-            options.axis,
-            gain_margin=options.gain_margin,
-            phase_margin=options.phase_margin,
-            encoder_noise=options.encoder_noise,
-            at=options.at,
-            evaluations=options.evaluations,
-            uncertain=options.uncertain,
-            set=options.overrides,
-            fmus=options.fmus,
-            out=directory,
-            figures=options.figures,
-            control=options.control,
-            watch=watch,
-        )
+    result = call(tune_drive, options, " runs", out=directory)
     finish(options.quiet, result.findings, *result.lines, f"-> {directory / 'report.html'}")
 
 

@@ -45,11 +45,19 @@ def test_a_line_through_both_rests_is_found_and_taken_out() -> None:
 
 
 def test_a_note_names_the_first_lines() -> None:
-    lines = [Line(27.0, 0.6e-6, 0.0, float(k), k + 0.8) for k in range(6)]
+    lines = [Line(27.0 + 3 * k, 0.6e-6, 0.0, float(k), k + 0.8) for k in range(6)]
     text = in_words("X", lines)
-    assert text.count("27 Hz") == 4
+    assert text.count("Hz") == 4
     assert "3 to 3.8 s and 2 more: vibration from outside the axis" in text
     assert " more:" not in in_words("X", lines[:4])
+    assert in_words("X", lines[:1], moving=True).startswith("axis X: while it moves the record has 27 Hz")
+
+
+def test_a_note_names_a_frequency_once() -> None:
+    """Rests of 0.8 s tell frequencies to 1.25 Hz."""
+    lines = [Line(27.0 + 0.1 * k, 1e-7 * (k + 1), 0.1, float(k), k + 0.8) for k in range(6)]
+    assert "27.2 Hz" not in in_words("X", lines)
+    assert "with 0.6 um and 0.1 N.m (amplitudes), 0 to 5.8 s: vibration" in in_words("X", lines)
 
 
 def test_two_lines_and_no_torque() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, nan
 from pathlib import Path
 
@@ -16,8 +16,9 @@ from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.findings import Note, Wrong
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
-from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of, unclipped
-from feedsim.replay.outside import Line, in_words, without_outside
+from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of, same_time, unclipped
+from feedsim.replay.moving_lines import lines_in_motion
+from feedsim.replay.outside import Line, in_words, same_line, without_outside
 from feedsim.scenario import Drive, Machine
 from feedsim.trace.trace import Array
 
@@ -60,8 +61,8 @@ class Comparison:
             where there is none.
         limit: torque that the simulated drive cannot exceed [N.m]; limited: share of its rows at that limit.
         open_loop: whether the recorded torque drives the axis, in place of a drive.
-        outside: lines of the record that come from outside the axis. clipped: sentences on torque that the record cuts
-            off: its rows count in no figure of the torque.
+        outside: lines of the record that come from outside the axis, at rest. moving_lines: others while it moves.
+        clipped: sentences on torque that the record cuts off: its rows count in no figure of the torque.
     """
 
     axis: str
@@ -75,6 +76,7 @@ class Comparison:
     limited: float = 0.0
     open_loop: bool = False
     outside: Sequence[Line] = ()
+    moving_lines: Sequence[Line] = ()
     clipped: Sequence[str] = ()
 
     @property
@@ -98,6 +100,8 @@ class Comparison:
         result += self.clipped
         if self.outside:
             result.append(Note(in_words(self.axis, self.outside)))
+        if self.moving_lines:
+            result.append(Note(in_words(self.axis, self.moving_lines, moving=True)))
         return result
 
     @property
@@ -175,8 +179,15 @@ class Comparison:
         return 0.5 * (edges[1:] + edges[:-1]), means[0], means[1]
 
 
-def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | None = None) -> dict[str, Comparison]:
+def replayed(
+    machine: Machine,
+    records: Mapping[str, AxisRecord],
+    fmus: Path | None = None,
+    beside: Mapping[str, AxisRecord] | None = None,
+) -> dict[str, Comparison]:
     """The records of some axes of a machine through its units, axis by axis beside what was recorded.
+
+    beside: further axes that were recorded at the same time, which may drive a vibration.
 
     By how much a control logs its torque later than its position is not known ahead: the delay with which it agrees
     best is taken out, and reported.
@@ -187,10 +198,20 @@ def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | N
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
     with Replay(machine, records, fmus=fmus) as replay:
         result = replay.follow(machine, signals, per_row)
+    every = {**(beside or {}), **records}
     return {
-        axis: compared(axis_record, result[axis], per_row, limits.get(axis, inf))
+        axis: _with_moving_lines(compared(axis_record, result[axis], per_row, limits.get(axis, inf)), every)
         for axis, axis_record in records.items()
     }
+
+
+def _with_moving_lines(comparison: Comparison, records: Mapping[str, AxisRecord]) -> Comparison:
+    """The axis with the lines of its motion that its record at rest does not have."""
+    errors = {name: -channel.error for name, channel in comparison.channels.items()}
+    axes = [one for one in records.values() if same_time({comparison.axis: comparison.each, one.axis: one})]
+    lines = lines_in_motion(comparison.each, errors["position"], errors.get("torque"), axes)
+    further = [line for line in lines if not any(same_line(line, other) for other in comparison.outside)]
+    return replace(comparison, moving_lines=further)
 
 
 def compared(

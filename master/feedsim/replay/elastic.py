@@ -89,7 +89,7 @@ def resonance(axis_record: AxisRecord, simulated: Array, per_row: int, K_v: floa
     best: tuple[float, Resonance] | None = None
     for f in np.geomspace(low, high, RESONANCE_FREQUENCIES) if low < high else ():
         for D in DAMPING:
-            A = _filtered(float(f), D, acceleration, h / per_row)[::per_row][rows]
+            A = resonator(float(f), D, acceleration, h / per_row)[::per_row][rows]
             c = _solved(A, remaining[rows])
             off = float(np.sum((remaining[rows] - A @ c) ** 2))
             if best is None or off < best[0]:
@@ -97,7 +97,7 @@ def resonance(axis_record: AxisRecord, simulated: Array, per_row: int, K_v: floa
     return best[1] if best is not None else None
 
 
-def _filtered(frequency: float, damping: float, a: Array, h: float) -> Array:
+def resonator(frequency: float, damping: float, a: Array, h: float) -> Array:
     """(N, 2) q and dq/dt / w of a resonance, by its exact answer to steps of `a`."""
     w = 2 * pi * frequency
     A, B = np.array([[0.0, 1.0], [-(w**2), -2 * damping * w]]), np.array([[0.0], [w**2]])

@@ -142,7 +142,8 @@ def identify_drives(
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
         comparisons = [
-            replace(replayed(made[axis], {axis: each}, fmus)[axis], clipped=()) for axis, each in records.items()
+            replace(replayed(made[axis], {axis: each}, fmus, records)[axis], clipped=())
+            for axis, each in records.items()
         ]
     return DrivesFound(found, comparisons, files, outside, clipped)
 

@@ -28,6 +28,7 @@ FINER = 8  # frequencies per line width
 PREDICTED_SHARE = 0.5  # share of the variance at rest that either side has to predict of the other
 MOST_LINES = 3
 MAX_NAMED_LINES = 4  # in a note
+SAME_LINE = 1.0  # by how many line widths frequencies of one line differ at most
 MIN_AMPLITUDE = 1e-8  # [m] amplitude: less is the digits of a record
 
 
@@ -69,10 +70,10 @@ def without_outside(axis_record: AxisRecord) -> tuple[AxisRecord, tuple[Line, ..
             sine = _sine(time, own, frequency, before, after)
             if np.hypot(*sine) < MIN_AMPLITUDE:
                 break
-            waves = _waves(time[whole], frequency)
-            own[whole] -= waves @ sine
+            wave = waves(time[whole], frequency)
+            own[whole] -= wave @ sine
             force = _sine(time, beside, frequency, before, after) if axis_record.record.driven else np.zeros(2)
-            beside[whole] -= waves @ force
+            beside[whole] -= wave @ force
             sizes = float(np.hypot(*sine)), float(np.hypot(*force))
             lines.append(Line(frequency, *sizes, float(time[rows[0]]), float(time[rows[-1]])))
         if len(lines) > count:
@@ -115,7 +116,7 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
         step /= 3
     sides = [(before, detrended(position, before)), (after, detrended(position, after))]
     for (own, y), (other, z) in (sides, sides[::-1]):
-        W, V = (detrended(_waves(time, best), rows) for rows in (own, other))
+        W, V = (detrended(waves(time, best), rows) for rows in (own, other))
         sine = np.linalg.lstsq(W, y, rcond=None)[0]
         if not np.sum((z - V @ sine) ** 2) < (1 - PREDICTED_SHARE) * np.sum(z**2):
             return None
@@ -134,12 +135,12 @@ def _sine(time: Array, signal: Array, frequency: float, before: Rows, after: Row
 
 
 def _both(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> tuple[Array, Array]:
-    waves, sides = _waves(time, frequency), (before, after)
-    return tuple(np.concatenate([detrended(of, rows) for rows in sides]) for of in (waves, signal))  # type: ignore[return-value]
+    wave, sides = waves(time, frequency), (before, after)
+    return tuple(np.concatenate([detrended(of, rows) for rows in sides]) for of in (wave, signal))  # type: ignore[return-value]
 
 
-def _waves(time: Array, frequency: float) -> Array:
-    """(N, 2)"""
+def waves(time: Array, frequency: float) -> Array:
+    """(N, 2) cosine and sine of 2 pi `frequency` `time`."""
     phase = 2 * np.pi * frequency * time
     return np.column_stack([np.cos(phase), np.sin(phase)])
 
@@ -151,10 +152,34 @@ def detrended(signal: Array, rows: Rows) -> Array:
     return np.asarray(signal[rows] - trend @ (trend.T @ signal[rows]))
 
 
-def in_words(axis: str, lines: Sequence[Line]) -> str:
-    """A note on them: the first ones, and how many there are beyond."""
-    more = f" and {len(lines) - MAX_NAMED_LINES} more" if len(lines) > MAX_NAMED_LINES else ""
+def in_words(axis: str, lines: Sequence[Line], moving: bool = False) -> str:
+    """A note on them: each frequency once, the first ones, and how many there are beyond."""
+    named = _by_frequency(lines)
+    more = f" and {len(named) - MAX_NAMED_LINES} more" if len(named) > MAX_NAMED_LINES else ""
+    when, what = ("while it moves", "no setpoint drives") if moving else ("at rest", "no drive and no mode explains")
     return (
-        f"axis {axis}: at rest the record has {'; '.join(line.text for line in lines[:MAX_NAMED_LINES])}{more}: "
-        "vibration from outside the axis, which no drive and no mode explains"
+        f"axis {axis}: {when} the record has {'; '.join(line.text for line in named[:MAX_NAMED_LINES])}{more}: "
+        f"vibration from outside the axis, which {what}"
     )
+
+
+def same_line(one: Line, other: Line) -> bool:
+    """Whether two lines have the same frequency, as far as the shorter one determines it."""
+    return abs(one.frequency - other.frequency) * min(one.end - one.begin, other.end - other.begin) < SAME_LINE
+
+
+def _by_frequency(lines: Sequence[Line]) -> list[Line]:
+    """Lines of one frequency as one, with the largest amplitudes."""
+    result: list[Line] = []
+    for line in sorted(lines, key=lambda line: (line.begin, line.frequency)):
+        k = next((k for k, other in enumerate(result) if same_line(line, other)), None)
+        if k is None:
+            result.append(line)
+            continue
+        both = line, result[k]
+        longer = max(both, key=lambda one: one.end - one.begin)
+        begin, end = min(one.begin for one in both), max(one.end for one in both)
+        result[k] = Line(
+            longer.frequency, max(one.position for one in both), max(one.torque for one in both), begin, end
+        )
+    return result

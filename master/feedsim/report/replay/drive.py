@@ -80,6 +80,9 @@ class DriveReport:
         for axis, lines in self.found.outside.items():
             if lines:
                 reported[Note(f"{in_words(axis, lines)}; it was taken out of what was fitted")] = None
+        for comparison in self.comparisons:
+            if comparison.moving_lines:
+                reported[Note(in_words(comparison.axis, comparison.moving_lines, moving=True))] = None
         for axis, one in self.found.drives.items():
             open_ones = [name for name, estimate in one.estimates.items() if estimate.status == "undetermined"]
             if open_ones:

@@ -14,9 +14,11 @@ from feedsim.errors import InputError
 
 MAX_LINE_LENGTH = 4000  # characters of a line; longer ones hold no single value
 _BINARY = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+# Up to the sign of equality; two of them compare. The language of the control knows no cases of letters.
 _MACHINE_DATUM = re.compile(
-    r"(?:(?<![A-Za-z])N(?P<number>\d{1,6})[ \t]+)?\$(?P<kind>M[ANC]|S[ANC])_(?P<name>[A-Z0-9_]+)"
-    r"[ \t]*(?:\[(?P<index>[^\[\]]*)\])?[ \t]*=(?P<value>.*)$"
+    r"(?:(?<![A-Za-z])N(?P<number>\d{1,6})[ \t]*)?\$(?P<kind>M[ANC]|S[ANC])_(?P<name>[A-Z0-9_]+)"
+    r"[ \t]*(?:\[(?P<index>[^\[\]]*)\])?[ \t]*=(?!=)",
+    re.IGNORECASE,
 )
 _DRIVE = re.compile(r"^[ \t]*(?P<name>[pPrR]0*(?P<number>\d{1,5}))[ \t]*(?:\[(?P<index>\d+)\])?[ \t]*=(?P<value>.*)$")
 _DRIVE_OBJECT = re.compile(r"PS0*(\d{1,6})[._](?:TEA|ACX)", re.IGNORECASE)
@@ -32,6 +34,9 @@ _ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"([^\"]*)\"|'([^']*)')")
 _PARAMETER = re.compile(
     r"^\W*((?P<p>[pPrR]0*(?P<number>\d{1,5})(?:\[(?P<index>\d+)\])?)|(?P<idn>[SP]-\d-\d{4}(?:\.\d+\.\d+)?)|"
     r"(?P<isg>P-(?:AXIS|COMP|CHAN)-\d{5})|(?P<md>(?:MD|N)(?P<mdn>\d{5})(?:\[(?P<mdi>\d+)\])?))\W*$"
+)
+_STATEMENT = re.compile(
+    r"\s*(?:N\d+\s+)?(?P<word>IF|GOTO[FB]?|WHILE|ELSE|ENDIF|ENDWHILE|ENDFOR|FOR|REPEAT)\b", re.IGNORECASE
 )
 _END = re.compile(r"\s*(?:N\d+\s+)?M(?:0?17|0?2|30)\b")
 _VALUE_HEADS = ("value", "wert", "valeur", "setting", "actual", "offline", "online", "current value")
@@ -112,18 +117,21 @@ def _sinumerik(archive: Archive) -> None:
             archive.add_odd(number, line[:200], "a line of more than 4000 characters")
             continue
         whole = ended or not archive.container
-        datum = _MACHINE_DATUM.search(line)
-        if datum and ";" in line[: datum.start()]:
+        data = _data(_without_comment(line))
+        if data:
+            ends = [*(datum.start() for datum in data[1:]), len(line)]
+            for datum, end in zip(data, ends, strict=True):
+                _machine_datum(archive, number, start, line[:end], datum, whole, "below an IF" if branches else "")
+        elif _MACHINE_DATUM.search(line) and not _STATEMENT.match(line):
             archive.comments += 1
-        elif datum:
-            _machine_datum(archive, number, start, line, datum, whole, "below an IF" if branches else "")
         elif (drive := _DRIVE.match(line)) and not drive["name"].lower().startswith("r"):
             _drive_parameter(archive, number, start, line, drive, place or "drive", whole)
         elif drive or re.fullmatch(r"\s*(?:M0?17|M0?2|M30|CHANDATA\(\d+\)|\w+_HEADER|[A-Z_]+\s*=.*)\s*(?:;.*)?", line):
             archive.comments += 1
-        elif re.match(r"\s*(?:N\d+\s+)?(?:IF|GOTO[FB]?|WHILE|ELSE|ENDIF|ENDWHILE|ENDFOR|FOR|REPEAT)\b", line):
-            branches += bool(re.match(r"\s*(?:N\d+\s+)?(?:IF|WHILE|FOR)\b(?!.*GOTO)", line))
-            branches -= bool(re.match(r"\s*(?:N\d+\s+)?(?:ENDIF|ENDWHILE|ENDFOR)\b", line) and branches)
+        elif statement := _STATEMENT.match(line):
+            word = statement["word"].upper()
+            branches += word in ("IF", "WHILE", "FOR") and "GOTO" not in line.upper()
+            branches -= word in ("ENDIF", "ENDWHILE", "ENDFOR") and branches > 0
             archive.add_odd(number, line, "a statement of a program")
         else:
             damaged = bool(_BINARY.search(line))
@@ -150,13 +158,18 @@ def _value(line: str, at: int) -> tuple[str, int, bool]:
     return text.strip(), at + len(text) - len(text.lstrip()), checked is not None
 
 
+def _data(line: str) -> list[re.Match[str]]:
+    """Assignments of a line without its comment, up to their signs of equality; none within quotes."""
+    return [datum for datum in _MACHINE_DATUM.finditer(line) if line.count('"', 0, datum.start()) % 2 == 0]
+
+
 def _machine_datum(
     archive: Archive, number: int, start: int, line: str, match: re.Match[str], whole: bool, doubt: str
 ) -> None:
     if not whole or _BINARY.search(line[match.start() :]):
         archive.add_odd(number, line[match.start() :], "cut by a binary record, or not whole")
         return
-    text, at, checked = _value(line, match.start("value"))
+    text, at, checked = _value(line, match.end())
     index, axis, odd = None, "", ""
     for part in (entry.strip() for entry in (match["index"] or "").split(",")):
         if part.isdecimal() and len(part) < 6 and index is None:
@@ -168,13 +181,14 @@ def _machine_datum(
     if not text or odd:
         archive.add_odd(number, line[match.start() :], odd or "no value behind the sign of equality")
         return
-    if match["kind"] == "MA" and not axis:
+    of_axis = match["kind"].upper() == "MA"
+    if of_axis and not axis:
         archive.add_odd(number, line[match.start() :], "machine data of an axis, without the axis")
         return
     filed = f"MD{match['number']}" if match["number"] else ""
     archive.entries.append(
         Entry(
-            match["name"], text, index, axis if match["kind"] == "MA" else "", "", number,
+            match["name"].upper(), text, index, axis if of_axis else "", "", number,
             (start + at, start + at + len(text)), doubt=doubt, number=filed, checksum=checked,
         )
     )  # fmt: skip
@@ -396,7 +410,7 @@ def _has(pattern: str) -> Callable[[str], bool]:
 
 _FORMATS: tuple[tuple[str, str, Callable[[str], bool], Callable[[Archive], None]], ...] = (
     ("twincat", ".xti of TwinCAT NC", _has(r"<TcSmItem\b|<AxisPara\b"), _xti),
-    ("sinumerik", "machine data of a SINUMERIK", _has(r"\$M[ANC]_[A-Z0-9_]+[^\n=]{0,80}="), _sinumerik),
+    ("sinumerik", "machine data of a SINUMERIK", _has(r"(?i)\$M[ANC]_[A-Z0-9_]+[^\n=]{0,80}="), _sinumerik),
     ("sinumerik", "parameters of SINAMICS", _has(r"^[ \t]*[pP]0*\d{1,5}[ \t]*(\[\d+\])?[ \t]*="), _sinumerik),
     ("linuxcnc", "INI file of LinuxCNC", _has(r"^[ \t]*\[(EMC|TRAJ|EMCMOT|JOINT_\d+)\]"), _linuxcnc),
     ("twincat", "axis list of TwinCAT CNC", _has(r"^[ \t]*(kopf|kenngr|getriebe|antr|lr_param|lr_hw|vorsteuer|"

@@ -32,6 +32,9 @@ UNITS = {
     **dict.fromkeys(("sigma_1", "sigma_2"), "N.m.s/rad"), "sigma_0": "N.m/rad", "W": "rad",
 }  # fmt: skip
 MODEL_DAMPING = 1.487  # of the reference model, as in the default machine
+CASES = {
+    "held_out": "friction's part", "friction+": "friction 20 % higher", "friction-": "20 % lower", "worn": "worn axes",
+}  # fmt: skip
 AIMS = {"pulse": (45, 20), "pulse_characteristic": (55, 40), "table": (40, 30), "model": (95, 90)}  # median, least [%]
 
 
@@ -173,24 +176,15 @@ def scenarios(folder: Path, names: list[str]) -> Iterator[tuple[str, Path]]:
 
 
 def row(name: str, kind: str, result: TuneCompensationResult, taken: float) -> str:
-    """Median and least reduction [%], the least once more of circles whose error is friction's, and with other
-    friction."""
+    """Median and least reduction [%] of the error and of what friction makes of it, the latter on changed machines."""
     found = {key: float(figure) for key, figure in result.figures.items()}
-    judged = result.judged
-    others = {(axis, pair) for axis, pair, *_ in judged.beyond_friction}
-    of_each = 100 * judged.reduction(judged.held_before, judged.held_after)
-    own = [
-        of_each[i, k] for i, pair in enumerate(judged.held) for k, axis in enumerate(judged.axes)
-        if (axis, pair) not in others
-    ]  # fmt: skip
-    changed = ", ".join(
-        f"{found[f'friction{sign}.median']:.0f} / {found[f'friction{sign}.worst']:.0f}" for sign in "+-"
-    )
-    median, least = AIMS[kind]
-    return (
-        f"| {name} | {kind} | {found['held_out.median']:.1f} ({median}) | {found['held_out.worst']:.1f} ({least}) | "
-        f"{min(own):.1f} | {changed} | {taken:.0f} |"
-    )
+
+    def both(key: str) -> str:
+        return " / ".join(f"{found[f'{key}{end}']:.1f}" for end in ("median", "worst"))
+
+    asked = " / ".join(map(str, AIMS[kind]))
+    cells = [both("held_out."), *(both(f"{case}.friction_") for case in CASES), asked]
+    return f"| {name} | {kind} | {' | '.join(cells)} | {taken:.0f} |"
 
 
 def main() -> int:
@@ -199,8 +193,9 @@ def main() -> int:
     parser.add_argument("--kinds", default=",".join(COMPENSATOR_KINDS))
     parser.add_argument("--machines", default=",".join(["default", *MACHINES]))
     given = parser.parse_args()
-    print("| machine | kind | median (asked) | least (asked) | least of friction | friction +, - 20 % | time [s] |")
-    print("|---|---|---|---|---|---|---|", flush=True)
+    print("Median / least reduction in per cent: of the whole error, then of the part that friction makes.")
+    heads = ("machine", "kind", "whole", *CASES.values(), "asked", "time [s]")
+    print(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|", flush=True)
     with TemporaryDirectory() as folder:
         for name, scenario in scenarios(Path(folder), given.machines.split(",")):
             for kind in given.kinds.split(","):

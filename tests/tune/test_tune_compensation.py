@@ -18,10 +18,11 @@ from feedsim.scenario import Machine, load
 from feedsim.structure import checked_modes
 from feedsim.tune import circles as circles_module
 from feedsim.tune import compensation
-from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
+from feedsim.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
 from feedsim.tune.compensation import tune
-from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, compensated, pulse, score
+from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, pulse, score
 from feedsim.tune.effects import effects_of, frictionless
+from feedsim.tune.groups import compensated
 from identified_sets import write_set
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
@@ -54,20 +55,23 @@ def test_a_compensation_that_the_machine_has_is_taken_off_first(monkeypatch: pyt
     monkeypatch.setattr(compensation, "practical", lambda machine, plane: pairs)
     seen = []
 
-    def errors(circles: Circles, machine: Machine, **named: object) -> np.ndarray:
+    angle = np.linspace(-math.pi, math.pi, 360, endpoint=False)
+
+    def contours(circles: Circles, machine: Machine, **named: object) -> tuple[Contour, ...]:
         pulse = machine.axes["Z"].drive.friction_pulse
         seen.append(0.0 if pulse is None else float(pulse.amplitude))
-        peak = abs(1.0 - seen[-1] / 1e-4)
-        return np.full((len(circles.pairs), 2, 2), [1.0 + peak, -0.1])
+        level = 0.0 if machine.axes["Z"].friction.F_C < 1e-3 else 1.0 + abs(1.0 - seen[-1] / 1e-4)
+        peaks = level * np.maximum(0.0, np.cos(4 * angle)) ** 9
+        return tuple(Contour(angle, peaks) for _ in circles.pairs)
 
-    monkeypatch.setattr(Circles, "errors", errors)
+    monkeypatch.setattr(Circles, "contours", contours)
     present = ["amplitude=7e-5 m/s", "time=0.05 s"]
     found = []
     for more in ([], [f"machine.axes.Z.drive.friction_pulse.{each}" for each in present]):
         seen.clear()
         judged = tune(load(CIRCLE, more), "pulse", PLANE, ("Z",), "ratio", fmus=None, progress=lambda *_: None)
         assert seen[0] == 0.0
-        found.append((judged.found.values, judged.held_before.tolist(), tuple(seen)))
+        found.append((judged.found.values, judged.held_errors.before.tolist(), tuple(seen)))
     assert found[0] == found[1]
 
 
@@ -188,6 +192,11 @@ def test_the_model_takes_nearly_all_off(fmus: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     figures = json.loads((tmp_path / "m/summary.json").read_text())["figures"]
     assert figures["held_out.median"]["value"] > 95
+    # On this machine nearly all of the error is friction's.
+    for key in ("median", "worst"):
+        part = figures[f"held_out.friction_{key}"]["value"]
+        assert part == pytest.approx(figures[f"held_out.{key}"]["value"], abs=5)
+        assert part > 98
     assert 50 < figures["friction+.worst"]["value"] < 95
     assert 50 < figures["friction-.worst"]["value"] < 95
 
@@ -206,6 +215,34 @@ def test_what_is_not_friction_is_named(fmus: Path) -> None:
     none = frictionless(load(CIRCLE, ["machine.axes.Z.guide={share: 30 %}"]).machine, ["Z"]).axes["Z"]
     assert none.guide is None
     assert none.friction.F_S < 1e-5
+
+
+def test_the_part_of_friction(fmus: Path) -> None:
+    """Of a servo mismatch and friction that act together: what remains without the former is what friction does alone.
+
+    The radius of a path (a cos p, b sin(p + d)) less that of the same path with a small further deviation is that
+    deviation's radial part, whatever the ellipse.
+    """
+    angle = np.linspace(-math.pi, math.pi, 2000, endpoint=False)
+    ellipse = 30e-6 * np.sin(2 * angle + 0.3)
+    peak = 5e-6 * np.exp(-(((angle - 0.05) / 0.03) ** 2))  # beside the reversal of the first axis
+    both, free = Contour(angle, ellipse + peak), Contour(angle, ellipse)
+    own = extremes([both], [free])
+    assert own[0, 0] == pytest.approx([5e-6, 0.0], rel=1e-3, abs=1e-12)
+    assert size(extremes([both]))[0, 0] > 25e-6
+
+    # In the machine: unequal T_sym change the whole error of a fast circle several times, friction's part little.
+    pair = [Pair(0.005, 2 / 60)]
+    parts, wholes = [], []
+    for T_sym in ("3.528 ms", "4.5 ms"):
+        scenario = load(CIRCLE, [f"machine.axes.Z.drive.T_sym={T_sym}"])
+        circles = Circles.of(scenario, PLANE, pair)
+        with_friction = circles.contours(scenario.machine, fmus=fmus)
+        without = circles.contours(frictionless(scenario.machine, PLANE), fmus=fmus)
+        parts.append(size(extremes(with_friction, without))[0])
+        wholes.append(size(extremes(with_friction))[0])
+    assert (wholes[1] > 2 * wholes[0]).all()
+    assert parts[1] == pytest.approx(parts[0], rel=0.1)
 
 
 @pytest.mark.parametrize(

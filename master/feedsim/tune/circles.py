@@ -92,6 +92,14 @@ def tuned_on(pairs: Sequence[Pair]) -> list[Pair]:
 
 
 @dataclass(frozen=True, eq=False)
+class Contour:
+    """The turn of a circle that counts: angle [rad] and deviation of the radius [m], (rows,) at equal times."""
+
+    angle: Array
+    deviation: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Circles:
     """Circles on a machine, planned.
 
@@ -146,23 +154,39 @@ class Circles:
         """The scenario on another machine of the same axes and limits."""
         return self.scenario.model_copy(update={"machine": machine})
 
-    def errors(self, machine: Machine, *, fmus: Path | None = None, torque: TorqueFeedforward | None = None) -> Array:
-        """(pairs, 2 axes, 2) peak and dip [m] of the radius where an axis reverses, from the median of the turn.
-
-        The larger of two reversals each. Raises as :func:`feedsim.cosim.run`.
-        """
+    def contours(
+        self, machine: Machine, *, fmus: Path | None = None, torque: TorqueFeedforward | None = None
+    ) -> tuple[Contour, ...]:
+        """What the linear scales see of every circle. Raises as :func:`feedsim.cosim.run`."""
         results = run(self.with_machine(machine), program=self.program, fmus=fmus, torque_feedforward=torque)
         x, z = (np.asarray(results.trace[f"{axis}.x_a"]) for axis in self.plane)
-        result = np.empty((len(self.pairs), 2, 2))
-        for i, (pair, turn, centre) in enumerate(zip(self.pairs, self.turns, self.centres, strict=True)):
-            rows = (results.trace.time >= turn[0]) & (results.trace.time <= turn[1])
+        time, result = results.trace.time, []
+        for pair, (begin, end), centre in zip(self.pairs, self.turns, self.centres, strict=True):
+            rows = (time >= begin) & (time <= end)
             u, w = x[rows] - centre[0], z[rows] - centre[1]
-            deviation, angle = np.hypot(u, w) - pair.radius, np.arctan2(w, u)
-            deviation = deviation - np.median(deviation)
-            for k in range(2):
-                near = quadrant(angle, k * math.pi / 2) | quadrant(angle, k * math.pi / 2 + math.pi)
-                result[i, k] = deviation[near].max(), deviation[near].min()
-        return result
+            result.append(Contour(np.arctan2(w, u), np.hypot(u, w) - pair.radius))
+        return tuple(result)
+
+    def errors(self, machine: Machine, *, fmus: Path | None = None) -> Array:
+        """(pairs, 2 axes, 2) peaks and dips [m] of all circles, as :func:`extremes`. Raises as :meth:`contours`."""
+        return extremes(self.contours(machine, fmus=fmus))
+
+
+def extremes(contours: Sequence[Contour], free: Sequence[Contour] | None = None) -> Array:
+    """(pairs, 2 axes, 2) peak and dip [m] of the radius where an axis reverses, from the median of the turn.
+
+    The larger of two reversals each. free: contours of the same circles without friction. With them it is the part that
+    friction makes: the difference of both radii at the same instant. Drives alone make ellipses of fast circles, which
+    no friction compensation takes off.
+    """
+    result = np.empty((len(contours), 2, 2))
+    for i, contour in enumerate(contours):
+        deviation = contour.deviation if free is None else contour.deviation - free[i].deviation
+        deviation = deviation - np.median(deviation)
+        for k in range(2):
+            near = quadrant(contour.angle, k * math.pi / 2) | quadrant(contour.angle, k * math.pi / 2 + math.pi)
+            result[i, k] = deviation[near].max(), deviation[near].min()
+    return result
 
 
 def size(errors: Array) -> Array:

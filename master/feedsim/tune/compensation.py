@@ -13,12 +13,31 @@ from feedsim.cosim.feedforward import TorqueFeedforward, friction_feedforward, l
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.scenario import Machine, Scenario
-from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
+from feedsim.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
 from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table, together, without
 from feedsim.tune.effects import Effect, effects_of, frictionless
+from feedsim.tune.trials import Trials
 from feedsim.uncertainty import JUDGE_SEED, SEARCH_DRAWS, SEARCH_SEED, Cloud, draw_named, torque_scale
 
 OTHER_CAUSES = 0.1  # of the error without compensation, from where on a part that is not friction's is named
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Errors of circles where an axis reverses, without and with a compensation: (pairs, 2 axes of the plane) [m].
+
+    before, after: of the circles as they are. own_before, own_after: the part that friction makes.
+    """
+
+    before: Array
+    after: Array
+    own_before: Array
+    own_after: Array
+
+    @classmethod
+    def of(cls, before: Sequence[Contour], after: Sequence[Contour], free: Sequence[Contour]) -> Errors:
+        """free: contours of the same machine without friction."""
+        return cls(*(size(extremes(contours, than)) for than in (None, free) for contours in (before, after)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +47,11 @@ class Judged:
     Attributes:
         scenario, plane, axes: of what. objective: what was minimised.
         found: kind and values.
-        tuned, held: pairs that it was found on, and other ones. Errors are (pairs, 2 axes of the plane) [m]:
-        tuned_before, tuned_after, held_before, held_after: without and with it.
-        held_frictionless: errors of the machine without friction, which no friction compensation takes off.
-        changed: effect of the machine -> (2, pairs, 2) errors [m] of the pairs held out, without and with it.
-        drawn: (draws, 2, pairs, 2) the same, of draws of the machine from cloud; None without.
+        tuned, held_out: pairs that it was found on, and other ones; tuned_errors, held_errors: of them.
+        held_frictionless: errors (pairs, 2) [m] of the machine without friction, which no friction compensation takes
+            off.
+        changed: effect of the machine -> errors of the pairs held out.
+        drawn: the same of draws of the machine from cloud; None without.
     """
 
     scenario: Scenario
@@ -41,14 +60,12 @@ class Judged:
     objective: str
     found: Found
     tuned: tuple[Pair, ...]
-    held: tuple[Pair, ...]
-    tuned_before: Array
-    tuned_after: Array
-    held_before: Array
-    held_after: Array
+    held_out: tuple[Pair, ...]
+    tuned_errors: Errors
+    held_errors: Errors
     held_frictionless: Array
-    changed: Mapping[Effect, Array]
-    drawn: Array | None = None
+    changed: Mapping[Effect, Errors]
+    drawn: Sequence[Errors] | None = None
     cloud: Cloud | None = None
 
     @property
@@ -56,19 +73,22 @@ class Judged:
         """Places of the compensated axes in the plane."""
         return [self.plane.index(axis) for axis in self.axes]
 
-    def reduction(self, before: Array, after: Array) -> Array:
+    def reduction(self, errors: Errors) -> Array:
         """(pairs, compensated axes) by how much the error falls [1]; below 0 it grows."""
-        columns = self.columns
-        return np.asarray(1 - after[:, columns] / before[:, columns])
+        return np.asarray(1 - (errors.after / errors.before)[:, self.columns])
+
+    def own_reduction(self, errors: Errors) -> Array:
+        """(pairs, compensated axes) by how much the part that friction makes falls [1]."""
+        return np.asarray(1 - (errors.own_after / errors.own_before)[:, self.columns])
 
     @property
     def beyond_friction(self) -> list[tuple[str, Pair, float, float]]:
         """Axis, pair, error without friction and before [m], of pairs held out whose error is more than friction's, the
         largest share first."""
         result = [
-            (axis, pair, float(self.held_frictionless[i, k]), float(self.held_before[i, k]))
+            (axis, pair, float(self.held_frictionless[i, k]), float(self.held_errors.before[i, k]))
             for k, axis in zip(self.columns, self.axes, strict=True)
-            for i, pair in enumerate(self.held)
+            for i, pair in enumerate(self.held_out)
         ]
         return sorted(
             (entry for entry in result if entry[2] > OTHER_CAUSES * entry[3]),
@@ -79,11 +99,12 @@ class Judged:
     @property
     def worse(self) -> list[tuple[str, Pair, float, float]]:
         """Axis, pair, error before and after [m] of every pair held out that gets worse by more than 5 %."""
+        before, after = self.held_errors.before, self.held_errors.after
         return [
-            (axis, pair, float(self.held_before[i, k]), float(self.held_after[i, k]))
+            (axis, pair, float(before[i, k]), float(after[i, k]))
             for k, axis in zip(self.columns, self.axes, strict=True)
-            for i, pair in enumerate(self.held)
-            if self.held_after[i, k] > NEVER_WORSE * self.held_before[i, k]
+            for i, pair in enumerate(self.held_out)
+            if after[i, k] > NEVER_WORSE * before[i, k]
         ]
 
 
@@ -113,37 +134,37 @@ def tune(
     machines = [machine, *(draws(SEARCH_DRAWS, SEARCH_SEED) if kind != "model" else ())]
     result = _found(on, machines, kind, axes, objective, fmus, progress)
 
-    def errors(circles: Circles, own: Machine, *, compensated: bool) -> Array:
-        if not compensated:
-            return size(circles.errors(own, fmus=fmus))
+    def compensated(circles: Circles, own: Machine) -> tuple[Contour, ...]:
         torque = None
         if kind == "model":
             made = _feedforward(circles, machine, axes, fmus)
             torque = {axis: torque_scale(machine, own, axis) * values for axis, values in made.items()}
-        return size(circles.errors(result.on(own, machine), fmus=fmus, torque=torque))
+        return circles.contours(result.on(own, machine), fmus=fmus, torque=torque)
+
+    def judged(circles: Circles, own: Machine) -> tuple[Errors, tuple[Contour, ...]]:
+        free = circles.contours(frictionless(own, plane), fmus=fmus)
+        return Errors.of(circles.contours(own, fmus=fmus), compensated(circles, own), free), free
 
     names = list(effects_of(machine, axes))
-    total, done = 5 + len(names) + count, 0
+    total, done = 2 + len(names) + count, 0
 
-    def both(own: Machine) -> Array:
+    def next_one(circles: Circles, own: Machine) -> tuple[Errors, tuple[Contour, ...]]:
         nonlocal done
         progress("judging", done, total)
         done += 1
-        return np.array([errors(off, own, compensated=entry) for entry in (False, True)])
+        return judged(circles, own)
 
-    progress("judging", done, total)
-    tuned_before, tuned_after = (errors(on, machine, compensated=entry) for entry in (False, True))
-    held_before, held_after = both(machine)
-    free = errors(off, frictionless(machine, plane), compensated=False)
-    changed = {effect: both(own) for effect, own in names}
+    tuned_errors, _ = next_one(on, machine)
+    held_errors, free = next_one(off, machine)
+    changed = {effect: next_one(off, own)[0] for effect, own in names}
     drawn = []
     for k, own in enumerate(draws(count, JUDGE_SEED)):
         with draw_named(k, count):
-            drawn.append(both(own))
+            drawn.append(next_one(off, own)[0])
     progress("judging", total, total)
     return Judged(
-        scenario, plane, tuple(axes), objective, result, tuple(tuned), tuple(pairs), tuned_before, tuned_after,
-        held_before, held_after, free, changed, np.array(drawn) if drawn else None, cloud,
+        scenario, plane, tuple(axes), objective, result, tuple(tuned), tuple(pairs), tuned_errors, held_errors,
+        size(extremes(free)), changed, drawn or None, cloud,
     )  # fmt: skip
 
 
@@ -159,9 +180,10 @@ def _found(
     if kind == "model":
         return Found(kind, {axis: {} for axis in axes}, 0)
     machine = machines[0]
+    trials = Trials.of(on, machines, fmus)
     if kind == "table":
-        return table(on, machines, objective, fmus=fmus, progress=progress, axes=axes)
-    grid = PulseGrid.measured(on, machines, fmus=fmus, progress=progress, axes=axes)
+        return table(trials, objective, progress=progress, axes=axes)
+    grid = PulseGrid.measured(trials, progress=progress, axes=axes)
     accelerations = np.array([pair.acceleration for pair in on.pairs] * len(machines))
     values = {
         axis: {
@@ -170,9 +192,7 @@ def _found(
         }
         for axis in axes
     }
-    values, runs = together(
-        on, machines, values, objective, before=size(grid.errors[0, 0]), fmus=fmus, progress=progress
-    )
+    values, runs = together(trials, values, objective, before=size(grid.errors[0, 0]), progress=progress)
     return Found(kind, values, runs + len(machines) * int(np.prod(grid.errors.shape[:2])))
 
 

@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +20,10 @@ from feedsim.analysis.figures import Array
 from feedsim.cosim.feedforward import lag_of
 from feedsim.errors import InputError
 from feedsim.scenario import Drive, Machine
-from feedsim.tune.circles import Circles, size
+from feedsim.tune.circles import size
 from feedsim.tune.closed_forms import axis_lag
-from feedsim.uncertainty import draw_named, torque_scale
+from feedsim.tune.groups import with_groups
+from feedsim.tune.trials import Trials
 
 COMPENSATOR_KINDS = ("pulse", "pulse_characteristic", "table", "model")
 OBJECTIVES = ("ratio", "worst", "largest")
@@ -61,20 +60,6 @@ class Found:
         return machine if group is None else with_groups(machine, of, group, self.values)
 
 
-def with_groups(
-    machine: Machine, of: Machine, group: str, values: Mapping[str, Mapping[str, float | bool | int]]
-) -> Machine:
-    """A draw of the machine `of`, or that machine, whose axes have a group of their drives with other values.
-
-    The values are those of the control; all torques of a draw are multiplied with one factor, and so are theirs.
-    """
-    for axis, entry in values.items():
-        scale = torque_scale(of, machine, axis)
-        own = {name: scale * value if name.startswith("torque_") else value for name, value in entry.items()}
-        machine = compensated(machine, axis, group, own)
-    return machine
-
-
 def without(machine: Machine, kind: str, axes: Sequence[str]) -> Machine:
     """The machine without a compensation of that kind on some axes: one that its file has is no part of the search."""
     if (group := GROUP_OF_KIND.get(kind)) is None:
@@ -84,17 +69,6 @@ def without(machine: Machine, kind: str, axes: Sequence[str]) -> Machine:
         drive = changed[axis].drive.model_copy(update={group: None})
         changed[axis] = changed[axis].model_copy(update={"drive": drive})
     return machine.model_copy(update={"axes": changed})
-
-
-def compensated(machine: Machine, axis: str, group: str, values: Mapping[str, float | bool | int]) -> Machine:
-    """A machine whose axis has a group of its drive with other values."""
-    own = machine.axes[axis]
-    kind = type(own.drive).model_fields[group].annotation
-    (model,) = [entry for entry in kind.__args__ if entry is not type(None)]  # type: ignore[union-attr]
-    names = model.model_fields
-    filled = {name: values.get(name, info.default) for name, info in names.items()}
-    drive = own.drive.model_copy(update={group: model.model_construct(**filled)})
-    return machine.model_copy(update={"axes": {**machine.axes, axis: own.model_copy(update={"drive": drive})}})
 
 
 def scale_of(machine: Machine, axis: str) -> float:
@@ -124,15 +98,12 @@ class PulseGrid:
     errors: Array
 
     @classmethod
-    def measured(
-        cls, circles: Circles, machines: Sequence[Machine], *, fmus: Path | None, progress: Progress,
-        axes: Sequence[str],
-    ) -> PulseGrid:  # fmt: skip
-        """Runs for every point of the grid, with both axes at the same share, on the first machine and on others of the
-        same drives: their pairs stand behind one another."""
-        machine = machines[0]
-        scales = tuple(scale_of(machine, axis) if axis in axes else 0.0 for axis in circles.plane)
-        none = _over(circles, machines, fmus)
+    def measured(cls, trials: Trials, *, progress: Progress, axes: Sequence[str]) -> PulseGrid:
+        """Runs for every point of the grid, with both axes at the same share: pairs of all machines stand behind one
+        another."""
+        machine, plane = trials.machines[0], trials.circles.plane
+        scales = tuple(scale_of(machine, axis) if axis in axes else 0.0 for axis in plane)
+        none = trials.errors()
         values = np.empty((len(AMPLITUDE_SHARES), len(TIME_CONSTANTS), *none.shape))
         values[0] = none
         total, done = (len(AMPLITUDE_SHARES) - 1) * len(TIME_CONSTANTS), 0
@@ -141,10 +112,10 @@ class PulseGrid:
                 progress("pulses", done, total)
                 groups = {
                     axis: {"amplitude": share * scale, "time": time, "delay": instant(machine, axis)}
-                    for axis, scale in zip(circles.plane, scales, strict=True)
+                    for axis, scale in zip(plane, scales, strict=True)
                     if scale
                 }
-                values[i, j] = _over(circles, machines, fmus, "friction_pulse", groups)
+                values[i, j] = trials.errors("friction_pulse", groups)
                 done += 1
         progress("pulses", total, total)
         return cls((scales[0], scales[1]), values)
@@ -161,22 +132,6 @@ class PulseGrid:
         low = (1 - p) * of[i, j, pairs] + p * of[i + 1, j, pairs]
         high = (1 - p) * of[i, j + 1, pairs] + p * of[i + 1, j + 1, pairs]
         return size((1 - q) * low + q * high)
-
-
-def _over(
-    circles: Circles, machines: Sequence[Machine], fmus: Path | None, group: str = "",
-    values: Mapping[str, Mapping[str, float | bool | int]] | None = None,
-) -> Array:  # fmt: skip
-    """(machines x pairs, axes, 2) errors [m] of machines whose axes have a group of their drives with other values.
-
-    machines: the first one, and draws of it.
-    """
-    result = []
-    for k, machine in enumerate(machines):
-        own = with_groups(machine, machines[0], group, values or {})
-        with draw_named(k - 1, len(machines) - 1, "which the values are found on") if k else nullcontext():
-            result.append(circles.errors(own, fmus=fmus))
-    return np.concatenate(result)
 
 
 def _between(grid: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
@@ -241,8 +196,8 @@ def pulse(
 
 
 def together(
-    circles: Circles, machines: Sequence[Machine], values: Mapping[str, Mapping[str, float | bool]], objective: str, *,
-    before: Array, fmus: Path | None, progress: Progress,
+    trials: Trials, values: Mapping[str, Mapping[str, float | bool]], objective: str, *, before: Array,
+    progress: Progress,
 ) -> tuple[dict[str, dict[str, float | bool]], int]:  # fmt: skip
     """Pulses of several axes, changed step by step where all axes together get better, and the runs that it took.
 
@@ -251,11 +206,11 @@ def together(
 
     before: (machines x pairs, axes) errors [m] without compensation.
     """
-    columns = [circles.plane.index(axis) for axis in values]
+    columns = [trials.circles.plane.index(axis) for axis in values]
     best = {axis: dict(value) for axis, value in values.items()}
 
     def cost(at: Mapping[str, Mapping[str, float | bool]]) -> float:
-        errors = size(_over(circles, machines, fmus, "friction_pulse", at))[:, columns]
+        errors = size(trials.errors("friction_pulse", at))[:, columns]
         return float(score((errors / before[:, columns]).T, errors.T, objective).mean())
 
     least, runs = cost(best), 1
@@ -272,7 +227,7 @@ def together(
                     best, least = tried, result
                     break
     progress("both axes", total, total)
-    return best, len(machines) * runs
+    return best, len(trials.machines) * runs
 
 
 def instant(machine: Machine, axis: str) -> float:
@@ -281,20 +236,14 @@ def instant(machine: Machine, axis: str) -> float:
     return max(0.0, axis_lag(drive) - drive.T_dyn)
 
 
-def table(
-    circles: Circles, machines: Sequence[Machine], objective: str, *, fmus: Path | None, progress: Progress,
-    axes: Sequence[str],
-) -> Found:  # fmt: skip
-    """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs.
-
-    machines: the first one, and others of the same drives that the torques are to be good for as well.
-    """
-    plane, machine = circles.plane, machines[0]
+def table(trials: Trials, objective: str, *, progress: Progress, axes: Sequence[str]) -> Found:
+    """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs."""
+    plane, machine = trials.circles.plane, trials.machines[0]
     level = {axis: machine.shipped_friction(axis, "tuning of a compensation").F_C for axis in axes}
     delay = {axis: _delay(machine, axis) for axis in axes}
-    before = size(_over(circles, machines, fmus))
+    before = size(trials.errors())
     torques = {axis: np.zeros(len(SPEEDS)) for axis in axes}
-    runs = len(machines)
+    runs = len(trials.machines)
 
     def values_of(axis: str, at: Array) -> dict[str, float | bool | int]:
         values: dict[str, float | bool | int] = {"points": len(SPEEDS), "distance": DISTANCE, "delay": delay[axis]}
@@ -304,8 +253,8 @@ def table(
     def scores(candidates: Mapping[str, Array]) -> dict[str, float]:
         nonlocal runs
         groups = {axis: values_of(axis, at) for axis, at in candidates.items()}
-        errors = size(_over(circles, machines, fmus, "friction_table", groups))
-        runs += len(machines)
+        errors = size(trials.errors("friction_table", groups))
+        runs += len(trials.machines)
         return {
             axis: float(score(errors[:, k] / before[:, k], errors[:, k], objective))
             for k, axis in enumerate(plane)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from feedsim.scenario import Drive, Friction, Machine
 from feedsim.scenario.axis_units import SHARED_WITH_GUIDE, Guide, Transmission
 from feedsim.structure import checked_modes
-from feedsim.tune.compensators import compensated
+from feedsim.tune.groups import compensated
 
 STRENGTH = 0.2  # of the friction, either way
 NO_FRICTION = 1e-6  # of all torques of a friction law: it has to have some

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
+from feedsim.analysis.figures import Array
 from feedsim.control import Name, names_of
 from feedsim.findings import Note, Wrong
 from feedsim.report import sections
@@ -21,7 +22,7 @@ from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, BEFORE
 from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
-from feedsim.tune.compensation import Judged
+from feedsim.tune.compensation import Errors, Judged
 from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, amplitude
 from feedsim.uncertainty import interval, share_of
 from feedsim.units import convert
@@ -54,18 +55,19 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 def figures_of(judged: Judged) -> dict[str, Figure]:
     """How much errors at the reversals fall, on the circles that were not used for tuning."""
-    values = judged.reduction(judged.held_before, judged.held_after)
-    words = "reduction of the error at the reversals, of all axes and of the circles that were not used for tuning"
-    figures = {
-        "held_out.median": Figure(100 * float(np.median(values)), "%", f"median {words}"),
-        "held_out.worst": Figure(100 * float(values.min()), "%", f"least {words}"),
-    }
-    for effect, (before, after) in judged.changed.items():
-        own = judged.reduction(before, after)
-        figures[f"{effect.name}.median"] = Figure(
-            100 * float(np.median(own)), "%", f"median {words}, with {effect.words}"
-        )
-        figures[f"{effect.name}.worst"] = Figure(100 * float(own.min()), "%", f"least {words}, with {effect.words}")
+    whole = "reduction of the error at the reversals"
+    own = "reduction of the part of the error at the reversals that friction makes"
+    others = "of all axes and of the circles that were not used for tuning"
+    figures = {}
+    cases = {"held_out": ("", judged.held_errors)}
+    cases |= {effect.name: (f", with {effect.words}", errors) for effect, errors in judged.changed.items()}
+    for name, (case, errors) in cases.items():
+        for prefix, words, values in (
+            ("", whole, judged.reduction(errors)), ("friction_", own, judged.own_reduction(errors)),
+        ):  # fmt: skip
+            for key, word, value in (("median", "median", np.median(values)), ("worst", "least", values.min())):
+                meaning = f"{word} {words}, {others}{case}"
+                figures[f"{name}.{prefix}{key}"] = Figure(100 * float(value), "%", meaning)
     for name, (low, high) in drawn_intervals(judged).items():
         for end, value in (("from", low), ("to", high)):
             figures[f"held_out.{name}_{end}"] = Figure(
@@ -73,9 +75,9 @@ def figures_of(judged: Judged) -> dict[str, Figure]:
                 f"{100 * share_of(len(judged.drawn)):.0f} % of draws of the machine",  # type: ignore[arg-type]
             )  # fmt: skip
     for axis, k in zip(judged.axes, judged.columns, strict=True):
-        for name, errors in (("before", judged.held_before), ("after", judged.held_after)):
+        for name, values in (("before", judged.held_errors.before), ("after", judged.held_errors.after)):
             figures[f"{axis}.largest_{name}"] = Figure(
-                1e6 * float(errors[:, k].max()), "um", f"largest error where {axis} reverses, {name} tuning: peak or "
+                1e6 * float(values[:, k].max()), "um", f"largest error where {axis} reverses, {name} tuning: peak or "
                 "dip of the radius against the median of the turn",
             )  # fmt: skip
     return figures
@@ -85,7 +87,7 @@ def drawn_intervals(judged: Judged) -> dict[str, tuple[float, float]]:
     """Intervals [%] of the median and of the least reduction over draws of the machine; empty without."""
     if judged.drawn is None:
         return {}
-    entry = [100 * judged.reduction(before, after) for before, after in judged.drawn]
+    entry = [100 * judged.reduction(errors) for errors in judged.drawn]
     result = {"median": np.array([np.median(one) for one in entry]), "worst": np.array([one.min() for one in entry])}
     return {name: tuple(map(float, interval(values))) for name, values in result.items()}  # type: ignore[misc]
 
@@ -98,12 +100,12 @@ def findings(judged: Judged) -> list[str]:
     ]
     result: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
     figures = figures_of(judged)
-    for effect, (before, after) in judged.changed.items():
-        if (judged.reduction(before, after) < 1 - NEVER_WORSE).any():
+    for effect, errors in judged.changed.items():
+        if (judged.reduction(errors) < 1 - NEVER_WORSE).any():
             most = -figures[f"{effect.name}.worst"].value
             result.append(f"with {effect.words} a circle gets worse than without compensation, by {most:.0f} %")
     if judged.drawn is not None:
-        worst = 100 * np.array([judged.reduction(*entry).min() for entry in judged.drawn])
+        worst = 100 * np.array([judged.reduction(errors).min() for errors in judged.drawn])
         bad = int((worst < 100 * (1 - NEVER_WORSE)).sum())
         if bad:
             result.append(
@@ -131,8 +133,9 @@ def answers(judged: Judged) -> list[str]:
     where = f"{judged.plane[0]}-{judged.plane[1]}"
     return [
         f"{where}: {WORDS[judged.found.kind]} of {', '.join(judged.axes)} takes off {figures['held_out.median']} of "
-        f"the error at the reversals (median of {len(judged.held)} other circles), at least "
-        f"{figures['held_out.worst']}.",
+        f"the error at the reversals (median of {len(judged.held_out)} other circles), at least "
+        f"{figures['held_out.worst']}; of the part that friction makes {figures['held_out.friction_median']}, at least "
+        f"{figures['held_out.friction_worst']}.",
         *_drawn_answer(judged),
     ]
 
@@ -204,7 +207,12 @@ def report_of(judged: Judged) -> Report:
     figures, machine = figures_of(judged), judged.scenario.machine
     tiles = [
         Tile(tile_value(figures[name]), label, typeset(figures[name].meaning))
-        for name, label in (("held_out.median", "median reduction"), ("held_out.worst", "least reduction"))
+        for name, label in (
+            ("held_out.median", "median reduction"),
+            ("held_out.worst", "least reduction"),
+            ("held_out.friction_median", "median reduction, friction's part"),
+            ("held_out.friction_worst", "least reduction, friction's part"),
+        )
     ]
     notes = [note for note in (machine.note, judged.scenario.note) if note]
     rows_ = [
@@ -225,14 +233,9 @@ def report_of(judged: Judged) -> Report:
             _values(judged),
             _effects(judged, figures),
             _errors(
-                "Circles not used for tuning",
-                judged.held,
-                judged.held_before,
-                judged.held_after,
-                judged,
-                judged.held_frictionless,
+                "Circles not used for tuning", judged.held_out, judged.held_errors, judged, judged.held_frictionless
             ),
-            _errors("Circles tuned on", judged.tuned, judged.tuned_before, judged.tuned_after, judged),
+            _errors("Circles tuned on", judged.tuned, judged.tuned_errors, judged),
             sections.figures_section(figures),
         ],
         provenance=sections.provenance_section(rows_, input_files(judged.scenario)),
@@ -253,30 +256,40 @@ def _values(judged: Judged) -> Section | None:
 
 def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:
     """What the same values do where the machine is another one."""
-    lines: list[tuple[Text, ...]] = [("as the machine file has it", *_both(figures, "held_out"))]
-    lines += [(effect.words, *_both(figures, effect.name)) for effect in judged.changed]
+    lines: list[tuple[Text, ...]] = [("as the machine file has it", *_four(figures, "held_out"))]
+    lines += [(effect.words, *_four(figures, effect.name)) for effect in judged.changed]
     for name, (low, high) in drawn_intervals(judged).items():
         if name == "median":
             worst = drawn_intervals(judged)["worst"]
             lines.append(
-                ("draws of identified values", *(minus(f"{a:.0f} to {b:.0f}") for a, b in ((low, high), worst)))
+                ("draws of identified values", *(minus(f"{a:.0f} to {b:.0f}") for a, b in ((low, high), worst)), "", "")
             )
-    note = "The same values on a changed machine. The sizes are usual ones, not measured ones."
-    heads = ("Machine", "Median reduction [%]", "Least reduction [%]")
+    note = (
+        "The same values on a changed machine. The sizes are usual ones, not measured ones. What friction makes is the "
+        "difference from the same machine without friction, at the same instant."
+    )
+    heads = (
+        "Machine",
+        "Median reduction [%]",
+        "Least [%]",
+        "Median, friction's part [%]",
+        "Least, friction's part [%]",
+    )
     drawn = [] if judged.cloud is None else [drawn_values(judged.cloud)]
-    return Section("With other effects of the machine", [Table("lrr", heads, lines, note), *drawn], "effects")
+    return Section("With other effects of the machine", [Table("lrrrr", heads, lines, note), *drawn], "effects")
 
 
-def _both(figures: Mapping[str, Figure], name: str) -> tuple[str, str]:
-    median, worst = (figures[f"{name}.{key}"].value for key in ("median", "worst"))
-    return minus(f"{median:.0f}"), minus(f"{worst:.0f}")
+def _four(figures: Mapping[str, Figure], name: str) -> tuple[str, ...]:
+    keys = ("median", "worst", "friction_median", "friction_worst")
+    return tuple(minus(f"{figures[f'{name}.{key}'].value:.0f}") for key in keys)
 
 
 def _errors(
-    title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: Judged, free: Any = None
+    title: str, pairs: Sequence[Pair], errors: Errors, judged: Judged, free: Array | None = None
 ) -> Section:  # fmt: skip
     """free: errors without friction, where they are known."""
     lines: list[tuple[Text, ...]] = []
+    before, after = errors.before, errors.after
     for i, pair in enumerate(pairs):
         cells = [f"{pair.radius * 1e3:.4g}", f"{pair.feed * 60:.4g}", f"{pair.acceleration:.3g}"]
         for k in judged.columns:
@@ -295,14 +308,14 @@ def _errors(
 
 def pictures_of(judged: Judged) -> list[Picture]:
     """Errors over the acceleration without and with, and the characteristic as the control's manual draws it."""
-    accelerations = np.array([pair.acceleration for pair in judged.held])
+    accelerations = np.array([pair.acceleration for pair in judged.held_out])
     across = Axis("acceleration at the reversal, v²/r", "m/s²", log=True)
     panels = [
         Panel(
             f"{axis}", across, Axis("error at the reversals", "µm"),
             [Curve(name, accelerations, 1e6 * errors[:, k], colour, dots=True)
              for name, errors, colour in (
-                 ("without", judged.held_before, BEFORE), ("with", judged.held_after, AFTER))],
+                 ("without", judged.held_errors.before, BEFORE), ("with", judged.held_errors.after, AFTER))],
         )
         for axis, k in zip(judged.axes, judged.columns, strict=True)
     ]  # fmt: skip
@@ -340,11 +353,11 @@ def summary(judged: Judged, names: Sequence[str]) -> Mapping[str, Any]:
         "circles": {
             name: [
                 {"radius": pair.radius, "feed": pair.feed, "before": list(before), "after": list(after)}
-                for pair, before, after in zip(pairs, befores.tolist(), afters.tolist(), strict=True)
+                for pair, before, after in zip(pairs, errors.before.tolist(), errors.after.tolist(), strict=True)
             ]
-            for name, pairs, befores, afters in (
-                ("tuned", judged.tuned, judged.tuned_before, judged.tuned_after),
-                ("held_out", judged.held, judged.held_before, judged.held_after),
+            for name, pairs, errors in (
+                ("tuned", judged.tuned, judged.tuned_errors),
+                ("held_out", judged.held_out, judged.held_errors),
             )
         },
         "axes": list(judged.plane),

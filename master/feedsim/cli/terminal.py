@@ -7,7 +7,7 @@ import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,6 +25,7 @@ class TerminalWatch(Watch):
     """Shows what a job reports: a progress bar, and sentences on standard error."""
 
     def __init__(self, bar: Any, quiet: bool) -> None:
+        """bar: of tqdm; None where nobody looks."""
         self._bar, self._quiet = bar, quiet
         self._what: str | None = None
         self.command = ("feedsim", *sys.argv[1:])  # not where it is installed: records are sent to others
@@ -33,6 +34,8 @@ class TerminalWatch(Watch):
     def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
         """How many of its steps are done, of how many. before: done earlier, which do not count for the rate."""
         self.done, self.total = done, total
+        if self._bar is None:
+            return
         if what != self._what:
             self._what = what
             self._bar.reset(total)
@@ -44,19 +47,23 @@ class TerminalWatch(Watch):
             self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
 
+    def _aside(self) -> AbstractContextManager[Any]:
+        """A block that prints beside the bar."""
+        return nullcontext() if self._bar is None else self._bar.external_write_mode(file=sys.stderr)
+
     def announce(self, sentence: str) -> None:
         """Whose programs the job executes."""
-        with self._bar.external_write_mode(file=sys.stderr):
+        with self._aside():
             print(f"feedsim: {sentence}", file=sys.stderr)
 
     def note(self, sentence: str) -> None:
         """What the job will replace."""
-        with self._bar.external_write_mode(file=sys.stderr):
+        with self._aside():
             warn([Note(sentence)])
 
     def warn(self, findings: Iterable[str]) -> None:
         """What is the matter with the files that the job begins with."""
-        with self._bar.external_write_mode(file=sys.stderr):
+        with self._aside():
             warn(findings)
 
     def say(self, sentence: str) -> None:
@@ -103,9 +110,12 @@ def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterato
 
     unit: what the bar counts; shortened: in large numbers (12.3k).
     """
+    if quiet or not sys.stderr.isatty():
+        yield TerminalWatch(None, quiet)
+        return
     from tqdm import tqdm
 
-    with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
+    with tqdm(unit=unit, unit_scale=shortened, leave=False) as bar:
         yield TerminalWatch(bar, quiet)
 
 

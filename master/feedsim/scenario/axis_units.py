@@ -263,10 +263,10 @@ class Drive(_Effects):
     M_max: float = _drive("M_max")
 
     # current setpoint filters, in series
-    filter_1: Filter = Field(default=Filter(), description="Current setpoint filter 1")
-    filter_2: Filter = Field(default=Filter(), description="Current setpoint filter 2")
-    filter_3: Filter = Field(default=Filter(), description="Current setpoint filter 3")
-    filter_4: Filter = Field(default=Filter(), description="Current setpoint filter 4")
+    filter_1: Filter = Field(default=Filter.model_construct(), description="Current setpoint filter 1")
+    filter_2: Filter = Field(default=Filter.model_construct(), description="Current setpoint filter 2")
+    filter_3: Filter = Field(default=Filter.model_construct(), description="Current setpoint filter 3")
+    filter_4: Filter = Field(default=Filter.model_construct(), description="Current setpoint filter 4")
 
     # current loop and motor
     ideal_current_loop: StrictBool = _drive("ideal_current_loop", False)

@@ -22,6 +22,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
+from math import isclose
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,6 +37,7 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import read_axes, windowed
+from feedsim.replay.cycle import decision
 from feedsim.replay.elastic import ElasticMode, with_modes
 from feedsim.replay.identified import identify_drives
 from feedsim.scenario import Machine, load, load_machine
@@ -230,10 +232,15 @@ def identified(
     modes = None if kind.modes else 0
     found = identify_drives(read, records, None, [], "made", "made", modes=modes).drives[kind.axis]
     true, estimated = truth(known, kind.axis), {}
+    decided = found.other is not None and decision([found.other]) != 0
 
     def judge(name: str, holds: bool) -> None:
         outcome.within[name] = outcome.within.get(name, True) and bool(holds)
 
+    if decided:
+        judge("cycle", isclose(found.machine.cycles.T_pos, known.cycles.T_pos))
+    else:
+        outcome.undetermined.append("cycle")
     for name, each in found.estimates.items():
         if name in true and each.status == "estimated":
             estimated[name] = each

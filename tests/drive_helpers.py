@@ -48,9 +48,15 @@ def logged(folder: Path, axis: str, noise: str = "", seed: int = 1, machine: Pat
 
 
 def identified(
-    path: Path, axis: str, machine: Machine | None = None, mapping: Columns | None = None
+    path: Path,
+    axis: str,
+    machine: Machine | None = None,
+    mapping: Columns | None = None,
+    position_cycle: float | None = None,
 ) -> tuple[DriveFound, dict[str, str]]:
     read: dict[str, Recorded] = read_axes(path, [axis], machine, mapping)
     records: dict[str, AxisRecord] = {axis: windowed(axis, read[axis], None)}
-    found = identify_drives(read, records, machine, ["made by a test"], "made", "by a test")
+    found = identify_drives(
+        read, records, machine, ["made by a test"], "made", "by a test", position_cycle=position_cycle
+    )
     return found.drives[axis], dict(found.files)

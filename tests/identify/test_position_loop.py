@@ -11,7 +11,7 @@ import pytest
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Record, read_records
-from feedsim.identify.position_loop import gain_by_deviation, noisy_delay, setpoint_delay, speed_setpoint
+from feedsim.identify.position_loop import Taps, gain_by_deviation, noisy_delay, setpoint_delay, speed_setpoint
 
 H = 2e-3
 
@@ -140,5 +140,25 @@ def test_gain_by_the_following_error(noise: float) -> None:
         whole = replace(each, deviation=noisy, speed_setpoint=n_s, feedforward=forward)
         found = gain_by_deviation([whole], 6.25e-3)
         misses += not abs(found.value - 33.0) <= NORMAL_95 * found.sigma + 1e-9
-        assert found.sigma < 0.33
+        assert found.sigma < 0.5
     assert misses <= 3
+
+
+def test_a_delay_that_few_stretches_determine() -> None:
+    """An axis that moves in two of the eight stretches, in each with a delay that is off by an error of its own, as a
+    model's is: with Student's distribution of eight stretches the interval held three of four records."""
+    rows, delay = 800, 3 * H
+    speed = np.zeros(rows)
+    for begin in (130, 530):
+        speed[begin : begin + 40] = 5 * np.sin(np.pi * np.arange(40) / 40) ** 2
+    x = np.cumsum(speed)
+    delayed = np.concatenate([np.full(3, x[0]), x[:-3]])
+    taps = Taps(3, np.ones(1), H, 0.0, 0.0, 0.0)
+    inside, rng = 0, np.random.default_rng(1)
+    for _ in range(300):
+        error = np.repeat(0.05 * rng.standard_normal(8), rows // 8)
+        deviation = error * np.gradient(x) + 1e-3 * rng.standard_normal(rows)
+        each = Record("made", H * np.arange(rows), np.zeros(rows), angle=delayed, setpoint=x, deviation=deviation)
+        found = noisy_delay([each], taps)
+        inside += abs(found.value - delay) <= NORMAL_95 * found.sigma
+    assert 0.91 <= inside / 300 <= 0.99

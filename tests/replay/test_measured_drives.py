@@ -23,13 +23,35 @@ from feedsim.scenario import load_machine
 def test_a_real_machine(axis: str, position: float, torque: float, gain: str) -> None:
     """A SINUMERIK 840D sl, rigid axes: what a first study had reached by hand was 1.10 um and 0.32 N.m on X, 1.28 um
     and 0.68 N.m on Y, the vertical axis. K_p of X is told: its gentle moves and its rapids, each alone, give the same
-    (the test below). Y has one kind of fast stroke only."""
-    found, _ = identified(Path(os.environ["FEEDSIM_CAPTURE"]), axis)
+    (the test below). Y has one kind of fast stroke only. The loop is taken to be closed in the drive."""
+    found, _ = identified(Path(os.environ["FEEDSIM_CAPTURE"]), axis, position_cycle=125e-6)
     assert found.position < position
     assert found.torque < torque
     assert found.estimates["K_p"].status == gain
     assert "asymmetry" not in found.chosen
     assert found.estimates["T_dyn"].value + found.estimates["T_sym"].value == pytest.approx(8.25e-3, abs=1e-6)
+
+
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
+def test_a_record_that_does_not_decide_on_the_position_cycle(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Y with a loop of 2 ms is met as well; T_sym is about half of that cycle longer then. What does not depend on it
+    is estimated, and the message says which option decides."""
+    words = ["identify-drive", os.environ["FEEDSIM_CAPTURE"], "--axes", "Y", "--quiet"]
+    assert main([*words, "--out", str(tmp_path / "open")]) == 0
+    assert (
+        "axis Y: position cycles of 0.125 ms (taken) and 2 ms (--position-cycle) fit alike. Give --position-cycle "
+        "0.125ms if the drive closes the position loop (DSC), or --position-cycle 2ms if the control does"
+    ) in " ".join(capsys.readouterr().err.split())
+    found = json.loads((tmp_path / "open" / "summary.json").read_text())["axes"]["Y"]["parameters"]
+    assert found["T_sym"]["status"] == "undetermined"
+    assert found["T_sym"]["reason"].startswith("with a position cycle of 2 ms, which fits as well, it is 0.0016")
+    assert {name: found[name]["status"] for name in ("K_v", "M_0")} == {"K_v": "estimated", "M_0": "estimated"}
+    assert main([*words, "--position-cycle", "0.125ms", "--out", str(tmp_path / "given")]) == 0
+    given = json.loads((tmp_path / "given" / "summary.json").read_text())["axes"]["Y"]["parameters"]
+    assert given["T_sym"]["status"] == "estimated"
+    assert given["T_sym"]["value"] == found["T_sym"]["value"]
 
 
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")

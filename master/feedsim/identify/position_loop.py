@@ -20,7 +20,7 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.estimation.covariance import correlation_length
-from feedsim.estimation.interval import NORMAL_95, student
+from feedsim.estimation.jackknife import between_groups
 from feedsim.identify.record import Array, Record
 
 MAX_SETPOINT_DELAY = 0.1  # [s]: no control delays its setpoint by more
@@ -170,16 +170,11 @@ def gain_by_deviation(records: Sequence[Record], delay: float) -> Constant:
 
 def _of_stretches(A: Array, b: Array, weights: Array) -> tuple[float, float]:
     """weights . x of least squares A x = b (N rows), and its standard deviation: the larger one of correlated residuals
-    and of what the STRETCHES say differently (grouped jackknife, by Student's distribution)."""
+    and of what the STRETCHES say differently."""
     x, covariance = _least_squares(A, b)
     variance = float(weights @ covariance @ weights) * correlation_length(b - A @ x)
-    values = []
-    for fold in np.array_split(np.arange(len(b)), STRETCHES):
-        others = np.delete(np.arange(len(b)), fold)
-        values.append(float(weights @ _least_squares(A[others], b[others])[0]))
-    scatter = (STRETCHES - 1) / STRETCHES * float(np.sum((np.array(values) - np.mean(values)) ** 2))
-    scatter *= (student(STRETCHES - 1) / NORMAL_95) ** 2
-    return float(weights @ x), float(np.sqrt(max(variance, scatter)))
+    (scatter,) = between_groups(A, b, np.array_split(np.arange(len(b)), STRETCHES), weights[None])
+    return float(weights @ x), float(np.sqrt(max(variance, float(scatter))))
 
 
 def speed_setpoint(records: Sequence[Record]) -> SpeedSetpoint:

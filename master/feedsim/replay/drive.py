@@ -37,6 +37,7 @@ from feedsim.identify.position_loop import (
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
+from feedsim.replay.cycle import OtherCycle, other_cycle
 from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.estimates import (
     correlation_of,
@@ -57,7 +58,7 @@ from feedsim.replay.selection import (
     with_elastic_modes,
 )
 from feedsim.replay.start import Begin
-from feedsim.replay.tuning import FINAL_TOLERANCE, FIRST_TOLERANCE, Problem, Tuned
+from feedsim.replay.tuning import FINAL_TOLERANCE, Problem, Tuned, first_weights
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 
@@ -70,7 +71,6 @@ DELAY_SIGMA, GAIN_SIGMA = 10e-6, 0.01
 MIN_MOVING_ROWS = 50  # in which the axis moves
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
 WEIGHT_TOLERANCE = 0.01  # change of a weight that moves no value by what its interval shows
-DECISIVE = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,7 @@ class DriveFound:
             times or kinds of motion worse, that loss.
         position, torque: rms of what is left [m], [N.m]; without a recorded torque nan.
         predicted: the same, of every quarter of the motion by a fit to the other three.
-        other_cycles: cycle of the position loop [s] -> by how much the record is likelier with it than with the
-            machine's (logarithm of the likelihood).
+        other: a fit with another cycle of the position loop; None where the machine's is known.
         runs: of the units.
         modes: elastic ones. modes_predicted: number of modes -> rms of the position [m] of every quarter of the motion,
             by a fit to the other three. correlation: of the estimates that have an interval.
@@ -102,7 +101,7 @@ class DriveFound:
     position: float
     torque: float
     predicted: tuple[float, float]
-    other_cycles: Mapping[float, float]
+    other: OtherCycle | None
     runs: int
     modes: tuple[ElasticMode, ...] = ()
     modes_predicted: Mapping[int, float] = field(default_factory=dict)
@@ -117,7 +116,7 @@ def identify_drive(
     *,
     structure_known: bool,
     begin: Begin | None = None,
-    other_cycle: float | None = None,
+    beside_cycle: float | None = None,
     modes: int | None = 0,
     progress: Progress = lambda what, done, total: None,
 ) -> DriveFound:
@@ -129,7 +128,7 @@ def identify_drive(
         structure_known: the inertia is that of the machine's modes, and the friction has the parts that it has there.
         begin: what the record alone says, in place of the machine's values: a fit begins at each of its starts, and
             the best goes on.
-        other_cycle: of the position loop [s], in place of the machine's, that what was found is held against.
+        beside_cycle: of the position loop [s], in place of the machine's, that what was found is compared with.
         modes: elastic ones of a rigid axis; None: as many as the record asks for.
 
     Raises:
@@ -159,7 +158,7 @@ def identify_drive(
             f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {MIN_MOVING_ROWS} are "
             "needed"
         )
-    problem = Problem(machine, each, replay, candidates[0], total, J, _first_weights(each), rows)
+    problem = Problem(machine, each, replay, candidates[0], total, J, first_weights(each), rows)
     driven = each.record.driven
     free = ["K_p", "K_i", "T_sym", "k_ffw"]
     # Without a torque friction and load are the machine's: what they do to the position, the speed controller may, too.
@@ -177,7 +176,7 @@ def identify_drive(
         own = {name for name, block in BLOCKS.items() if driven and _has(problem.start, block)}
         chosen = tuple(name for name in BLOCKS if name in own)
         free += [name for part in chosen for name in BLOCKS[part]]
-        found = _first(problem, free)
+        found = problem.first(free)
     else:
         found = _best_start(problem, free, candidates)
         chosen, parts, found, undecided = friction_parts(problem, found, progress)
@@ -195,7 +194,8 @@ def identify_drive(
             break
     refuse_poor(each, found)
     found = problem.exact(found, central=True)
-    unseen = unpredicted(problem, found, np.array_split(np.arange(len(rows)), FOLDS))
+    quarters = np.array_split(np.arange(len(rows)), FOLDS)
+    unseen = unpredicted(problem, found, quarters)
     predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
     if not each.record.driven:
         predicted = predicted[0], nan
@@ -204,10 +204,14 @@ def identify_drive(
         estimates = with_undecided(estimates, without, undecided)
     if begin is not None and begin.one_way:
         estimates = one_way(each, estimates, begin.one_way)
-    likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, found, other_cycle)}
+
+    def judged(fit: Tuned) -> Mapping[str, Estimate]:
+        return estimates_of(problem, fit, unpredicted(problem, fit, quarters), delay, gain, structure_known)
+
+    other = None if beside_cycle is None else other_cycle(problem, found, beside_cycle, judged)
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
-        rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, likelier, problem.runs,
+        rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, other, problem.runs,
         elastic_modes(problem, found, unseen), elastic,
         correlation_of(problem, found, unseen, delay, gain, estimates),
     )  # fmt: skip
@@ -284,42 +288,6 @@ def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
     return values[block[0]] != 0
 
 
-def _likelier(problem: Problem, found: Tuned, T_pos: float) -> float:
-    """By how much the whole motion is likelier (logarithm) with another cycle of the position loop."""
-
-    def likely(found: Tuned) -> float:
-        return -independent(problem, len(problem.rows)) * (log(rms(found.position)) + log(rms(found.torque)))
-
-    machine, weights = problem.machine, problem.weights
-    cycles = machine.cycles.model_copy(update={"position": T_pos})
-    problem.machine = machine.model_copy(update={"cycles": cycles})
-    try:
-        # Such a fit is nearer to its least than two cycles are to one another.
-        other = likely(problem.fitted(found.names, found.values, found, FIRST_TOLERANCE))
-        if found.values["T_sym"] <= TABLE["T_sym"].lower:
-            # A wrong cycle has driven the delay to its bound; what it leaves of the position has no weight any more.
-            problem.weights = _first_weights(problem.each)
-            with suppress(InputError):
-                other = max(other, likely(_first(problem, found.names)))
-        return other - likely(found)
-    finally:
-        problem.machine, problem.weights = machine, weights
-
-
-def _first_weights(each: AxisRecord) -> dict[str, float]:
-    """What a residual is worth ahead of any fit: position [m], torque [N.m]."""
-    return {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}
-
-
-def _first(problem: Problem, free: Sequence[str]) -> Tuned:
-    """A first fit, whose weights are those of what is left."""
-    found = problem.fitted(free, {}, tolerance=FIRST_TOLERANCE)
-    problem.weigh(found)
-    found = problem.fitted(free, found.values, found)
-    problem.weigh(found)
-    return found
-
-
 def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict[str, float]]) -> Tuned:
     """The likeliest of first fits from several starts; the problem has that start, and its weights, then.
 
@@ -331,7 +299,7 @@ def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict
     for start in candidates:
         problem.start, problem.weights = start, dict(weights)
         try:
-            found = _first(problem, free)
+            found = problem.first(free)
         except InputError as error:
             failed = error
             continue

@@ -15,7 +15,8 @@ import numpy as np
 from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.estimation.covariance import Covariance, correlation_length, stretched
-from feedsim.estimation.interval import NORMAL_95, half_width, student
+from feedsim.estimation.interval import NORMAL_95, half_width
+from feedsim.estimation.jackknife import between_groups
 from feedsim.identify.parameters import EXCESS, estimate, inner_to_outer
 from feedsim.identify.position_loop import Constant, rms
 from feedsim.identify.result import Correlation, Estimate
@@ -263,23 +264,7 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
 def between_stretches(J: Array, r: Array, count: int) -> Array:
     """(P,) variance of the parameters by what the STRETCHES of a record say differently, in usual deviations.
 
-    Errors of a model are not drawn anew with every row, and a fit to other motion has others. Leaving out one stretch
-    after the other shows how far they move the values (grouped jackknife; R. G. Miller, Biometrika 61 (1974), 1-15).
-    So few stretches know their own scatter roughly only: it counts by Student's distribution. Of a value that few of
-    them determine, as accelerations do an inertia, still fewer say something. Degrees of freedom are those of a sum of
-    unlike variances (F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114), whose shares follow from J.
-
     Args:
         J, r: (2 count + M, P) and (2 count + M,), of two channels over `count` rows of motion, and of what is usual.
     """
-    moved, shares = [], []
-    for fold in np.array_split(np.arange(count), STRETCHES):
-        out = np.concatenate([fold, fold + count])
-        others = np.delete(np.arange(len(r)), out)
-        moved.append(np.linalg.lstsq(J[others], -r[others], rcond=None)[0])
-        shares.append(np.diag(Covariance.of(J[others].T @ J[others], hermitian=True).by(J[out].T @ J[out])))
-    scatter = (STRETCHES - 1) / STRETCHES * np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
-    centre = np.eye(STRETCHES) - 1 / STRETCHES
-    unlike = [centre * own for own in np.array(shares).T]
-    free = [float(np.trace(each)) ** 2 / float(np.trace(each @ each)) for each in unlike]
-    return np.asarray(scatter * (np.array([student(each) for each in free]) / NORMAL_95) ** 2)
+    return between_groups(J, -r, [np.append(own, own + count) for own in np.array_split(np.arange(count), STRETCHES)])

@@ -18,7 +18,8 @@ from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord, Replay, same_time, unclipped
 from feedsim.replay.compare import Comparison, replayed
 from feedsim.replay.coupling import coupled
-from feedsim.replay.drive import DECISIVE, DriveFound, identify_drive
+from feedsim.replay.cycle import decision, with_either
+from feedsim.replay.drive import DriveFound, identify_drive
 from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.machine_files import (
     RigidAxis,
@@ -31,7 +32,7 @@ from feedsim.replay.machine_files import (
     simple_drive,
 )
 from feedsim.replay.outside import Line, without_outside
-from feedsim.replay.start import Begin, limits, once_a_cycle, start_values
+from feedsim.replay.start import Begin, limits, of_cycle, start_values
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.structure import checked_modes
 
@@ -46,6 +47,7 @@ class DrivesFound:
     drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
     machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis. outside: axis -> lines
     from outside the axis, which were taken out of what was fitted. clipped: sentences on torque that is cut off.
+    undecided_cycle: whether the record speaks for no cycle of the position loop, and nobody has given one.
     """
 
     drives: Mapping[str, DriveFound]
@@ -53,6 +55,7 @@ class DrivesFound:
     files: Mapping[str, str]
     outside: Mapping[str, Sequence[Line]] = field(default_factory=dict)
     clipped: Sequence[str] = ()
+    undecided_cycle: bool = False
 
 
 def identify_drives(
@@ -101,8 +104,8 @@ def identify_drives(
                 progress(f"{axis}: {what}", done, total)
 
             begin = begins[axis]
-            if begin is not None and cycle > 0.5 * interval:
-                begin = once_a_cycle(begin)
+            if begin is not None:
+                begin = replace(begin, starts=[of_cycle(start, cycle, interval) for start in begin.starts])
             axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
             with (
                 _begun(machine, name, note, axes, interval, cycle) as own,
@@ -110,16 +113,23 @@ def identify_drives(
             ):
                 found[axis] = identify_drive(
                     own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
-                    other_cycle=_other(cycle, interval) if machine is None else None, modes=modes, progress=tell,
+                    beside_cycle=_other(cycle, interval) if machine is None else None, modes=modes, progress=tell,
                 )  # fmt: skip
         return found
 
     # A drive that closes the position loop itself (DSC) does so in its own cycle; a control, in that of its rows.
     cycle = position_cycle or control_cycle(interval)
-    found = drives(cycle)
-    if position_cycle is None and sum(sum(one.other_cycles.values()) for one in found.values()) > DECISIVE:
-        cycle = _other(cycle, interval)
-        found = drives(cycle)
+    found, undecided = drives(cycle), False
+    if position_cycle is None and machine is None and (speaks := _speaks_for_other(found)) >= 0:
+        # Fits that begin with either cycle must agree on it.
+        if speaks > 0 and _speaks_for_other(anew := drives(_other(cycle, interval))) < 0:
+            cycle, found = _other(cycle, interval), anew
+        else:
+            undecided = True
+            found = {
+                axis: replace(one, estimates=with_either(one.estimates, one.other)) if one.other is not None else one
+                for axis, one in found.items()
+            }
     for axis, one in found.items():
         each, begin = records[axis], begins[axis]
         drive, friction = one.machine.shipped_drive(axis, "a drive file"), friction_of(one, axis)
@@ -145,7 +155,7 @@ def identify_drives(
             replace(replayed(made[axis], {axis: each}, fmus, records)[axis], clipped=())
             for axis, each in records.items()
         ]
-    return DrivesFound(found, comparisons, files, outside, clipped)
+    return DrivesFound(found, comparisons, files, outside, clipped, undecided)
 
 
 def _without_clipped(each: AxisRecord, machine: Machine | None) -> tuple[AxisRecord, Sequence[str]]:
@@ -200,6 +210,11 @@ def _refuse_own_setpoint(each: AxisRecord) -> None:
             "without it gives a wrong load and friction. Name the column of the setpoint, or identify inertia and "
             "friction alone: feedsim identify"
         )
+
+
+def _speaks_for_other(found: Mapping[str, DriveFound]) -> int:
+    """1 where the axes of a record together speak for the other cycle of the position loop, -1 against it, else 0."""
+    return decision([one.other for one in found.values() if one.other is not None])
 
 
 def _other(position_cycle: float, interval: float) -> float:

@@ -88,13 +88,14 @@ def start_values(each: AxisRecord) -> Begin:
     return Begin(starts, only)
 
 
-def once_a_cycle(begin: Begin) -> Begin:
-    """The same where the record has the torque once a cycle of the position loop.
+def of_cycle(start: Mapping[str, float], cycle: float, interval: float) -> dict[str, float]:
+    """A start for a position loop of that cycle, of a record with rows at that interval [s].
 
-    A held speed setpoint makes the torque ripple within that cycle, and the record shows one phase of the ripple: the
-    torque that accelerates comes out too small, and with it the inertia of the rigid line.
+    Where the record has the torque once a cycle, a held speed setpoint makes the torque ripple within that cycle, and
+    the record shows one phase of the ripple: the torque that accelerates comes out too small, and with it the inertia
+    of the rigid line.
     """
-    return replace(begin, starts=[{**start, "J_sigma": ONE_PHASE_DEVIATION} for start in begin.starts])
+    return {**start, "J_sigma": ONE_PHASE_DEVIATION} if cycle > 0.5 * interval else dict(start)
 
 
 def _rigid_line(record: Record) -> tuple[Inertia, float]:

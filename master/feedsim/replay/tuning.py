@@ -68,6 +68,11 @@ class Tuned:
         return self.point.errors[len(self.point.errors) // 2 :][self.counted]
 
 
+def first_weights(each: AxisRecord) -> dict[str, float]:
+    """What a residual is worth ahead of any fit: position [m], torque [N.m]."""
+    return {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}
+
+
 @dataclass(eq=False)
 class Problem:
     """The units on one record, over the parameters that are free."""
@@ -176,6 +181,14 @@ class Problem:
             * sqrt(correlation_length(position - np.mean(position))),
             "torque": max(rms(torque), least) * sqrt(correlation_length(torque - np.mean(torque))),
         }
+
+    def first(self, free: Sequence[str]) -> Tuned:
+        """A fit from the start, whose weights are those of what is left."""
+        fit = self.fitted(free, {}, tolerance=FIRST_TOLERANCE)
+        self.weigh(fit)
+        fit = self.fitted(free, fit.values, fit)
+        self.weigh(fit)
+        return fit
 
     def fitted(
         self,

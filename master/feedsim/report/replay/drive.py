@@ -14,7 +14,8 @@ from feedsim.findings import Note
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.replay.compare import Comparison
-from feedsim.replay.drive import DECISIVE, DriveFound
+from feedsim.replay.cycle import OtherCycle, decision
+from feedsim.replay.drive import DriveFound
 from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
@@ -88,18 +89,27 @@ class DriveReport:
             if open_ones:
                 reported[Note(f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit "
                           "together with the rest, and may be others")] = None  # fmt: skip
-            for cycle, likelier in one.other_cycles.items():
-                own = one.machine.cycles.T_pos
-                cycles = (
-                    f"position cycles of {1e3 * own:g} ms (taken) and {1e3 * cycle:g} ms ({spelt('position_cycle')})"
-                )
-                if likelier > DECISIVE:
-                    reported[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
-                elif likelier > -DECISIVE:
-                    reported[Note(f"axis {axis}: {cycles} fit alike")] = None
-                else:
-                    reported[Note(f"axis {axis}: of {cycles} the record speaks for the former")] = None
+            if one.other is not None:
+                reported[_position_cycle(axis, one, one.other, self.found.undecided_cycle)] = None
         return list(reported)
+
+
+def _position_cycle(axis: str, one: DriveFound, other: OtherCycle, undecided: bool) -> str:
+    """What the record of an axis says of the cycle of the position loop."""
+    own, option = 1e3 * one.machine.cycles.T_pos, spelt("position_cycle")
+    cycles = f"position cycles of {own:g} ms (taken) and {1e3 * other.cycle:g} ms ({option})"
+    decided = 0 if undecided else decision([other])
+    if decided > 0:
+        return f"axis {axis}: of {cycles} the record speaks for the latter"
+    if decided < 0:
+        return Note(f"axis {axis}: of {cycles} the record speaks for the former")
+    if not undecided:  # a cycle was given
+        return Note(f"axis {axis}: {cycles} fit alike")
+    short, long = sorted((own, 1e3 * other.cycle))
+    return Note(
+        f"axis {axis}: {cycles} fit alike. Give {option} {short:g}ms if the drive closes the position loop (DSC), or "
+        f"{option} {long:g}ms if the control does"
+    )
 
 
 def check_writable(axes: Sequence[str], directory: Path, inputs: Sequence[Path] = ()) -> None:

@@ -1,4 +1,4 @@
-"""Files of controls: what is read from them, in SI, and what is refused; values by hand."""
+"""Files of a SINUMERIK: what is read from them, in SI, and what is refused; values by hand."""
 
 from __future__ import annotations
 
@@ -6,81 +6,13 @@ import math
 from pathlib import PurePath
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
+from control_helpers import DRIVE, INI, NC, reasons, values
 from feedsim.control import table
-from feedsim.control.archive import scalar
 from feedsim.control.formats import opened
-from feedsim.control.reading import Reading, read
+from feedsim.control.reading import read
 from feedsim.control.usual import usual_ranges
 from feedsim.errors import InputError
-
-NC = """; start-up data, written by hand
-%_N_INITIAL_INI
-;$PATH=/_N_INI_DIR
-CHANDATA(1)
-N10000 $MN_AXCONF_MACHAX_NAME_TAB[0]="X1"
-N10000 $MN_AXCONF_MACHAX_NAME_TAB[1]="Y1" ; the second one
-N10240 $MN_SCALING_SYSTEM_IS_METRIC=1
-N20050 $MC_AXCONF_GEOAX_ASSIGN_TAB[0]=1
-CHANDATA(2)
-N30300 $MA_IS_ROT_AX[AX1]=FALSE
-N31030 $MA_LEADSCREW_PITCH[AX1]=10
-N31050 $MA_DRIVE_AX_RATIO_DENOM[0,AX1]=1
-N31060 $MA_DRIVE_AX_RATIO_NUMERA[0,AX1]=2
-N32200 $MA_POSCTRL_GAIN[0,AX1]=5
-N32200 $MA_POSCTRL_GAIN[1,AX1]=2.5
-N32200 $MA_POSCTRL_GAIN[0,AX2]=.15EX1 '2C3D
-   $MA_VELO_FFW_WEIGHT[0,AX1] = 0.95 ; without a number
-N32620 $MA_FFW_MODE[AX1]=3
-N32620 $MA_FFW_MODE[AX2]=0
-N32610 $MA_VELO_FFW_WEIGHT[0,AX2]=1
-N32810 $MA_EQUIV_SPEEDCTRL_TIME[0,AX1]=0.0035
-N32900 $MA_DYN_MATCH_ENABLE[AX1]=1
-N32910 $MA_DYN_MATCH_TIME[0,AX1]=1.2E-3
-N32300 $MA_MAX_AX_ACCEL[0,AX1]=2.5
-N32450 $MA_BACKLASH[0,AX1]=0.012
-M17
-"""
-DRIVE = """[SINUMERIK_HEADER]
-VERSION=1
-[SINAMICS_HEADER]
-PD_FILE_NAME=PS000003.TEA
-[PARAMETER]
-p115[0]=125
-p115[1]=125
-p1400[0]='H8029'
-p1433[0]=120
-p1434[0]=1.25
-p1460[0]=7.5
-p1460[1]=9
-p1462[0]=12.5
-p1520[0]=80
-p1521[0]=-80
-p1656[0]='H0003'
-p1657[0]=2
-p1658[0]=455
-p1659[0]=0.9
-p1660[0]=455
-p1661[0]=0.1
-p1662[0]=1
-p1663[0]=1999
-p1664[0]=0.7
-p1665[0]=2000
-p1666[0]=0.7
-p316[0]=1.6
-p314[0]=4
-r2=31
-"""
-
-
-def values(found: Reading, axis: str) -> dict[str, object]:
-    return {each.parameter: each.value for each in found.taken if each.axis == axis}
-
-
-def reasons(found: Reading) -> dict[str, str]:
-    return {each.name.number: each.reason for each in found.refused if each.weight == "doubt"}
 
 
 def test_machine_data() -> None:
@@ -266,124 +198,6 @@ def test_much_that_is_not_understood_is_counted() -> None:
     assert len(archive.odd) == 1000
 
 
-TABLE = """Parameter;Name;Value;Unit
-p1460[0];Speed controller P gain;7.5;Nms/rad
-p1462[0];Speed controller integral time;12,5;ms
-p1520[0];Torque limit;80000;mNm
-"p1715[0]";"Current controller; P gain";"10.4";"V/A"
-S-0-0100;nothing
-"""
-
-
-def test_tables() -> None:
-    found = read([opened("list.csv", TABLE.replace("S-0-0100;nothing\n", "").encode("utf-8-sig"))], {"X": "X"})
-    assert values(found, "X") == {"drive.K_p": 7.5, "drive.current.K_p": 10.4}  # the file states the unit of p1715
-    assert reasons(found)["p1462"] == "no number"  # 12,5 may be two numbers
-    assert reasons(found)["p1520"] == "the file has it in 'mNm', the table of names in N.m"
-    idn = "IDN,Text,Value\nS-0-0100,Velocity loop gain,0.6\nS-0-0296,Feedforward,95\nP-AXIS-00099,kv,5000\n"
-    found = read([opened("ax.csv", idn.encode("utf-16"))], {"X": "X"})
-    assert values(found, "X") == {"drive.k_ffw": pytest.approx(0.95), "drive.K_v": 50.0}
-    assert "no public source" in reasons(found)["S-0-0100"]  # N.m.s/rad or A.s/rad, by a bit of another parameter
-    unsure = opened("ax.csv", b"S-0-0100,0.6,0.7\nS-0-0101,5\n")
-    assert [each.reason for each in unsure.odd] == ["which cell is the value is not known"]
-
-
-def test_a_list_of_twincat_cnc() -> None:
-    text = (
-        "# X axis\nkopf.log_achs_name   X_Achse\ngetriebe[0].kv   5000   # 0.01/s\ngetriebe[1].kv  100\n"
-        "getriebe[0].dynamik.vb_max 500000\ngetriebe[0].dynamik.a_max 14400\ngetriebe[0].lose 120\nodd\n"
-    )
-    found = read([opened("x.lis", text.encode())], {"X": "X_Achse"})
-    assert values(found, "X") == {
-        "drive.K_v": 50.0,
-        "max_speed": pytest.approx(0.5),
-        "max_acceleration": pytest.approx(14.4),
-        "drive.backlash_compensation.value": pytest.approx(12e-6),
-    }
-    assert found.doubts == ["X: P-AXIS-00099 getriebe[i].kv differs between data sets; that of index 0 is taken"]
-
-
-def test_an_xti_of_twincat_nc() -> None:
-    text = (
-        '<?xml version="1.0"?>\n<TcSmItem><!-- <Velo Maximum="9"/> --><Axis Id="1"><Name>X</Name><AxisPara>\n'
-        "<Dynamic AccelerationMaximum=\"1500\"/><Velo Maximum='250'/></AxisPara></Axis></TcSmItem>"
-    )
-    archive = opened("axis.xti", text.encode())
-    assert values(read([archive], {"X": "X"}), "X") == {}
-    found = read([archive], {"X": "X"}, checked=["Velo@Maximum", "Dynamic@AccelerationMaximum"])
-    assert values(found, "X") == {"max_speed": 0.25, "max_acceleration": 1.5}
-
-
-INI = """[EMC]
-MACHINE = mill
-[EMCMOT]
-SERVO_PERIOD = 1000000
-[TRAJ]
-COORDINATES = X Z
-LINEAR_UNITS = inch
-[JOINT_0]
-TYPE = LINEAR
-MAX_VELOCITY = 10 # inch/s
-MAX_ACCELERATION = 100
-MIN_LIMIT = 0
-MAX_LIMIT = 20
-BACKLASH = 0.001
-P = 50
-[JOINT_1]
-UNITS = mm
-MAX_VELOCITY = 200
-BACKLASH = 0.02
-COMP_FILE = z.comp
-"""
-
-
-def test_linuxcnc() -> None:
-    found = read([opened("mill.ini", INI.encode())], {"X": "X", "Z": "JOINT_1"})
-    assert values(found, "X") == {
-        "max_speed": pytest.approx(0.254),
-        "max_acceleration": pytest.approx(2.54),
-        "travel.0": 0.0,
-        "travel.1": pytest.approx(0.508),
-        "drive.backlash_compensation.value": pytest.approx(25.4e-6),
-    }
-    assert values(found, "Z") == {"max_speed": pytest.approx(0.2)}
-    assert values(found, "") == {"cycles.position": 0.001}
-    assert "its wiring is in the HAL file" in reasons(found)["pid.Pgain"]
-    assert reasons(found)["BACKLASH"] == "COMP_FILE takes its place"
-    found = read([opened("mill.ini", INI.replace("TYPE = LINEAR", "TYPE = ANGULAR").encode())], {"X": "X"})
-    assert values(found, "X") == {}
-    found = read([opened("mill.ini", INI.replace("= inch", "= furlong").encode())], {"X": "X"})
-    assert values(found, "X") == {}
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("5", 5.0), ("-.5", -0.5), ("5.", 5.0), ("1e-3", 1e-3), ("1.5EX-3", 1.5e-3), ("+2", 2.0), ("TRUE", True),
-        ("false", False), ("'H8029'", 0x8029), ("1H", 1.0), ("fH", 15.0), ("8029H", 0x8029), ("'B101'", 5.0),
-        ('"X1"', "X1"), ("#x0000ffff", 65535.0),
-    ],
-)  # fmt: skip
-def test_scalars(text: str, value: object) -> None:
-    assert scalar(text) == value
-
-
-@pytest.mark.parametrize(
-    "text", ["", "5,0", "5 6", "(1,2)", "R5", "nan", "inf", "0x10", "'H'", "--5", "1e", "5'", "0101B", "GH", "H"]
-)
-def test_no_scalars(text: str) -> None:
-    with pytest.raises(ValueError, match=r"no number|invalid literal"):
-        scalar(text)
-
-
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
-def test_a_byte_order_mark_is_of_no_line(encoding: str) -> None:
-    archive = opened("d.tea", "p1460[0]=5\np1462[0]=10\n".encode(encoding))
-    assert values(read([archive], {"X": "X"}), "X") == {"drive.K_p": 5.0, "drive.T_n": 0.01}
-    assert [archive.text[slice(*each.span)] for each in archive.entries] == ["5", "10"]
-    assert opened("d.tea", "; gain\np1460=5\n".encode(encoding)).odd == []
-
-
 def test_words_of_bits_in_hexadecimal() -> None:
     found = read([opened("d.tea", DRIVE.replace("'H0003'", "FH").encode())], {"X": "X"})
     assert values(found, "X")["drive.filter_1.f"] == 455.0
@@ -473,36 +287,3 @@ def test_no_file_of_a_control() -> None:
 def test_files_of_several_controls() -> None:
     with pytest.raises(InputError, match="files of several controls: linuxcnc, sinumerik"):
         read([opened("a", NC.encode()), opened("b", INI.encode())], {"X": "X1"})
-
-
-SEEDS = [NC, DRIVE, TABLE, INI, 'getriebe[0].kv 5\n<TcSmItem><Axis><Velo Maximum="3"/></Axis>', "p1460[0]=1\n"]
-
-
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(st.data())
-def test_no_bytes_end_in_anything_but_a_sentence(data: st.DataObject) -> None:
-    raw = bytearray(data.draw(st.sampled_from(SEEDS)).encode())
-    for _ in range(data.draw(st.integers(0, 12))):
-        at = data.draw(st.integers(0, len(raw)))
-        piece = data.draw(
-            st.one_of(st.binary(max_size=6), st.sampled_from([b"[", b"]=", b"'H", b"\n", b"$MA_", b",AX1]"]))
-        )
-        raw[at : at + data.draw(st.integers(0, 8))] = piece
-    try:
-        archive = opened("file.arc", bytes(raw))
-        axes = [each.axis for each in archive.entries if each.axis][:1] or ["X"]
-        found = read([archive], {"X": axes[0]}, checked=["all"])
-    except InputError:
-        return
-    assert all(not isinstance(each.value, float) or math.isfinite(each.value) for each in found.taken)
-    assert all(archive.text[slice(*each.span)] == each.text for each in archive.entries)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.binary(max_size=300))
-def test_any_bytes(data: bytes) -> None:
-    try:
-        opened("file", data)
-    except InputError:
-        return
-    assert data

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import drive_helpers
 from feedsim.cosim import run
 from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
@@ -21,7 +22,6 @@ from feedsim.structure import checked_modes
 from feedsim.trace import write_csv
 from machine_helpers import rigid_copy
 
-MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"
 SCENARIO = """
 name: log
 machine: {machine}
@@ -40,17 +40,7 @@ logging:
   noise: {{M_a: 5 %, x_a: 0.1 um}}
   seed: 1
 """
-COLUMNS = """
-axis: X
-pitch: 10 mm
-time: {column: time}
-position: {column: X.x_a}
-setpoint: {column: X.x_s}
-torque: {column: X.M_a}
-speed_setpoint: {column: X.n_s}
-feedforward: {column: X.n_ffw}
-deviation: {column: X.x_e}
-"""
+COLUMNS = drive_helpers.COLUMNS + "speed_setpoint: {column: X.n_s}\nfeedforward: {column: X.n_ffw}\n"
 TWO = [ElasticMode(24.0, 0.03, 0.2, 0.2), ElasticMode(47.0, 0.02, 0.35, -0.3)]
 
 
@@ -58,7 +48,7 @@ def test_modes_of_a_simulated_axis_come_back(tmp_path: Path) -> None:
     """Two modes, a log of 2 ms, 5 % noise on the torque and 0.1 um on the position: two modes are found, no more, and
     their frequencies within 2 %. The position is met nearly to its noise (a rigid axis: 0.35 um and more), and what is
     written is a machine with these modes."""
-    rigid_copy(MACHINES / "sinumerik_840d", tmp_path / "true")
+    rigid_copy(drive_helpers.MACHINES / "sinumerik_840d", tmp_path / "true")
     elastic = with_modes(load_machine(tmp_path / "true"), "X", TWO)
     shutil.copy(elastic.modes, tmp_path / "true" / "modes.csv")
     (tmp_path / "moves.yaml").write_text(SCENARIO.format(machine=tmp_path / "true"))

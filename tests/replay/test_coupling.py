@@ -10,6 +10,7 @@ import pytest
 
 from feedsim.cosim import run
 from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.identify import Record
 from feedsim.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
@@ -47,9 +48,9 @@ torque: {{column: {axis}.M_a}}
 """
 
 
-def machine_with(folder: Path, shape: float) -> Path:
+def machine_with(folder: Path, shape: float, mode: ElasticMode = MODE) -> Path:
     """The measured machine with a mode of X that moves the scale of Y by `shape` of the rigid motion of X."""
-    elastic = with_modes(load_machine(rigid_copy(MACHINES / "sinumerik_840d", folder)), "X", [MODE])
+    elastic = with_modes(load_machine(rigid_copy(MACHINES / "sinumerik_840d", folder)), "X", [mode])
     header, *rows = elastic.modes.read_text().splitlines()
     names, values = header.split(","), rows[-1].split(",")
     rigid = dict(zip(names, rows[0].split(","), strict=True))
@@ -81,6 +82,21 @@ def test_the_shape_at_the_other_scale_comes_back(shape: float, tmp_path: Path) -
     assert set(found) == {(2, "Y")}
     assert found[2, "Y"].axis == "Y"
     assert found[2, "Y"].shape == pytest.approx(shape, rel=0.05)
+
+
+def test_the_interval_includes_what_is_not_known_of_the_mode(tmp_path: Path) -> None:
+    """A mode that turns its motor 12 % less than it does, and is 0.3 % too low: the shape comes out larger by as much.
+    The record alone gives an interval that excludes the truth; with the mode's own deviations it has it."""
+    records = logged(tmp_path, machine_with(tmp_path / "true", 0.1))
+    off = replace(MODE, frequency=0.997 * MODE.frequency, motor=0.88 * MODE.motor)
+    known = load_machine(machine_with(tmp_path / "known", 0.0, off))
+    alone = coupled(known, records)[2, "Y"]
+    assert abs(alone.shape - 0.1) > NORMAL_95 * alone.sigma
+    spread = (0.003 * MODE.frequency, 0.001, 0.12 * MODE.motor, 0.01)
+    whole = coupled(known, records, spread={2: spread})[2, "Y"]
+    assert whole.shape == alone.shape
+    assert abs(whole.shape - 0.1) <= NORMAL_95 * whole.sigma < 0.05
+    assert coupled(known, records, spread={2: (0.0, 0.0, 0.0, 0.0)})[2, "Y"].sigma == pytest.approx(alone.sigma)
 
 
 def test_axes_that_do_not_move_one_another(tmp_path: Path) -> None:

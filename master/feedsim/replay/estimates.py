@@ -27,7 +27,7 @@ from feedsim.trace.trace import Array
 
 MAX_RESIDUAL_SHARE = 0.3  # share of the torque, or of the lag, that a fit may leave
 EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
-ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
+ONE_WAY = 0.1  # share of the mean torque to which the constant load has to be known where the axis moves one way
 SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
 STRETCHES = 8  # of the motion, each of which is left out once
 PRIOR_SHARE = 0.8  # share of the usual deviation that is left: the record does not determine the value

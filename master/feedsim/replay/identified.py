@@ -176,10 +176,13 @@ def _beside(
     Of records whose gaps lie elsewhere nothing is said.
     """
     shapes = {}
+    first = len(modes)  # the table begins with a rigid mode of every axis
     if len(records) > 1 and any(modes.values()) and same_time(records):
+        every = [mode for own in modes.values() for mode in own]
         with _folder(files) as folder:
-            shapes = coupled(load_machine(folder), records, fmus)
-    found, k = {}, len(modes)  # the table begins with a rigid mode of every axis
+            spread = {first + i: mode.sigma for i, mode in enumerate(every) if np.all(np.isfinite(mode.sigma))}
+            shapes = coupled(load_machine(folder), records, fmus, spread)
+    found, k = {}, first
     for axis, own in modes.items():
         found[axis] = tuple(
             replace(mode, beside=tuple(shape for (row, _), shape in shapes.items() if row == k + i))

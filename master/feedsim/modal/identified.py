@@ -10,20 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import sqrt
+from math import nan, sqrt
 from pathlib import Path
 
 import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.modal.measured import Measured
+from feedsim.modal.neighbours import least, scatter
 from feedsim.modal.rational import MOST_MODES, Fitted, extremes, fitted
 from feedsim.structure.modes import TOOL_PORTS, Modes
 from feedsim.trace.response import Complexes
-from feedsim.trace.trace import Array
 
 MOTOR, SCALE = "motor", "scale"
-DIP_DISTANCE = 0.1  # share of a frequency within which a measured dip or peak is that of the fit
+# Share of a mode's frequency within which its peak is: friction alone makes one at low frequencies.
+PEAK_DISTANCE = 0.25
 OFF = 0.1  # share by which inertia and lead may differ from the machine's without a word
 MAX_DEVIATIONS = 3.0, 30.0  # dB and degrees that 90 % of the motor's lines have to be within
 HELD = 0.9  # share of the lines that a fit is judged by
@@ -35,8 +36,9 @@ class AxisModes:
 
     measured, fit: in SI, accelerations over the input. own: output -> (N,) the machine's response at the lines.
     table: the machine's modes with those of the axis in place of all elastic ones; None where a mode cannot be placed.
-    left: output -> dB and degrees that 90 % of the lines are within. dips, peaks: of the motor [Hz]: of the fit, and
-    measured (nan where the measurement has none there).
+    deviations: output -> dB and degrees that 90 % of the lines are within. scatter: the same about their neighbours.
+    dips, peaks: of the motor [Hz]: of the fit, measured without it, and the standard deviation of that (nan where the
+    measurement has none there).
     """
 
     axis: str
@@ -44,33 +46,41 @@ class AxisModes:
     fit: Fitted
     own: Mapping[str, Complexes]
     table: Modes
-    left: Mapping[str, tuple[float, float]]
-    dips: tuple[tuple[float, float], ...]
-    peaks: tuple[tuple[float, float], ...]
+    deviations: Mapping[str, tuple[float, float]]
+    scatter: Mapping[str, tuple[float, float]]
+    dips: tuple[tuple[float, float, float], ...]
+    peaks: tuple[tuple[float, float, float], ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
     @property
-    def ratios(self) -> tuple[float, float] | None:
-        """Inertia behind the first mode over that of the motor, (peak/dip)^2 - 1, of the fit and measured; None without
-        dip and peak."""
-        if not self.dips or not self.peaks or self.peaks[0][0] <= self.dips[0][0]:
+    def ratios(self) -> tuple[float, float, float] | None:
+        """(peak/dip)^2 - 1 of the first mode, with light damping the inertia behind it over that of the motor: of the
+        fit, measured, and the standard deviation of that; None without dip and peak."""
+        first = self.fit.modes[0].frequency if self.fit.modes else nan
+        peak = min(self.peaks, key=lambda peak: abs(peak[0] - first), default=None)
+        dips = [dip for dip in self.dips if peak is not None and dip[0] < peak[0]]
+        if peak is None or not dips:
             return None
-        own, measured = ((peak / dip) ** 2 - 1 for peak, dip in zip(self.peaks[0], self.dips[0], strict=True))
-        return own, measured
+        dip = dips[-1]
+        square = (peak[1] / dip[1]) ** 2
+        return (peak[0] / dip[0]) ** 2 - 1, square - 1, 2 * square * float(np.hypot(peak[2] / peak[1], dip[2] / dip[1]))
+
+    @property
+    def inertia_ratio(self) -> float | None:
+        """Residue of the first mode over that of rigid motion at the motor: of two inertias, the further one over that
+        of the motor, whatever their damping."""
+        fit = self.fit
+        return fit.modes[0].residues[MOTOR] / fit.rigid[MOTOR] if fit.modes else None
 
 
 def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: int | None = None) -> AxisModes:
     """Fit the responses of an axis. modes: how many; None: by cross-validation. InputError: what `fitted` refuses."""
     fit = fitted(measured.frequency, measured.values, measured.relative, modes)
     frequency = measured.frequency
-    remaining = {}
-    for name, values in measured.values.items():
-        ratio = fit.response(name, frequency) / values
-        remaining[name] = (
-            float(np.quantile(np.abs(20 * np.log10(np.abs(ratio))), HELD)),
-            float(np.quantile(np.abs(np.degrees(np.angle(ratio))), HELD)),
-        )
+    remaining = {
+        name: _within(np.log(fit.response(name, frequency) / values)) for name, values in measured.values.items()
+    }
     decibel, degrees = remaining[MOTOR]
     if decibel > MAX_DEVIATIONS[0] or degrees > MAX_DEVIATIONS[1]:
         raise InputError(
@@ -81,15 +91,20 @@ def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: i
             "(--band)"
         )
     low, high = float(frequency[0]), float(frequency[-1])
-    size = np.log(np.abs(measured.values[MOTOR]))
+    motor = measured.values[MOTOR]
     fine = np.geomspace(low, high, 20000)
     model = np.log(np.abs(fit.response(MOTOR, fine)))
-    dips = tuple((f, _near(frequency, -size, f)) for f in extremes(fine, -model))
-    peaks = tuple((f, _near(frequency, size, f)) for f in extremes(fine, model))
+    dips = tuple((f, *least(frequency, motor, f)) for f in extremes(fine, -model))
+    peaks = tuple(
+        (f, *least(frequency, 1 / motor, f))
+        for f in extremes(fine, model)
+        if any(abs(f / mode.frequency - 1) < PEAK_DISTANCE for mode in fit.modes)
+    )
     warnings, notes = _said(measured, machine_modes, axis, fit)
     return AxisModes(
         axis, measured, fit, responses_of(machine_modes, axis, measured), _table(machine_modes, axis, fit),
-        remaining, dips, peaks, tuple(warnings), tuple(notes),
+        remaining, {name: _within(scatter(frequency, values)) for name, values in measured.values.items()},
+        dips, peaks, tuple(warnings), tuple(notes),
     )  # fmt: skip
 
 
@@ -115,18 +130,11 @@ def _lead(modes: Modes, axis: str) -> float:
     return float(n @ x / (n @ n))
 
 
-def _near(frequency: Array, height: Array, at: float) -> float:
-    """The highest measured line near a frequency, by a parabola through it and its neighbours [Hz]."""
-    near = np.flatnonzero(np.abs(frequency / at - 1) < DIP_DISTANCE)
-    if len(near) < 3:
-        return float("nan")
-    k = int(near[np.argmax(height[near])])
-    if not 0 < k < len(frequency) - 1:
-        return float("nan")
-    x, y = frequency[k - 1 : k + 2], height[k - 1 : k + 2]
-    curve = np.polyfit(x - x[1], y, 2)
-    top = -curve[1] / (2 * curve[0]) if curve[0] < 0 else 0.0
-    return float(x[1] + np.clip(top, x[0] - x[1], x[2] - x[1]))
+def _within(logarithm: Complexes) -> tuple[float, float]:
+    """dB and degrees that 90 % of differences of logarithms are within."""
+    parts = 20 / np.log(10) * logarithm.real, np.degrees(logarithm.imag)
+    decibel, degrees = (float(np.quantile(np.abs(part), HELD)) for part in parts)
+    return decibel, degrees
 
 
 def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[list[str], list[str]]:

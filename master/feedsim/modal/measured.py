@@ -111,6 +111,7 @@ def from_signals(
         {name: [read[n] for n in channel.names] for name, channel in outputs.items()},
         h,
         period=period,
+        orders=orders,
     )
     s = 2j * pi * result.frequency
     values: dict[str, Complexes] = {

@@ -46,33 +46,41 @@ class ModesReport:
         axis_modes, axis = self.found, self.found.axis
         fit = axis_modes.fit
         figures: dict[str, Figure] = {}
-        for k, (own, measured) in enumerate(axis_modes.dips, 1):
-            figures[f"{axis}.antiresonance_{k}"] = Figure(own, "Hz", "least response of the motor: of the fit")
-            figures[f"{axis}.antiresonance_{k}_measured"] = Figure(
-                measured, "Hz", "least response of the motor: of the measured lines"
-            )
-        for k, (own, measured) in enumerate(axis_modes.peaks, 1):
-            figures[f"{axis}.resonance_{k}"] = Figure(own, "Hz", "largest response of the motor: of the fit")
-            figures[f"{axis}.resonance_{k}_measured"] = Figure(
-                measured, "Hz", "largest response of the motor: of the measured lines"
-            )
+        for key, meaning, extremes in (
+            ("antiresonance", "least response of the motor", axis_modes.dips),
+            ("resonance", "largest response of the motor", axis_modes.peaks),
+        ):
+            for k, (own, measured, sigma) in enumerate(extremes, 1):
+                figures[f"{axis}.{key}_{k}"] = Figure(own, "Hz", f"{meaning}: of the fit")
+                figures[f"{axis}.{key}_{k}_measured"] = Figure(
+                    measured, "Hz", f"{meaning}: of the measured lines{_interval(sigma)}"
+                )
         if axis_modes.ratios is not None:
-            meaning = "inertia behind the first mode over that of the motor, (resonance/antiresonance)^2 - 1"
-            for key, ratio, of in zip(
-                ("ratio", "ratio_measured"), axis_modes.ratios, ("fit", "measured lines"), strict=True
-            ):
-                figures[f"{axis}.{key}"] = Figure(ratio, "1", f"{meaning}: of the {of}")
+            meaning = "(resonance/antiresonance)^2 - 1"
+            own, measured, sigma = axis_modes.ratios
+            figures[f"{axis}.ratio"] = Figure(own, "1", f"{meaning}: of the fit")
+            figures[f"{axis}.ratio_measured"] = Figure(
+                measured, "1", f"{meaning}: of the measured lines{_interval(sigma)}"
+            )
+        if axis_modes.inertia_ratio is not None:
+            figures[f"{axis}.inertia_ratio"] = Figure(
+                axis_modes.inertia_ratio, "1", "inertia behind the first mode over that of the motor: of the fit"
+            )
         per = f"(rad/s^2)/({axis_modes.measured.input_unit})"
         figures[f"{axis}.rigid"] = Figure(abs(fit.rigid[MOTOR]), per, "acceleration of the motor in rigid motion")
         for name, delay in fit.delay.items():
             figures[f"{axis}.{name}_delay"] = Figure(1e3 * delay, "ms", f"delay of the {name} behind the input")
-        for name, (decibel, degrees) in axis_modes.left.items():
+        for name, (decibel, degrees) in axis_modes.deviations.items():
             figures[f"{axis}.{name}_magnitude_left"] = Figure(
                 decibel, "dB", f"{name}: 90 % of the lines are within this of the fit"
             )
             figures[f"{axis}.{name}_phase_left"] = Figure(
                 degrees, "deg", f"{name}: 90 % of the lines are within this of the fit"
             )
+        for name, (decibel, degrees) in axis_modes.scatter.items():
+            meaning = f"{name}: 90 % of the lines are within this of a parabola through their neighbours"
+            figures[f"{axis}.{name}_magnitude_scatter"] = Figure(decibel, "dB", meaning)
+            figures[f"{axis}.{name}_phase_scatter"] = Figure(degrees, "deg", meaning)
         return figures
 
     @property
@@ -204,13 +212,22 @@ def summary(report: ModesReport, files: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _interval(sigma: float) -> str:
+    """The 95 % interval in words; empty where none is known."""
+    return f", ± {NORMAL_95 * sigma:.2g} (95 %)" if sigma == sigma else ""
+
+
 def answers(report: ModesReport) -> list[str]:
     """What was found, and how near it is."""
     axis_modes = report.found
     modes = ", ".join(f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} %)" for m in axis_modes.fit.modes) or "no mode"
-    remaining = "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} degrees" for name, (db, deg) in axis_modes.left.items())
+    remaining, scatter = (
+        "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} degrees" for name, (db, deg) in of.items())
+        for of in (axis_modes.deviations, axis_modes.scatter)
+    )
     return [
         f"{axis_modes.axis}: rigid body with {modes} of damping. 90 % of the lines are met within {remaining}.",
+        f"About their own neighbours 90 % of the lines are within {scatter}: noise and distortion, which no fit meets.",
         f"Estimate: {axis_modes.measured.method}, {len(axis_modes.measured.frequency)} lines.",
         f"{MODES_FILE} is the machine's table with these modes in place of its elastic ones; other axes are rigid in "
         "it.",

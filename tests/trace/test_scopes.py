@@ -45,6 +45,14 @@ FULL = [
 ]
 
 
+COMMAS = ["Name,Project", "Starttime of export,133238090039920000", "", "Name,Pos", "SampleTime[ms],1", ""]
+
+
+def test_twincat_with_quoted_decimal_commas(tmp_path: Path) -> None:
+    found = read(tmp_path, "\n".join([*COMMAS, '"0,0","1,5"', '"1,0","2,5"', '"2,0","3,5"']))
+    assert found.read(["time", "Pos"])["Pos"].tolist() == [1.5, 2.5, 3.5]
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
 def test_twincat_with_a_time_for_every_channel(tmp_path: Path, encoding: str) -> None:
     rows = [f"{2 * k}\t{0.5 * k:.3f}\t{2 * k}\t{-1.25 * k:.3f}".replace(".", ",") for k in range(6)]
@@ -115,6 +123,15 @@ def test_twincat_for_identification(tmp_path: Path) -> None:
         ([*FULL, "0\t1\t2"], "export it with a column of time"),
         ([*FULL, "0\t1\t0\t1"], "1 rows of values; at least 2"),
         ([*[line for line in FULL if not line.startswith("Name")], "0\t1\t0\t1"], "without the names of its channels"),
+        ([*PROJECT, *FULL[7:], "0\t1\t0\t1", "2\t1\t2\t1"], "without the names of its channels"),
+        ([*FULL, "0\t1\t0\t1", "2\t1\t2\t1\t7"], "scope.csv:16: 5 values below 4 columns of the header"),
+        ([*FULL, "0\t1\t0\t1", "2\t1\t2", "4\t1\t4\t1"], "scope.csv:16: no value of 'ActTorque' beside its time"),
+        ([*FULL, "0\t1\t0\t1", "4\t1\t2\t1", "2\t1\t4\t1"], "scope.csv:17: the time 2 follows 4; it must increase"),
+        (
+            [*COMMAS, "0,0,1,5", "1,0,2,5"],
+            "4 values below 2 columns of the header; with commas between columns, numbers ",
+        ),
+        ([*COMMAS, "0,1", "1,2", *COMMAS, "0,1"], "'Name' in 'the time' is no number"),
     ],
 )
 def test_twincat_files_that_are_refused(tmp_path: Path, lines: list[str], message: str) -> None:

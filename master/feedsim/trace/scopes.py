@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +27,7 @@ KEYS = frozenset({
     "SampleTime[ms]", "SymbolBased", "VariableSize", "Offset", "ScaleFactor", "BitMask", "Unit", "Unit ScaleFactor",
     "Unit Offset",
 })  # fmt: skip
+PROJECT_KEYS = frozenset({"File", "Starttime of export", "StartRecord"})
 _TWINCAT = re.compile(
     r"^(?:Starttime of export|StartRecord|SampleTime\[ms\]|SymbolName|Data-Type)([\t;,])", re.MULTILINE
 )
@@ -93,8 +94,11 @@ def _twincat(path: Path, text: str, separator: str) -> Signals:
         raise InputError(f"{path}: a TwinCAT Scope header without a row of values below it")
     header: dict[str, list[str]] = {}
     for row in rows[:first]:
-        if row and row[0].strip() in KEYS:
-            header[row[0].strip()] = row  # of two rows of names the second is that of the channels
+        key = row[0].strip() if row else ""
+        if key in PROJECT_KEYS:
+            header.pop("Name", None)  # that ahead of them is of the project
+        elif key in KEYS:
+            header[key] = row
     if "Name" not in header:
         raise InputError(f"{path}: a TwinCAT Scope header without the names of its channels; export it with them")
     names = header["Name"]
@@ -105,13 +109,18 @@ def _twincat(path: Path, text: str, separator: str) -> Signals:
     if "SymbolName" in header and len(set(channels.values())) < len(channels):
         channels = {k: _cell(header, "SymbolName", k) or name for k, name in channels.items()}
     body = [(k + 1, row) for k, row in enumerate(rows[first:], first) if row and row[0].strip() != "EOF"]
+    width = max(len(row) for row in header.values())
+    for line, row in body:
+        if any(cell.strip() for cell in row[width:]):
+            hint = "; with commas between columns, numbers need decimal points" if separator == "," else ""
+            raise InputError(f"{path}:{line}: {len(row)} values below {width} columns of the header{hint}")
     width = max(max(channels), max(clocks)) + 1
     if any(len(row) < width for _, row in body[:1]):
         raise InputError(
             f"{path}:{first + 1}: {len(rows[first])} values below {width} columns of the header; export it with a "
             "column of time for every channel or sampling time (Timelines: All)"
         )
-    return _grouped(path, header, clocks, channels, body, separator)
+    return _grouped(path, header, clocks, channels, body)
 
 
 def _cell(header: Mapping[str, Sequence[str]], key: str, column: int) -> str:
@@ -121,7 +130,7 @@ def _cell(header: Mapping[str, Sequence[str]], key: str, column: int) -> str:
 
 def _grouped(
     path: Path, header: Mapping[str, Sequence[str]], clocks: Sequence[int], channels: Mapping[int, str],
-    body: Sequence[tuple[int, Sequence[str]]], separator: str,
+    body: Sequence[tuple[int, Sequence[str]]],
 ) -> Signals:  # fmt: skip
     """One time of all groups of channels: that of the group with the most rows."""
     groups: dict[int, tuple[Array, dict[int, Array]]] = {}
@@ -129,10 +138,18 @@ def _grouped(
         own = [k for k in channels if clock < k and not any(clock < other < k for other in clocks)]
         if not own:
             continue
-        kept = [(line, row) for line, row in body if len(row) > max(own) and row[clock].strip()]
-        times = _numbers(path, kept, clock, "the time", separator)
+        kept = [(line, row) for line, row in body if len(row) > clock and row[clock].strip()]
+        if short := [line for line, row in kept if len(row) <= max(own)]:
+            raise InputError(f"{path}:{short[0]}: no value of {channels[max(own)]!r} beside its time")
+        times = _numbers(path, kept, clock, "the time")
+        back = np.flatnonzero(np.diff(times) <= 0)
+        if back.size:
+            line = kept[int(back[0]) + 1][0]
+            raise InputError(
+                f"{path}:{line}: the time {times[back[0] + 1]:.15g} follows {times[back[0]]:.15g}; it must increase"
+            )
         times = (times - times[0]) * (TICK if times.size and times[0] > TICKS else MS) if times.size else times
-        groups[clock] = times, {k: _numbers(path, kept, k, channels[k], separator) for k in own}
+        groups[clock] = times, {k: _numbers(path, kept, k, channels[k]) for k in own}
     if not groups:
         raise InputError(f"{path}: no channel has a column of time; export it with one (Timelines: All)")
     base = max(groups, key=lambda clock: groups[clock][0].size)
@@ -175,10 +192,9 @@ def _number(cell: str) -> float | None:
         return None
 
 
-def _numbers(path: Path, rows: Sequence[tuple[int, Sequence[str]]], k: int, name: str, separator: str) -> Array:
-    plain: Callable[[str], str] = (lambda cell: cell) if separator == "," else (lambda cell: cell.replace(",", "."))
+def _numbers(path: Path, rows: Sequence[tuple[int, Sequence[str]]], k: int, name: str) -> Array:
     try:
-        return np.array([float(plain(row[k])) for _, row in rows], dtype=np.float64)
+        return np.array([float(row[k].replace(",", ".")) for _, row in rows], dtype=np.float64)
     except ValueError:
         line, cell = next((line, row[k]) for line, row in rows if _number(row[k]) is None)
         words = {"true": 1.0, "false": 0.0}

@@ -87,6 +87,12 @@ def _trace(path: Path, root: ElementTree.Element, frame: ElementTree.Element) ->
         raise InputError(f"{path}: a row (rec) of traceData: {error}") from None
     if len(rows) < 2:
         raise InputError(f"{path}: {len(rows)} rows (rec) in traceData; at least 2 are needed")
+    back = np.flatnonzero(~(np.diff(time) > 0))
+    if back.size:
+        before, after = time[back[0] : back[0] + 2]
+        raise InputError(
+            f"{path}: row (rec) {back[0] + 2} of traceData: the time {after:.9g} follows {before:.9g}; it must increase"
+        )
     with np.errstate(invalid="ignore"):
         table[np.abs(table) >= NOTHING] = np.nan
     short = {name.rpartition("/")[2] for name in names}

@@ -21,7 +21,7 @@ from feedsim.report.changes import changes_part, changes_section
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.structure import checked_modes
 from feedsim.tune import Proposal, of_circle, of_run
-from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain
+from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain, torque_response
 from feedsim.tune.proposals import GAIN_MARGIN, PHASE_MARGIN, changed, least_margins
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -112,6 +112,39 @@ def test_a_slow_integral_part(fmus: Path) -> None:
     shorter = changed(machine, "Z", {"T_n": 0.85 * first.proposed})
     gain, phase = least_margins(judge(shorter, checked_modes(machine)), "Z")
     assert gain < GAIN_MARGIN or phase < PHASE_MARGIN
+
+
+@pytest.mark.parametrize("values", [{"K_v": 0.0}, {"speed_integrator": False}])
+def test_the_response_to_a_torque(values: dict[str, float]) -> None:
+    """At its ends: without position control by the integral part alone, without integral part by both gains."""
+    machine = changed(load(CIRCLE).machine, "Z", {"T_dyn": 0.0, **values})
+    system = LinearSystem(machine, checked_modes(machine))
+    gain = abs(system.transfer(np.array([0.05]), "Z.x_a", "Z.M_add")[0]) / machine.axes["Z"].I_P
+    assert gain == pytest.approx(torque_response(machine.axes["Z"].drive), rel=5e-3)
+
+
+def test_the_peak_that_can_fall_most_comes_first(fmus: Path) -> None:
+    """X has the slow integral part and, by its large inertia, still the smaller peak than Y."""
+    settings = [
+        "motions=[{kind: circle, plane: [X, Y], radius: 30 mm, feed: 2 m/min, direction: both, turns: 3}]",
+        DRIVE.format("X", "T_n=80 ms"),
+    ]
+    scenario = load(CIRCLE, settings)
+    result = judged(cosim.run(scenario, fmus=fmus))
+    causes = analysis.diagnoses(result)
+    peaks = {term.axis: term.value for diagnosis in causes.values() for term in diagnosis.terms if term.key == "peaks"}
+    assert 0 < peaks["X"] < peaks["Y"]
+    found = of_run(result, causes)
+    assert [(each.axis, each.parameter) for each in found] == [("X", "drive.T_n"), ("Y", "drive.T_n")]
+
+    def fallen(axis: str) -> float:
+        """What a T_n of 5 ms takes off."""
+        shorter = load(CIRCLE, [*settings, DRIVE.format(axis, "T_n=5 ms")])
+        (diagnosis,) = analysis.diagnoses(judged(cosim.run(shorter, fmus=fmus))).values()
+        now = [term.value for term in diagnosis.terms if term.key == "peaks" and term.axis == axis]
+        return peaks[axis] - (now[0] if now else 0.0)
+
+    assert fallen("X") > fallen("Y")
 
 
 def test_a_circle_alone_gives_directions(fmus: Path) -> None:

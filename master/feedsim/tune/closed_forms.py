@@ -59,3 +59,14 @@ def model_gain(drive: Drive, J: float) -> float | None:
     if not (drive.speed_integrator and drive.reference_model and drive.omega_0 and drive.D):
         return None
     return J * drive.omega_0 / (2 * drive.D)
+
+
+def torque_response(drive: Drive) -> float:
+    """Angle per torque [rad/(N.m)] by which an axis gives way to friction that turns round; infinite without control.
+
+    Behind a step M of the torque the speed loop gives way by the integral of its speed, M T_n/K_p, as s goes to 0 in
+    1/(J s^2 + K_p s + K_p/T_n). The position controller draws it back meanwhile: its integral over T_n at the rate K_v
+    makes that M/(K_p (1/T_n + K_v)). Without integral part it is the stiffness of the loops, M/(K_p K_v).
+    """
+    rate = drive.K_v + (1 / drive.T_n if drive.speed_integrator and drive.T_n else 0.0)
+    return 1 / (drive.K_p * rate) if drive.K_p > 0 and rate > 0 else float("inf")

@@ -18,7 +18,7 @@ from feedsim.errors import FeedsimError
 from feedsim.linear.judgement import Loop, judge
 from feedsim.scenario import Drive, Machine
 from feedsim.structure import Modes, checked_modes
-from feedsim.tune.closed_forms import axis_lag, feedforward_lag, loop_lag, model_gain
+from feedsim.tune.closed_forms import axis_lag, feedforward_lag, loop_lag, model_gain, torque_response
 
 # Off the neutral value by less than this share of it, or this time, a T_sym is neutral: rounding of what was typed.
 NEUTRAL_SHARE, NEUTRAL = 0.02, 20e-6
@@ -27,6 +27,7 @@ FITS = 0.1
 # Margins that a proposed gain keeps.
 GAIN_MARGIN, PHASE_MARGIN = 8.0, 40.0  # [dB], [deg]
 MIN_RESET_TIME = 1e-3  # T_n [s] below which none is proposed
+USUAL_RESET_RATIO = 2.0  # T_n over J/K_p that usual margins allow: the integral part takes 27 degrees at the crossover
 RESET_HALVINGS = 6  # of halving the range of T_n on a logarithmic scale: 3 % of its value
 
 
@@ -71,7 +72,10 @@ def of_circle(
     that take a search within margins are found, which takes seconds.
     """
     result: dict[str, Proposal] = {}
-    for term in worth_telling(diagnosis):
+    terms = list(worth_telling(diagnosis))
+    if machine is not None and modes is not None:
+        terms = _by_gain(terms, machine, modes)
+    for term in terms:
         proposals = _unknown(diagnosis, term) if machine is None or modes is None else _of(
             diagnosis, term, machine, modes, searched
         )  # fmt: skip
@@ -158,6 +162,31 @@ def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, search
                 yield from _shorter(machine, modes, term.axis, drive, cause, searched)
         case "lost_motion":
             yield from _backlash(machine, term)
+
+
+def _by_gain(terms: Sequence[Term], machine: Machine, modes: Modes) -> list[Term]:
+    """The terms with the peaks among them by what their drives can take off, not by their sizes.
+
+    A small peak of a slow drive may be worth more than a large one of a drive that can do no better.
+    """
+
+    def gain(term: Term) -> float:
+        axis = machine.axes.get(term.axis)
+        if axis is None or not isinstance(axis.drive, Drive) or term.value <= 0:
+            return 0.0
+        drive, J = axis.drive, modes.J_tot(term.axis)
+        present = torque_response(drive)
+        if not 0 < present < math.inf:
+            return 0.0
+        fitting = model_gain(drive, J)
+        K_p = drive.K_p if fitting is None or abs(drive.K_p / fitting - 1) <= FITS else fitting
+        T_n = drive.T_n
+        if drive.speed_integrator and T_n is not None:
+            T_n = min(T_n, max(USUAL_RESET_RATIO * J / K_p, MIN_RESET_TIME))
+        return term.value * (1 - torque_response(drive.model_copy(update={"K_p": K_p, "T_n": T_n})) / present)
+
+    ordered = iter(sorted((term for term in terms if term.key == "peaks"), key=gain, reverse=True))
+    return [next(ordered) if term.key == "peaks" else term for term in terms]
 
 
 def _servo(axes: tuple[str, str], value: float, machine: Machine, modes: Modes) -> Iterator[Proposal]:

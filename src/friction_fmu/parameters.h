@@ -1,24 +1,8 @@
-/* The unit's parameters as the contact takes them. Which there are, in which order and range: variables.def alone. */
+/* The parameters of this unit's law. */
 #ifndef FEEDSIM_PARAMETERS_H
 #define FEEDSIM_PARAMETERS_H
 
-#include <stdbool.h>
-
 #include "contact.h"
-#include "prefix.h"
-#include "table.h"
-
-#define parameters_take PREFIXED(parameters_take)
-#define parameters_agree PREFIXED(parameters_agree)
-#define parameters_contact PREFIXED(parameters_contact)
-
-/* The parameters in the order of their rows -> their fields of *v; the other fields are left alone. False where one is
- * out of its row's range or not finite. */
-bool parameters_take(const double values[], Scalars *v);
-
-/* Whether the parameters, each within its range, go together: F_S >= F_C. */
-bool parameters_agree(const Scalars *v);
-
-Contact parameters_contact(const Scalars *v);
+#include "law_parameters.h"
 
 #endif

@@ -1,5 +1,6 @@
-/* How a friction unit's parameters reach its law by its table alone. For tables whose parameters are all REAL: another
- * kind has no macro here and does not compile. Ahead of #include "variables.def", with VARIABLE defined as
+/* How a friction unit's parameters reach its law by its table alone; to be included once, by the unit's parameters.c,
+ * behind its parameters.h. For tables whose parameters are all REAL: another kind has no macro here and does not
+ * compile. Ahead of #include UNIT_TABLE, with VARIABLE defined as
  *
  *   TAKE  a row's value is taken into *v, and `good` is false where it is out of the row's range
  *   PUT   and goes from there to its place in `contact`: among those of LuGre, contact.lugre, but for those of which
@@ -31,5 +32,17 @@ static bool within(double value, double min, double max) {
 #define PUT_local(...)
 #define PUT_parameter(field) contact.PLACE(field) = v->field;
 #define PUT(kind, field, name, causality, ...) PUT_##causality(field)
+
+#define VARIABLE(...) TAKE(__VA_ARGS__)
+bool parameters_take(const double values[], Scalars *v) {
+    bool good = true;
+#include UNIT_TABLE
+    return good;
+}
+#undef VARIABLE
+
+bool parameters_agree(const Scalars *v) {
+    return v->F_S >= v->F_C;
+}
 
 #endif

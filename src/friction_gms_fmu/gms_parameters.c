@@ -6,25 +6,13 @@
 #define PLACE_skew ~, skew
 #define PLACE_C ~, C
 
-#define VARIABLE(...) TAKE(__VA_ARGS__)
-bool parameters_take(const double values[], Scalars *v) {
-    bool good = true;
-#include "variables.def"
-    return good;
-}
-#undef VARIABLE
-
-bool parameters_agree(const Scalars *v) {
-    return v->F_S >= v->F_C;
-}
-
 #define VARIABLE(...) PUT(__VA_ARGS__)
 Contact parameters_contact(const Scalars *v) {
     struct {
         Lugre lugre;
         double spread, skew, C;
     } contact = {.C = 0};
-#include "variables.def"
+#include UNIT_TABLE
     return contact_make(&contact.lugre, contact.spread, contact.skew, contact.C);
 }
 #undef VARIABLE

@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from reference_files import Case, Table
 
-# Z axis of the synthetic default machine: the unit's start values
-DEFAULTS = {
+# Z axis of the synthetic default machine, the units' start values: what laws share, and what this one has besides
+SHARED = {
     "sigma_0": 300.0,
     "sigma_1": 0.8,
     "sigma_2": 0.006,
@@ -23,9 +23,8 @@ DEFAULTS = {
     "F_log": 0.4,
     "v_log": 3.0,
     "asymmetry": 0.0,
-    "W": 0.04,
-    "gamma": 0.35,
 }
+DEFAULTS = {**SHARED, "W": 0.04, "gamma": 0.35}
 
 # Gragg's modified midpoint rule with 2 to 12 substeps, extrapolated to order 12 in steps of half a relaxation of the
 # bristles (g/|n|), one per interval at least, a control cycle: |n|^beta has no third derivative at n = 0. Twice as
@@ -36,12 +35,17 @@ LEAST = 1
 OWN_ERROR = 2e-13  # share of a column's range
 
 
-def steady_deflection(p: Mapping[str, float], n: float, side: float) -> float:
-    """g(n) of Eq. 7 [rad] at the speed n [rad/s]; `side`: sign of the direction of travel."""
+def level(p: Mapping[str, float], n: float, side: float) -> float:
+    """s(n) [N.m] at the speed n [rad/s]; `side`: sign of the direction of travel."""
     speed = abs(n)
     stribeck = math.exp(-((speed / p["v_s"]) ** p["beta"]))
-    level = p["F_C"] + (p["F_S"] - p["F_C"]) * stribeck + p["F_log"] * math.log(speed / p["v_log"] + 1)
-    return level * (1 + p["asymmetry"] * side) / p["sigma_0"]
+    rise = p["F_log"] * math.log(speed / p["v_log"] + 1)
+    return (p["F_C"] + (p["F_S"] - p["F_C"]) * stribeck + rise) * (1 + p["asymmetry"] * side)
+
+
+def steady_deflection(p: Mapping[str, float], n: float, side: float) -> float:
+    """g(n) of Eq. 7 [rad], likewise."""
+    return level(p, n, side) / p["sigma_0"]
 
 
 def engagement(p: Mapping[str, float], z: float, c: float) -> tuple[float, float]:
@@ -60,17 +64,36 @@ def solve(case: Case, every: float, outputs: tuple[str, ...], finer: int = 1) ->
     many steps of the integration.
     """
     p = DEFAULTS | dict(case.parameters)
+    state = 0.0, 0.0
+
+    def step(n0: float, n1: float, h: float) -> None:
+        nonlocal state
+        state = _held(p, *state, n0, h) if case.held else _interval(p, *state, n0, n1, h, finer)
+
+    columns = ("M_fr", "z", "c", "k", "lambda")
+    return over_knots(case, every, columns, outputs, lambda n: _shown(p, n, *state), step)
+
+
+def over_knots(
+    case: Case,
+    every: float,
+    columns: tuple[str, ...],
+    outputs: tuple[str, ...],
+    shown: Callable[[float], tuple[float, ...]],
+    step: Callable[[float, float, float], None],
+) -> Table:
+    """The outputs of a friction law, of the columns that `shown` has at a speed, from knot to knot of the speed.
+
+    step: of a law from one speed to the next within h seconds.
+    """
     time, speed = case.inputs["time"], case.inputs["n_fr"]
-    z = c = 0.0
     rows: list[tuple[float, ...]] = []
     for i, (t, n) in enumerate(zip(time, speed, strict=True)):
         if abs(t / every - round(t / every)) < 1e-6:
-            rows.append((t, *_shown(p, speed[max(i - 1, 0)] if case.held else n, z, c)))
-        if i + 1 < len(time) and case.held:
-            z, c = _held(p, z, c, n, time[i + 1] - t)
-        elif i + 1 < len(time):
-            z, c = _interval(p, z, c, n, speed[i + 1], time[i + 1] - t, finer)
-    table = dict(zip(("time", "M_fr", "z", "c", "k", "lambda"), np.array(rows).T, strict=True))
+            rows.append((t, *shown(speed[max(i - 1, 0)] if case.held else n)))
+        if i + 1 < len(time):
+            step(n, n if case.held else speed[i + 1], time[i + 1] - t)
+    table = dict(zip(("time", *columns), np.array(rows).T, strict=True))
     return {name: table[name] for name in ("time", *outputs)}
 
 
@@ -110,12 +133,12 @@ def _interval(
     fastest = max(abs(n) / steady_deflection(p, n, side) for n in (n0, n1))
     steps = max(LEAST, math.ceil(fastest * h / RELAXATION)) * finer
     for i in range(steps):
-        z = _extrapolated(rate, i * h / steps, z, h / steps)
+        z = extrapolated(rate, i * h / steps, z, h / steps)
     half = p["W"] / 2
     return z, min(max(c + (n0 + n1) / 2 * h, -half), half)
 
 
-def _extrapolated(rate: Callable[[float, float], float], t: float, z: float, h: float) -> float:
+def extrapolated(rate: Callable[[float, float], float], t: float, z: float, h: float) -> float:
     """z after a step of h seconds: midpoint rules, the even powers of their substeps extrapolated away (Neville)."""
     found: list[float] = []
     for row, count in enumerate(SUBSTEPS):

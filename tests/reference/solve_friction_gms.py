@@ -11,24 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 from reference_files import Case, Table
-from solve_friction import _extrapolated
+from solve_friction import SHARED, extrapolated, level, over_knots
 
-# Z axis of the synthetic default machine: the unit's start values
-DEFAULTS = {
-    "sigma_0": 300.0,
-    "sigma_1": 0.8,
-    "sigma_2": 0.006,
-    "F_C": 1.6,
-    "F_S": 2.1,
-    "v_s": 0.6,
-    "beta": 1.0,
-    "F_log": 0.4,
-    "v_log": 3.0,
-    "asymmetry": 0.0,
-    "spread": 20.0,
-    "skew": 0.0,
-    "C": 200.0,
-}
+# start values of the unit
+DEFAULTS = {**SHARED, "spread": 20.0, "skew": 0.0, "C": 200.0}
 ELEMENTS = 10
 LOOKS = 16  # at the condition within an interval, which it passes once or hardly ever twice
 HALVINGS = 80
@@ -51,27 +37,18 @@ def elements(p: Mapping[str, float]) -> list[Element]:
     return [Element(p["sigma_0"] * share / x / soft, share) for share, x in zip(shares, deflections, strict=True)]
 
 
-def level(p: Mapping[str, float], n: float, side: float) -> float:
-    """s(n) [N.m] at the speed n [rad/s]; `side`: sign of the direction of travel."""
-    speed = abs(n)
-    stribeck = math.exp(-((speed / p["v_s"]) ** p["beta"]))
-    rise = p["F_log"] * math.log(speed / p["v_log"] + 1)
-    return (p["F_C"] + (p["F_S"] - p["F_C"]) * stribeck + rise) * (1 + p["asymmetry"] * side)
-
-
 def solve(case: Case, every: float, outputs: tuple[str, ...], finer: int = 1) -> Table:
     """The named outputs every `every` seconds, as solve_friction.solve() has them."""
     p = DEFAULTS | dict(case.parameters)
-    time, speed = case.inputs["time"], case.inputs["n_fr"]
     parts = elements(p)
-    rows: list[tuple[float, ...]] = []
-    for i, (t, n) in enumerate(zip(time, speed, strict=True)):
-        if abs(t / every - round(t / every)) < 1e-6:
-            rows.append((t, *_shown(p, parts, speed[max(i - 1, 0)] if case.held else n)))
-        if i + 1 < len(time):
-            _interval(p, parts, n, n if case.held else speed[i + 1], time[i + 1] - t, finer)
-    table = dict(zip(("time", "M_fr", "z", "k"), np.array(rows).T, strict=True))
-    return {name: table[name] for name in ("time", *outputs)}
+    return over_knots(
+        case,
+        every,
+        ("M_fr", "z", "k"),
+        outputs,
+        lambda n: _shown(p, parts, n),
+        lambda n0, n1, h: _interval(p, parts, n0, n1, h, finer),
+    )
 
 
 def _shown(p: Mapping[str, float], parts: list[Element], n: float) -> tuple[float, ...]:
@@ -151,6 +128,6 @@ def _slipped(
     for x in (0.0, 1.0):
         now, step = x, (h - begin) / finer
         for i in range(finer):
-            now = _extrapolated(rate, begin + i * step, now, step)
+            now = extrapolated(rate, begin + i * step, now, step)
         ends.append(now)
     return ends[0], ends[1] - ends[0]

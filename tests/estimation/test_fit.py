@@ -56,6 +56,22 @@ def test_scatter_of_a_nonlinear_fit_is_its_covariance(log: bool) -> None:
     np.testing.assert_allclose(np.mean(values, axis=0), [2.0, 0.7], atol=4e-3)
 
 
+def test_a_jump_beside_the_solution_promises_nothing() -> None:
+    """A line through 2500 samples of unit noise that moves by half of it where the slope passes its value by 1e-8: a
+    difference across that jump takes the slope for known to a hundredth of what the samples determine."""
+    t = np.linspace(0.0, 1.0, 2500)
+    noise = np.random.default_rng(3).standard_normal(t.size)
+    best = 1.0 + noise @ t / (t @ t)
+
+    def residuals(values: Mapping[str, float]) -> np.ndarray:
+        return noise + (1.0 - values["m"]) * t + 0.5 * (values["m"] > best + 1e-8) * np.sin(90 * np.pi * t)
+
+    line = 1 / np.linalg.norm(t)
+    sigma = {jumps: fit(residuals, [Parameter("m", best)], jumps=jumps).sigma["m"] for jumps in (False, True)}
+    assert sigma[False] < 0.01 * line
+    assert sigma[True] == pytest.approx(line, rel=1e-3)
+
+
 def test_bounds_are_kept_and_told() -> None:
     seen: list[float] = []
 

@@ -19,6 +19,9 @@ from feedsim.estimation.parameter import Array, Parameter, Prior
 # nothing: below it lies the error of the differences that the Jacobian is made of.
 SINGULAR_RATIO = 1e-8
 AT_BOUND = 1e-6  # of the scale: what counts as sitting at a bound
+# Of a model that jumps, in positions: the first secant, and the widest one. Slopes over a standard deviation count.
+FIRST_SECANT, WIDEST_SECANT, SECANTS = 1e-2, 0.1, 3
+JUMP_RATIO = 2.0  # of one side's slope over the other's: what lies between is a jump
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,7 @@ def fit(
     seed: int = 0,
     normalised: bool = True,
     difference: float = 1e-6,
+    jumps: bool = False,
     tolerance: float = 1e-10,
     limit: int = 100,
 ) -> Fit:
@@ -90,6 +94,8 @@ def fit(
             residual variance.
         difference: step of the differences, of the scale (of the value where log), to one side while
             searching; the covariance comes from central ones.
+        jumps: the model jumps in places. The covariance then comes from secants over the standard deviations: a slope
+            across a jump would promise a value as exact as the difference is small.
         tolerance: of cost, step and gradient. limit: steps per start.
 
     Raises InputError: no parameters, a name twice, fewer residuals than parameters, no start arrives.
@@ -110,7 +116,7 @@ def fit(
     if not arrived:
         raise InputError(f"fit: none of {len(made)} start(s) arrives: {made[0][0].failure}")
     cost, best = min(arrived, key=lambda pair: pair[0])
-    return _conclude(whole, best, beside, cost, tuple(start for start, _ in made), normalised)
+    return _conclude(whole, best, beside, cost, tuple(start for start, _ in made), normalised, jumps)
 
 
 def _with_prior(
@@ -186,11 +192,11 @@ def _onto_bounds(problem: LeastSquares, position: Array) -> Array:
 
 
 def _conclude(
-    whole: _Whole, position: Array, beside: int, cost: float, starts: tuple[Start, ...], normalised: bool
+    whole: _Whole, position: Array, beside: int, cost: float, starts: tuple[Start, ...], normalised: bool, jumps: bool
 ) -> Fit:
     """Covariance and what else belongs to a solution. beside: residuals of the prior."""
     problem = whole.problem
-    jacobian = whole.jacobian(position, central=True)
+    jacobian = _secants(whole, position) if jumps else whole.jacobian(position, central=True)
     own = len(jacobian) - beside
     residuals = whole(position)[:own]
     values = np.array(list(problem.values(position).values()))
@@ -211,6 +217,27 @@ def _conclude(
         tuple(name for name, quiet in zip(problem.names, silent, strict=True) if quiet),
         starts,
     )
+
+
+def _secants(whole: _Whole, position: Array) -> Array:
+    """(N + M, P) slopes over as many positions as a standard deviation: the mean of both sides, but for a jump on one,
+    which rules out what lies beyond it and determines nothing on the other."""
+    problem, here = whole.problem, whole(position)
+    jacobian, steps = np.empty((len(here), len(position))), np.full(len(position), FIRST_SECANT)
+    for _ in range(SECANTS):
+        for k, step in enumerate(steps):
+            slopes = []
+            for end in (max(position[k] - step, problem.low[k]), min(position[k] + step, problem.high[k])):
+                if end != position[k]:
+                    there = position.copy()
+                    there[k] = end
+                    slopes.append((whole(there) - here) / (end - position[k]))
+            least, most = min(slopes, key=np.linalg.norm), max(slopes, key=np.linalg.norm)
+            jump = np.linalg.norm(most) > JUMP_RATIO * np.linalg.norm(least)
+            jacobian[:, k] = least if jump else (least + most) / 2
+        steps = np.clip(np.sqrt(np.diag(inverse(jacobian)[0])), problem.steps, WIDEST_SECANT)
+    whole(position)
+    return jacobian
 
 
 def inverse(jacobian: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -57,7 +57,8 @@ MIN_GAIN_PER_PARAMETER = 12.0
 # Of Maxwell slip: no value of them is without effect, so that a fit without them is none with less in it. They are free
 # where the records determine them, also where the usual value happens to be the best one.
 WITHOUT_NEUTRAL = frozenset({"spread", "skew", "C"})
-# Also beside a stage 1 sought last: free from the start it leads astray where the axis is of another law.
+# Also beside a stage 1 sought last: free from the start it follows small sines of an axis of another law, and leaves
+# three times as much of a circle.
 LATE = frozenset({"C"})
 # In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
 # Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
@@ -68,8 +69,8 @@ REFINEMENTS = (
     ("F_S", "v_s"),
     ("asymmetry",),
     ("W", "gamma"),
+    ("spread", "skew"),
     ("spread",),
-    ("skew",),
     ("C",),
     ("F_S", "v_s"),  # once more: what engages passed for it, or hid it
     ("F_log",),
@@ -167,10 +168,12 @@ def dynamic(
     tell("final fit", 0.9)
     results = search.solve(results.values, results.states, base, tolerance=FINAL, limit=40)
     results, base = _told(search, results, base, known, fixed)
+    results = search.around(results, base)
     honest = uncertainty(search, results, known.open.values(), known.drift)
     # The delay first: without it damping is determined that both together leave open.
     while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
         results, base = _without(search, results, base, judged, known, fixed)
+        results = search.around(results, base)
         honest = uncertainty(search, results, known.open.values(), known.drift)
     if prior is None and has_sines(fine):
         fixed |= _left_with(known, base)
@@ -349,6 +352,11 @@ def _refined(
     starts = [values]
     if {"W", "gamma"} <= set(added):
         starts = [start for start in grid(coarse, values, ["W", "gamma", "sigma_0"])[:FOLLOWED] if start["W"] > 0][:2]
+    elif {"spread", "skew"} <= set(added):
+        own = [name for name in ("sigma_0", "sigma_1") if name in base]
+        starts = [values, *grid(coarse, values, [*added, *own])[: FOLLOWED - 1]]
+    elif "C" in added:
+        starts = [{**values, "C": values["C"] * factor} for factor in (1.0, 0.2, 5.0)]
     tried = search.best(starts, solution.states, [*base, *added])
     # Weighted by what the richer model leaves: what it explains must not pass for noise that hides it.
     search = Search(search.models, known.prior, _weights(search.models, tried, search.weights))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from feedsim.identify.record import Array
 from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 REACH = {"z": 1.0, "c": 0.5}
+VALLEYS, REACHED = 6, 1.5  # tried beside a solution, drawn within so many standard deviations of it
+VALLEY_TOLERANCE = 1e-6  # of cost and step there
 START_TOLERANCE = 1e-3  # tolerance of cost and step to compare starts
 FOLLOWED = 3  # of the starts; as many again where none of them explains the torque
 EXPLAINED = 2.0  # mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
@@ -56,10 +58,12 @@ class Search:
     Attributes:
         models, priors: what is fitted and what is known before.
         weights: per model, standard deviation of the residuals of each of its stretches [N.m].
+        jumps: whether the law's torque jumps with its parameters, as that of elements that slip or hardly do not.
     """
 
     def __init__(self, models: Sequence[RecordTorque], prior: Prior, weights: Sequence[Array]) -> None:
         self.models, self.prior, self.weights = tuple(models), with_excess(prior), tuple(weights)
+        self.jumps = "spread" in self.models[0].law.names
 
     def residuals(self, values: Mapping[str, float], states: Array) -> list[Array]:
         """Per model, (rows,) over their weights."""
@@ -82,6 +86,38 @@ class Search:
             if 2 * best.fit.cost <= EXPLAINED * len(best.fit.residuals):
                 break
         return best
+
+    def around(self, solution: Solution, free: Sequence[str]) -> Solution:
+        """The best of the valleys beside a solution; what is about as likely as it is in its covariance.
+
+        Where an element hardly begins to slip, or hardly does not, its torque jumps with the parameters: the sum of
+        squares has valleys side by side, nearer to each other than a standard deviation. A model that does not jump
+        keeps its solution.
+        """
+        if not self.jumps:
+            return solution
+        random = np.random.default_rng(0)
+        logarithmic = {name for name, one in reversal_ranges(solution.values).items() if one.get("log")}
+        best, found = solution, [solution]
+        for _ in range(VALLEYS):
+            moves = dict(
+                zip(
+                    best.fit.names,
+                    REACHED * _root(best.fit.covariance) @ random.standard_normal(len(best.fit.names)),
+                    strict=True,
+                )
+            )
+            point = {**best.values, EXCESS: best.values["F_S"] - best.values["F_C"]}
+            for name in map(inner, free):
+                value = point[name]
+                point[name] = value * float(np.exp(moves[name] / value)) if name in logarithmic else value + moves[name]
+            point["F_S"] = point["F_C"] + max(point.pop(EXCESS), 0.0)
+            found.append(self.solve(point, best.states, free, tolerance=VALLEY_TOLERANCE, limit=30))
+            best = min(best, found[-1], key=lambda one: one.fit.cost)
+        likely = np.exp([best.fit.cost - one.fit.cost for one in found])
+        apart = np.stack([one.fit.values - best.fit.values for one in found])
+        scatter = (apart * likely[:, None]).T @ apart / np.sum(likely)
+        return replace(best, fit=replace(best.fit, covariance=best.fit.covariance + scatter))
 
     def solve(
         self, values: Mapping[str, float], states: Array, free: Sequence[str], *, tolerance: float, limit: int
@@ -118,12 +154,20 @@ class Search:
             residuals,
             parameters,
             prior=Prior.joined([self.prior, loose]),
-            difference=1e-5,
+            difference=1e-3 if self.jumps else 1e-5,
+            jumps=self.jumps,
             tolerance=tolerance,
             limit=limit,
         )
         point, shares = full(result.mapping())
         return Solution(point, shares, result)
+
+
+def _root(covariance: Array) -> Array:
+    """(P, P) that makes white numbers those of a covariance; 0 for what has no finite variance."""
+    usable = np.isfinite(np.diag(covariance))
+    strength, directions = np.linalg.eigh(np.where(np.outer(usable, usable), covariance, 0.0))
+    return np.asarray(directions * np.sqrt(np.maximum(strength, 0.0)))
 
 
 def spread(residual: Array) -> float:
@@ -144,7 +188,7 @@ MOST_STIFFNESSES = 10
 ZONES = (3.0, 7.0, 14.0)  # width of the engaging zone over the largest deflection F_C/sigma_0
 GAMMA_STARTS = (0.25, 0.6)  # gamma
 PURE = (0.0, 1.0)  # W and gamma of pure LuGre
-SPREADS, SKEWS = (5.0, 20.0, 80.0), (0.0, 0.5)  # of the elements of Maxwell slip
+SPREADS, SKEWS = (5.0, 10.0, 20.0, 40.0, 80.0), (-0.4, 0.0, 0.4, 0.8)  # of the elements of Maxwell slip
 
 
 def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown: Collection[str]) -> dict[str, float]:

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws compensation-study band-coverage identification-accuracy lock ansys clean
+.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -246,6 +246,9 @@ identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320
 
 drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of eleven (half an hour of one core; docs/replay.md)
 	$(PY) benchmarks/drive_study.py
+
+circle-study: fmus $(VENV)/.run ## whether causes come out of circles that no rule was set on (a minute; ARGS='--seed 7': others; docs/causes.md)
+	$(PY) benchmarks/circle_study.py $(ARGS)
 
 compensation-study: fmus $(VENV)/.run ## what friction compensations take off on three machines (some five minutes; docs/tuning.md)
 	$(PY) benchmarks/compensation_study.py

@@ -112,7 +112,9 @@ def diagnosis(cause: Cause, feed: float, radius: float) -> tuple[Diagnosis, list
     (task,) = (each for each in tasks(run.scenario, run.program) if isinstance(each, CircleTask))
     columns = ("tcp.x_X", "tcp.x_Z") if cause.at_tool else None
     response = None if cause.at_tool else task.response  # of the scales
-    found = diagnosed(run.trace, task.turns, task.pitch, task.gain, task.drag, columns, cause.recorded, response)
+    found = diagnosed(
+        run.trace, task.turns, task.pitch, task.gain, task.drag, columns, cause.recorded, response, task.following
+    )
     assert found is not None
     turns = [contour(run.trace, turn, columns) for turn in task.turns]
     return found, [(turn.angle, turn.deviation) for turn in turns]

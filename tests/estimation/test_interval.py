@@ -108,3 +108,8 @@ def test_the_autocorrelation_is_the_sum_of_products() -> None:
     values = np.random.default_rng(2).standard_normal(50)
     expected = np.correlate(values, values, "full")[49:]
     assert covariance.autocorrelation(values)[:50] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("free", [2, 7, 40, 1e6])
+def test_a_pair_of_values_has_the_quantile_of_fisher(free: float) -> None:
+    assert interval.pair_quantile(free) == pytest.approx(math.sqrt(2 * stats.f.ppf(0.95, 2, free)), rel=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -119,3 +120,32 @@ def test_cogging_is_named_with_its_order_and_torque(driven: Driven) -> None:
     assert not [each for each in clean.terms if each.key == "cogging"]
     for axis in "XZ":  # the peaks are those of the machine without it
         assert found[f"peaks {axis}"].value == pytest.approx(clean[f"peaks {axis}"].value, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("settings", "key", "size"),
+    [
+        (("encoder.eccentricity=0.6 mrad",), "pitch X", 0.6e-3 * 20e-3 / (2 * math.pi)),
+        (("periodic_error_1.period=20 mm", "periodic_error_1.amplitude=2 um"), "pitch X", 2e-6),
+        (("backlash_compensation.value=8 um",), "lost_motion X", -8e-6),
+        ((), "", 0.0),
+    ],
+)  # fmt: skip
+def test_a_fast_small_circle_has_its_cause_alone(
+    driven: Driven, settings: tuple[str, ...], key: str, size: float
+) -> None:
+    """8.3 pitches a second, three of them in the circle, and friction that acts all the way round: unlike amplitudes
+    are those of the linear response, and nothing else is there."""
+    changes = tuple(f"machine.axes.X.drive.{each}" for each in settings)
+    if key and "encoder" in settings[0]:
+        changes += tuple(f"machine.axes.{axis}.drive.measuring.indirect=true" for axis in "XZ")
+    _, found = driven("motions.0.radius=30 mm", "motions.0.feed=10 m/min", *changes)
+    if key:
+        term = found[key]
+        assert abs(term.value - size) <= term.half < 0.35e-6
+    assert found.unlike is not None
+    for term in found.terms:
+        if term.key in ("servo", "squareness", "lost_motion", "pitch", "cogging") and f"{term.key} {term.axis}" != key:
+            assert not (term.shows and term.size > 0.5e-6), term
+        if term.key == "scale":
+            assert abs(term.value - found.unlike) <= term.half

@@ -37,6 +37,7 @@ def diagnosed(
     columns: tuple[str, str] | None = None,
     recorded: bool = False,
     response: Callable[[str, Array], NDArray[np.complex128]] | None = None,
+    following: Mapping[str, NDArray[np.complex128]] | None = None,
 ) -> Diagnosis | None:
     """Turns of one circle taken apart; None where they have too few samples for that.
 
@@ -54,7 +55,9 @@ def diagnosed(
         phase = (measured.time - measured.time[0]) * (2 * math.pi / (entry.end - entry.begin))
         paths.append(TurnedPath(measured.angle, measured.deviation, entry.sense, phase))
     speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
-    circle = CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}, recorded, response)
+    circle = CircleUnderTest(
+        turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}, following or {}, recorded, response
+    )
     return diagnose(circle, paths)
 
 

@@ -27,7 +27,7 @@ from feedsim.analysis.positioning_accuracy import Accuracy, readings
 from feedsim.cosim.plant import plant_modes
 from feedsim.errors import InputError
 from feedsim.findings import Note
-from feedsim.linear.loops import position_reference
+from feedsim.linear.loops import measuring_error, position_reference
 from feedsim.linear.system import LinearSystem
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
@@ -42,6 +42,8 @@ from feedsim.trace import Trace, matches
 RUN_IN = 0.2
 # Of the loops' response to friction: frequencies up to this [Hz], and up to this multiple of the circle's.
 DRAG_HIGHEST, DRAG_MOST = 200.0, 401
+# Harmonics beyond z of cos(z cos t), in cube roots of z: J_n(z) is below 1e-4 there.
+PITCH_HARMONICS = 4.0
 
 
 class Result(Protocol):
@@ -109,7 +111,18 @@ class CircleTask:
         """
         last: tuple[Trace, Diagnosis | None] | None = self.__dict__.get("_last")
         if last is None or last[0] is not trace:
-            last = trace, diagnosed(trace, self.turns, self.pitch, self.gain, self.drag, response=self.response)
+            last = (
+                trace,
+                diagnosed(
+                    trace,
+                    self.turns,
+                    self.pitch,
+                    self.gain,
+                    self.drag,
+                    response=self.response,
+                    following=self.following,
+                ),
+            )
             self.__dict__["_last"] = last
         return last[1]
 
@@ -146,6 +159,24 @@ class CircleTask:
             }
         except InputError:
             return {}
+
+    @cached_property
+    def following(self) -> dict[str, NDArray[np.complex128]]:
+        """How the plane's axes follow errors of their measured positions, at the multiples of the circle's frequency up
+        to where errors that repeat with the pitch have harmonics [1]; empty as gain."""
+        if not self.drag:
+            return {}
+        first, system = 1 / (self.turn.end - self.turn.begin), LinearSystem(self.machine, plant_modes(self.machine)[0])
+        result = {}
+        for axis in self.turn.axes:
+            waves = 2 * math.pi * self.turn.radius / self.pitch[axis]
+            count = int(
+                min(waves + PITCH_HARMONICS * (1 + waves ** (1 / 3)), 0.4 / self.machine.cycles.T_c / first, 500)
+            )
+            result[axis] = measuring_error(
+                system, axis, np.asarray(first * np.arange(1, max(count, 1) + 1), dtype=np.float64)
+            )
+        return result
 
     @property
     def response(self) -> Callable[[str, NDArray[np.float64]], NDArray[np.complex128]] | None:

@@ -69,3 +69,13 @@ def student(free: float) -> float:
         (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160,
     )
     return math.fsum(term / free**k for k, term in enumerate(series))
+
+
+def pair_quantile(free: float) -> float:
+    """Radius, in standard deviations, of the circle that holds 95 % of two values of one accuracy with so many degrees
+    of freedom: sqrt(2 F), F the quantile 0.95 of Fisher's distribution of 2 and ``free``, which has a closed form.
+
+    >>> round(pair_quantile(10), 4), round(pair_quantile(1e9), 4)
+    (2.8645, 2.4477)
+    """
+    return math.sqrt(free * math.expm1(math.log(20) * 2 / free))

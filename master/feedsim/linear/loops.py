@@ -106,6 +106,19 @@ def position_reference(system: LinearSystem, axis: str, frequency: Floats, *, fe
     return np.asarray(to_x_s + speed * to_n_ffw)
 
 
+def measuring_error(system: LinearSystem, axis: str, frequency: Floats) -> Complexes:
+    """How the closed position loop follows an error e of the measured position, -x_a/e [1], slowly 1. Measured
+    indirectly, the error is that of the motor encoder, whose speed errs by its derivative."""
+    drive = system.drives[_index(system, axis)]
+    s = np.asarray(2j * np.pi * np.asarray(frequency))
+    closed = system.closing({axis: "position"})
+    to_x_s, to_torque = closed.transfers(frequency, f"{axis}.x_a", (f"{axis}.x_s", f"{axis}.M_add"))
+    result = to_x_s / drive.setpoint_delay(s)
+    if drive.drive.indirect:
+        result = result + to_torque * drive.from_speed(s) * s / drive.I_P
+    return np.asarray(result)
+
+
 def speed_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:
     """Open-loop gain of the speed loop at s (F,) [rad/s]: cut at the speed ahead of the speed controller, the axis's
     position loop open, other loops as they are: what a control finds that measures one axis and holds the others. A

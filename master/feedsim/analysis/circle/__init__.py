@@ -6,6 +6,7 @@ Start with model.py, the terms and their fit (estimation/robust.py); diagnosis.p
 
 from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, diagnose
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.model import separating_radius
 from feedsim.analysis.circle.vibration import Vibration
 from feedsim.analysis.circle.words import answer, further, name, sentence, swinging, worth_telling
 
@@ -21,6 +22,7 @@ __all__ = [
     "further",
     "name",
     "sentence",
+    "separating_radius",
     "swinging",
     "worth_telling",
 ]

@@ -32,6 +32,8 @@ MIN_REMAINDER, MIN_EXPLAINED_SHARE, MIN_KEPT_SHARE, RIVAL_COUNT = 30e-9, 0.3, 0.
 # periods from reversal to reversal, and what friction leaves there is explained to 35 % by one, to 54 % by two.
 MIN_EXPLAINED_BY_ALL = 0.6
 MAX_WAVES = 4  # waves of a circle
+# Waves across the circle, below which one is not known from the circle's own shape, friction's included.
+MIN_PERIODS = 6.0
 WAVE_POINTS = 8192  # of a turn; the finest wave has some 1500 periods
 SCREENED_SAMPLES = 2000  # samples of all paths for the search among the orders
 # The axis follows a small torque by the linear response to this share of it: friction changes with the speed.
@@ -181,7 +183,7 @@ def _waves(circle: CircleUnderTest, axis: str) -> Iterator[Wave]:
     T = np.interp(at, grid, response.real) + 1j * np.interp(at, grid, response.imag)
     time = np.linspace(0, 2 * math.pi, WAVE_POINTS, endpoint=False)
     x = circle.radius * (np.cos, np.sin)[i](time)
-    for order in range(MOTOR_ORDERS[0], top + 1):
+    for order in range(max(MOTOR_ORDERS[0], math.ceil(MIN_PERIODS * pitch / (2 * circle.radius))), top + 1):
         moved = []
         for wave in (np.cos, np.sin):
             torque = np.fft.rfft(wave(2 * math.pi * order / pitch * x))

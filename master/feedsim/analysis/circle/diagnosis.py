@@ -238,7 +238,7 @@ def _curves(fit: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) -> d
             named["servo "] = made["servo"]
         for i, axis in enumerate(circle.axes):
             named[f"lost_motion {axis}"] = made[f"lost_{i}"]
-            if f"pitch_{i}_cos" in made:
+            if f"pitch_{i}_cos" in made and axis not in fit.left_out:
                 named[f"pitch {axis}"] = made[f"pitch_{i}_cos"] + made[f"pitch_{i}_sin"]
             own = (fit.reversal[k] >= 0) & (fit.reversal[k] % 2 == i)
             named[f"peaks {axis}"] = np.where(own, fit.residual[k], 0.0)

@@ -16,8 +16,11 @@ from feedsim.analysis.figures import Array
 
 # Lost motion from which on its shape is looked at [m]; the mark that it is play.
 PLAY, PLAYED = 0.2e-6, "play"
-# Travel in pitches from which an error that repeats with the pitch differs from the circle's own shape.
-PITCHES = 2.0
+# Travel in pitches from which an error that repeats with the pitch differs from the circle's own shape; and from which
+# it is taken in where it explains what is left, however well the circle determines it.
+PITCHES, FEWEST_PITCHES = 2.0, 0.5
+# Points of a turn at which the way of an axis is taken through the response of its loops.
+COURSE_POINTS = 1024
 # More samples of a turn add nothing to its shape.
 MAX_TURN_SAMPLES = 8000
 
@@ -27,7 +30,9 @@ class CircleUnderTest:
     """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s]; the pitch of an
     axis [m] where an error that repeats with it is looked for; where the drive of an axis is known, its response x_a
     over x_s at the circle's frequency [1], and x_a over a torque at the motor at the odd multiples of it, from the
-    first on [m/(N.m)]; or over a torque on the rotor as a function of axis and frequencies (F,) [Hz].
+    first on [m/(N.m)]; how an axis follows an error of its measured position at the multiples of that frequency, from
+    the first on [1], 1 where it follows all of it; x_a over a torque on the rotor as a function of axis and frequencies
+    (F,) [Hz].
 
     recorded: an instrument at the tool has measured it. Then guides may be bent, the centre may move while turns are
     driven, and the angles may be off by a constant (setup.py)."""
@@ -38,6 +43,7 @@ class CircleUnderTest:
     pitch: Mapping[str, float] = field(default_factory=dict)
     gain: Mapping[str, complex] = field(default_factory=dict)
     drag: Mapping[str, NDArray[np.complex128]] = field(default_factory=dict)
+    following: Mapping[str, NDArray[np.complex128]] = field(default_factory=dict)
     recorded: bool = False
     response: Callable[[str, Array], NDArray[np.complex128]] | None = None
 
@@ -78,9 +84,29 @@ class Undone:
     moved: Moved
 
 
-def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
+def enough_pitches(circle: CircleUnderTest, axis: str, pitches: float = PITCHES) -> bool:
     """Whether the circle is large enough to determine an error that repeats with the pitch of ``axis``."""
-    return axis in circle.pitch and 2 * circle.radius >= PITCHES * circle.pitch[axis]
+    return axis in circle.pitch and 2 * circle.radius >= pitches * circle.pitch[axis]
+
+
+def followed(circle: CircleUnderTest, i: int, angle: Array, positions: Array, sense: int) -> tuple[Array, Array]:
+    """What axis ``i`` does of errors cos(2 pi x/p) and sin(2 pi x/p) of its measured position at angles (N,) [rad] of a
+    turn, x its positions (N,) [m]: 1 m of each, as far as the loops follow, where their response is known."""
+    axis = circle.axes[i]
+    rate = 2 * math.pi / circle.pitch[axis]
+    if axis not in circle.following:
+        return np.cos(rate * positions), np.sin(rate * positions)
+    time = np.linspace(0, 2 * math.pi, COURSE_POINTS, endpoint=False)
+    way = rate * circle.radius * (np.cos, np.sin)[i](time)
+    courses = []
+    for wave in (np.cos, np.sin):
+        spectrum = np.fft.rfft(wave(way))
+        top = len(circle.following[axis]) + 1
+        spectrum[1:top] *= circle.following[axis]
+        spectrum[top:] = 0
+        courses.append(np.interp(sense * angle % (2 * math.pi), time, np.fft.irfft(spectrum), period=2 * math.pi))
+    # In the other sense the second axis goes the other way.
+    return courses[0], courses[1] * (sense if i else 1)
 
 
 def undo(
@@ -141,9 +167,9 @@ def displacements(
         else:
             result[f"lost_{i}"] = (i, 0.5 * side)
     for i, axis in enumerate(circle.axes):
-        if enough_pitches(circle, axis):
-            phase = 2 * math.pi / circle.pitch[axis] * positions[i]
-            result[f"pitch_{i}_cos"], result[f"pitch_{i}_sin"] = (i, np.cos(phase)), (i, np.sin(phase))
+        if axis in circle.pitch:
+            cos, sin = followed(circle, i, angle, positions[i], sense)
+            result[f"pitch_{i}_cos"], result[f"pitch_{i}_sin"] = (i, cos), (i, sin)
     if circle.recorded:
         u, w = positions / circle.radius
         result |= {"bend_0": (1, u**2), "bend_1": (0, w**2), "third": (1, u**3 - u / 2)}

@@ -18,7 +18,8 @@ taken for lost motion, and where the data do not separate the two, the interval 
 On a fast circle a peak takes as long as a quarter turn, and no exponential is its shape. Where the drives are known, so
 is that shape: Coulomb friction is a torque that changes sign where an axis reverses, and the position follows it by the
 loops' response at the odd harmonics of the turn. It stands in the place of the exponentials, with its first two slopes,
-as friction takes some way to turn round.
+as friction takes some way to turn round, and with the response to what friction rises with the speed. An error that
+repeats with the pitch is one of the measured position there: the axis follows it by the response of its position loop.
 
 Lost motion is a step, or play: then an axis stands behind a reversal until the play is used up, along R (1 - cos). That
 of both is taken which leaves less there.
@@ -35,6 +36,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import (
+    FEWEST_PITCHES,
+    PITCHES,
     PLAY,
     PLAYED,
     CircleUnderTest,
@@ -47,6 +50,7 @@ from feedsim.analysis.circle.geometry import (
 from feedsim.analysis.circle.setup import Offset, angle_offset, centre_moves
 from feedsim.analysis.circle.tails import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.figures import Array
+from feedsim.estimation.interval import pair_quantile, student
 from feedsim.estimation.robust import CHANGE_FLOOR, covariance_of, robust_fit, rounding
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
@@ -60,9 +64,10 @@ THIRD_ORDER_SHARE = 0.45
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK_ANGLE = 6.0
 # Friction is no clean step: the response to it outside the windows is known to this share.
-KNOWN = 0.3
-# Before it slides, friction is elastic, and no step at all: of a peak this share may look like lost motion.
-WOUND = 0.02
+KNOWN = 0.1
+# Before it slides, friction is elastic, and no step at all: of a peak this share may look like lost motion. Between the
+# reversals it changes with the speed: of the largest peak this share may look like any term.
+WOUND, SPEED_SHARE = 0.02, 0.005
 # Time in which a control that nobody knows lets a peak of friction fall to 1/e, or sooner [s].
 SETTLES = 0.05
 MAX_WINDOW_PASSES = 6
@@ -81,7 +86,7 @@ class Fit:
 
     Attributes:
         names: of the terms, as ``columns`` gives them. values: (K,) [m]; covariance: (K, K) [m2].
-        quantile: of Student's distribution, for intervals of 95 %.
+        quantile: of Student's distribution of ``free`` degrees of freedom, for intervals of 95 %.
         angle: of every path, undistorted (N,) [rad]; residual: (N,) [m]; reversal: within the window of which one a
             sample is, 0 to 3 from the half axis + of the first axis on, -1 in none (N,); since: the angle that the
             motion has turned since that reversal (N,) [rad].
@@ -114,6 +119,7 @@ class Fit:
     unsure: float = 0.0
     offset: Offset | None = None
     tails: tuple[Array, ...] = ()
+    free: int = 2
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
@@ -135,7 +141,10 @@ class Fit:
         along = part / length if length > 0 else np.full(len(rows), 1 / math.sqrt(len(rows)))
         own = self.quantile * math.sqrt(max(float(along @ self.covariance[np.ix_(rows, rows)] @ along), 0.0))
         besides = self.hidden if "squareness" in names else self.wound.get(names[0], 0.0)
-        return math.hypot(own, self.unsure, besides)
+        half = math.hypot(own, self.unsure, besides)
+        # Noise alone makes an amplitude: it is one if both parts together differ from zero.
+        zero = len(rows) == 2 and length < pair_quantile(self.free) * half / self.quantile
+        return max(half, length) if zero else half
 
     @property
     def hidden(self) -> float:
@@ -199,14 +208,16 @@ def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape)
     """Without errors that hardly repeat between two windows, unless they make all of it much clearer.
 
     Where they do not, friction's response may look like them, or they like other terms: what they would move these is
-    part of the intervals.
+    part of the intervals. Of fewer than PITCHES they are no terms, but are kept out of the others.
     """
     shaped = _shaped(circle, paths, shape)
-    if not any(enough_pitches(circle, axis) for axis in shaped.left_out):
+    if not any(enough_pitches(circle, axis, FEWEST_PITCHES) for axis in shaped.left_out):
         return shaped
     other = _shaped(circle, paths, shape._replace(pitches=True))
     if other.noise < CLEARER * shaped.noise:
         return other
+    if not any(enough_pitches(circle, axis) for axis in shaped.left_out):
+        return shaped
     moved = MODEL_DIFFERENCE_FACTOR * np.array([shaped[name] - other[name] for name in shaped.names])
     return replace(shaped, covariance=shaped.covariance + np.outer(moved, moved))
 
@@ -233,6 +244,13 @@ def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape
     return result
 
 
+def separating_radius(circle: CircleUnderTest, axes: Sequence[str]) -> float:
+    """The smallest radius from which on errors that repeat with the pitches of ``axes`` are separated [m]."""
+    pitch = max(circle.pitch[axis] for axis in axes)
+    free = math.pi / 2 - math.radians(ANGLES_BEHIND[0] + ANGLE_AHEAD)
+    return max(PITCHES / 2, REPEATS / free if circle.drag else 0.0) * pitch
+
+
 def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape: Shape) -> Fit:
     window = out.behind
     both = len({path.sense for path in paths}) == 2
@@ -241,7 +259,13 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     free = math.inf
     if circle.drag and not shape.pitches:
         free = circle.radius * (math.pi / 2 - window - math.radians(ANGLE_AHEAD))
-    circle = replace(circle, pitch={axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free})
+    least = FEWEST_PITCHES if shape.pitches else PITCHES
+    circle = replace(
+        circle,
+        pitch={
+            axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free and enough_pitches(circle, axis, least)
+        },
+    )
     values: dict[str, float] = {"angle": shape.angle} | ({PLAYED: 1.0} if shape.play else {})
     moves = centre_moves(paths) if circle.recorded else [{} for _ in paths]
     ends = np.cumsum([len(path.angle) for path in paths])[:-1]
@@ -273,7 +297,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
             break
     tail = tails.columns @ robust.values[len(names) :]
     rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
-    covariance, quantile = covariance_of(
+    covariance, free = covariance_of(
         fitted,
         (residual - tail)[kept],
         robust,
@@ -285,7 +309,8 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         names=names,
         values=np.array([values[name] for name in names]),
         covariance=covariance[: len(names), : len(names)],
-        quantile=quantile,
+        quantile=student(free),
+        free=free,
         angle=tuple(entry.angle for entry in undone),
         residual=tuple(np.split(residual, ends)),
         reversal=tuple(which for which, _ in windows),
@@ -309,7 +334,8 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
 def _unsure(circle: CircleUnderTest, tail: Array, peaks: Array, window: float) -> float:
     """What a term may be off by, as nobody knows how a peak dies away [m]. tail, peaks: behind the windows, in them."""
     if len(circle.drag) == 2:
-        return KNOWN * float(np.abs(tail).max(initial=0.0))
+        largest = float(np.abs(peaks).max(initial=0.0))
+        return math.hypot(KNOWN * float(np.abs(tail).max(initial=0.0)), SPEED_SHARE * largest)
     if not circle.recorded:
         return 0.0
     passed = window * circle.radius / circle.speed

@@ -24,6 +24,9 @@ DECAYS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 
 FALLEN = 2.0  # angle of the means [deg] that say where a peak has fallen to half its height
 # Of known responses: the angle in which friction turns round [deg]; points of a turn.
 TURNS, PERIOD = 10.0, 2048
+# Friction rises with the logarithm of 1 + v/RISE_SPEED [m/s] of the slide, by this share of its size at rest for every
+# factor of e, or less: usual values of v_log at a slide are 5 to 15 mm/s, of F_log/F_C 0.1 to 0.3.
+RISE_SPEED, RISE_SPREAD = 0.012, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +112,8 @@ def known_tails(
 
     A torque that is -F sgn(v) moves the axis by F 4/pi sum over odd k of Im(T_k exp(i k theta))/k, theta its own angle
     from the half axis + on, T_k its response. The columns are 1 m at their largest; friction is as large as the
-    windows' peaks, or less, and turns round within TURNS: so do the first two slopes of the response.
+    windows' peaks, or less, and turns round within TURNS: so do the first two slopes of the response. Between reversals
+    it rises with the speed, by sgn(v) ln(1 + |v|/RISE_SPEED): the fourth column.
     """
     columns, spread = [], []
     for i, axis in enumerate(circle.axes):
@@ -121,8 +125,14 @@ def known_tails(
         theta = np.linspace(0, 2 * math.pi, PERIOD, endpoint=False)
         largest = float(np.abs(_of_harmonics(k, waves)).max())
         within = math.radians(TURNS)
-        for order, size in enumerate((TAIL, within, within**2)):
-            own = _of_harmonics(k, (1j * k) ** order * waves) / largest
+        # sgn v ln(1 + |v|/RISE_SPEED), as a multiple of the harmonics 4/(pi k) of sgn v.
+        way = np.sin(theta)
+        course = np.fft.rfft(np.sign(way) * np.log1p(circle.speed / RISE_SPEED * np.abs(way)))
+        rising = -math.pi / (2 * PERIOD) * course.imag[k]
+        shapes = [(TAIL, waves), (within, 1j * k * waves), (within**2, -(k**2) * waves)]
+        shapes.append((RISE_SPREAD, rising * circle.drag[axis]))
+        for size, shape in shapes:
+            own = _of_harmonics(k, shape) / largest
             parts = []
             for value, path in zip(undone, paths, strict=True):
                 passed = path.sense * (value.angle - value.turned[i]) % (2 * math.pi)

@@ -11,7 +11,7 @@ function diagnosed(trace, turns, known) {
     if (angle.length < LEAST_SAMPLES) return null;
     paths.push({ angle, deviation, sense: each.sense, phase: time.map(t => (t - time[0]) * (2 * Math.PI / (each.end - each.begin))) });
   }
-  return diagnose({ axes: turn.axes, radius: turn.radius, speed: 2 * Math.PI * turn.radius / (turn.end - turn.begin), pitch: known.pitch, gain: known.gain || {}, drag: known.drag || {} }, paths, known.students);
+  return diagnose({ axes: turn.axes, radius: turn.radius, speed: 2 * Math.PI * turn.radius / (turn.end - turn.begin), pitch: known.pitch, gain: known.gain || {}, drag: known.drag || {}, following: known.following || {} }, paths, known.students);
 }
 
 function diagnose(circle, whole, students) {
@@ -59,7 +59,7 @@ function curves_of(found, paths, circle) {
     if (made.servo) named["servo "] = made.servo;
     circle.axes.forEach((axis, i) => {
       named[`lost_motion ${axis}`] = made[`lost_${i}`];
-      if (made[`pitch_${i}_cos`]) named[`pitch ${axis}`] = sum(made[`pitch_${i}_cos`], made[`pitch_${i}_sin`]);
+      if (made[`pitch_${i}_cos`] && !found.left_out.includes(axis)) named[`pitch ${axis}`] = sum(made[`pitch_${i}_cos`], made[`pitch_${i}_sin`]);
       named[`peaks ${axis}`] = found.residual[p].map((each, k) => found.reversal[p][k] >= 0 && found.reversal[p][k] % 2 === i ? each : 0);
     });
     for (const name in named) (curves[name] ||= []).push(named[name]);

@@ -2,22 +2,23 @@
 // which both axes' positions are known. What is fitted, and why, stands there; a test holds both to the same digits.
 const RADIANS = Math.PI / 180;
 const MODEL = {
-  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, REPEATS: 2,
-  KNOWN: 0.3, WOUND: 0.02, CLEARER: 0.5, DIFFERENCE: 1.5, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
+  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, FEWEST: 0.5, POINTS: 1024, REPEATS: 2,
+  KNOWN: 0.1, WOUND: 0.02, SPEED_SHARE: 0.005, RISE_SPEED: 0.012, RISE_SPREAD: 0.5, CURVATURE: 0.5, CLEARER: 0.5, DIFFERENCE: 1.5, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
   MOST: 8000, BIWEIGHT: 4.685, SETTLED: 1e-13, UNUSUAL: 0.6745,
 };
 
 const sign_of = value => value > 0 ? 1 : value < 0 ? -1 : 0;
 const concatenated = parts => { const found = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0)); let at = 0; for (const part of parts) { found.set(part, at); at += part.length; } return found; };
 const split_like = (values, parts) => { let at = 0; return parts.map(part => values.slice(at, at += part.length)); };
-const enough_pitches = (circle, axis) => axis in circle.pitch && 2 * circle.radius >= MODEL.PITCHES * circle.pitch[axis];
+const enough_pitches = (circle, axis, pitches = MODEL.PITCHES) => axis in circle.pitch && 2 * circle.radius >= pitches * circle.pitch[axis];
 
-// circle: {axes, radius, speed, pitch, gain, drag}; paths: {angle, deviation, sense, phase}.
+// circle: {axes, radius, speed, pitch, gain, drag, following, response}; paths: {angle, deviation, sense, phase}.
 function fit_circle(circle, paths, students) {
   const found = fit_lost(circle, paths, students, false);
-  if (!found.left_out.some(axis => enough_pitches(circle, axis))) return found;
+  if (!found.left_out.some(axis => enough_pitches(circle, axis, MODEL.FEWEST))) return found;
   const other = fit_lost(circle, paths, students, true);
   if (other.noise < MODEL.CLEARER * found.noise) return other;
+  if (!found.left_out.some(axis => enough_pitches(circle, axis))) return found;
   const moved = found.names.map(name => MODEL.DIFFERENCE * (found.of(name) - other.of(name)));
   return { ...found, covariance: found.covariance.map((row, i) => row.map((each, j) => each + moved[i] * moved[j])) };
 }
@@ -43,7 +44,7 @@ function fit_calm(circle, paths, students, play, pitches) {
 
 function fit_windowed(whole, paths, window, students, play, pitches) {
   const known = whole.axes.every(axis => axis in whole.drag), asked = whole.axes.filter(axis => axis in whole.pitch), free = known && !pitches ? whole.radius * (Math.PI / 2 - window - MODEL.AHEAD * RADIANS) : Infinity;
-  const circle = { ...whole, pitch: Object.fromEntries(Object.entries(whole.pitch).filter(([, pitch]) => MODEL.REPEATS * pitch <= free)) };
+  const circle = { ...whole, pitch: Object.fromEntries(Object.entries(whole.pitch).filter(([axis, pitch]) => MODEL.REPEATS * pitch <= free && enough_pitches(whole, axis, pitches ? MODEL.FEWEST : MODEL.PITCHES))) };
   const both = new Set(paths.map(path => path.sense)).size === 2, count = paths.reduce((sum, path) => sum + path.angle.length, 0);
   let values = play ? { play: 1 } : {}, tails = { columns: [], spread: [] }, residual = null, undone, parts, windows, names, matrix, robust, kept, blocks;
   for (let number = 0; number < MODEL.PASSES; number++) {
@@ -70,13 +71,13 @@ function fit_windowed(whole, paths, window, students, play, pitches) {
   }
   const tail = combined(tails.columns, robust.values.slice(names.length), count);
   // Positions of a run are not rounded: what rounding of a record adds is no part of it here.
-  const { covariance, quantile: student } = covariance_of(kept, Float64Array.from(robust.rows, k => residual[k] - tail[k]), robust, tails.spread, blocks, students);
+  const { covariance, free: freedom } = covariance_of(kept, Float64Array.from(robust.rows, k => residual[k] - tail[k]), robust, tails.spread, blocks);
   const reversal = concatenated(windows.map(each => each.which)), peak = i => residual.reduce((most, each, k) => reversal[k] >= 0 && reversal[k] % 2 === i ? Math.max(most, Math.abs(each)) : most, 0);
   const wound = known ? { lost_0: MODEL.WOUND * peak(0), lost_1: MODEL.WOUND * peak(1) } : {};
   return {
-    wound, names, values: names.map(name => values[name]), covariance, student, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
+    wound, names, values: names.map(name => values[name]), covariance, freedom, student: student(freedom, students), tails: tails.columns, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
     reversal: windows.map(each => each.which), since: windows.map(each => each.since), tail: split_like(tail, paths.map(path => path.angle)), columns: parts,
-    left_out: asked.filter(axis => !enough_pitches(circle, axis)), unsure: known ? MODEL.KNOWN * largest([0, ...Array.from(robust.rows, k => Math.abs(tail[k]))]) : 0, of: name => names.includes(name) ? values[name] : 0,
+    left_out: asked.filter(axis => !enough_pitches(circle, axis)), unsure: known ? Math.hypot(MODEL.KNOWN * largest([0, ...Array.from(robust.rows, k => Math.abs(tail[k]))]), MODEL.SPEED_SHARE * Math.max(peak(0), peak(1))) : 0, of: name => names.includes(name) ? values[name] : 0,
   };
 }
 
@@ -88,7 +89,8 @@ function half_of(found, ...names) {
   const along = length > 0 ? part.map(each => each / length) : rows.map(() => 1 / Math.sqrt(rows.length));
   let sum = 0;
   rows.forEach((i, a) => rows.forEach((j, b) => { sum += along[a] * found.covariance[i][j] * along[b]; }));
-  return Math.hypot(found.student * Math.sqrt(Math.max(sum, 0)), found.unsure, found.wound[names[0]] || 0);
+  const half = Math.hypot(found.student * Math.sqrt(Math.max(sum, 0)), found.unsure, found.wound[names[0]] || 0);
+  return rows.length === 2 && length < pair_quantile(found.freedom) * half / found.student ? Math.max(half, length) : half;
 }
 
 // Standard deviation of the model's own deviation where it is known least well, behind the reversals.
@@ -134,12 +136,43 @@ function displacements(circle, angle, positions, sense, turned, values) {
     found[`lost_${i}`] = [i, angle.map(each => sense * sign_of(Math.sin(each - turned[i])) * part(each))];
   }
   circle.axes.forEach((axis, i) => {
-    if (!enough_pitches(circle, axis)) return;
-    const rate = 2 * Math.PI / circle.pitch[axis];
-    found[`pitch_${i}_cos`] = [i, positions[i].map(each => Math.cos(rate * each))];
-    found[`pitch_${i}_sin`] = [i, positions[i].map(each => Math.sin(rate * each))];
+    if (!(axis in circle.pitch)) return;
+    const [cos, sin] = followed(circle, i, angle, positions[i], sense);
+    found[`pitch_${i}_cos`] = [i, cos];
+    found[`pitch_${i}_sin`] = [i, sin];
   });
   return found;
+}
+
+// What an axis does of errors of its measured position that repeat with the pitch, as far as its loops follow them.
+function followed(circle, i, angle, positions, sense) {
+  const axis = circle.axes[i], rate = 2 * Math.PI / circle.pitch[axis], following = circle.following[axis], n = MODEL.POINTS, step = 2 * Math.PI / n;
+  if (!following) return [Math.cos, Math.sin].map(wave => positions.map(each => wave(rate * each)));
+  const way = Float64Array.from({ length: n }, (_, k) => rate * circle.radius * (i ? Math.sin : Math.cos)(k * step));
+  return [Math.cos, Math.sin].map((wave, part) => {
+    const course = responded(way.map(wave), following, true), back = part && i ? sense : 1;
+    return angle.map(each => back * at_angle(course, sense * each));
+  });
+}
+
+// A course over a turn through a response at the multiples of its rate; its mean is kept, or nothing of it.
+function responded(course, response, level) {
+  const n = course.length, re = Float64Array.from(course), im = new Float64Array(n);
+  transform(re, im, 1);
+  if (!level) re[0] = im[0] = 0;
+  for (let k = 1; k < n; k++) {
+    const [a, b] = response[Math.min(k, n - k) - 1] || NONE, c = 2 * k < n ? b : -b, u = re[k], v = im[k];
+    re[k] = 2 * k === n ? 0 : u * a - v * c;
+    im[k] = 2 * k === n ? 0 : u * c + v * a;
+  }
+  transform(re, im, -1);
+  return re.map(each => each / n);
+}
+
+// A course over a turn at an angle, linear between its points.
+function at_angle(course, angle) {
+  const n = course.length, at = modulo(angle, 2 * Math.PI) / (2 * Math.PI / n), low = Math.floor(at), part = at - low;
+  return course[low % n] * (1 - part) + course[(low + 1) % n] * part;
 }
 
 function columns_of(circle, undone, sense, both, values) {
@@ -216,13 +249,16 @@ function tails_of(undone, paths, left, window, count) {
   return { columns, spread };
 }
 
-// Where the loops' response is known: of each axis the periodic response to its friction, and its first two slopes.
+// Where the loops' response is known: of each axis the periodic response to its friction, its first two slopes, and that to
+// friction that rises with the speed.
 function known_tails(circle, undone, paths, residual, which) {
   const columns = [], spread = [], step = 2 * Math.PI / MODEL.PERIOD, within = MODEL.TURNS * RADIANS;
   circle.axes.forEach((axis, i) => {
     const peak = largest([0, ...residual.filter((_, k) => which[k] >= 0 && which[k] % 2 === i).map(Math.abs)]);
     if (peak < MODEL.TAIL_FLOOR) return;
-    const courses = [0, 1, 2].map(() => new Float64Array(MODEL.PERIOD));
+    const courses = [0, 1, 2, 3].map(() => new Float64Array(MODEL.PERIOD)), rising = new Float64Array(MODEL.PERIOD), none = new Float64Array(MODEL.PERIOD);
+    for (let n = 0; n < MODEL.PERIOD; n++) { const v = Math.sin(step * n); rising[n] = sign_of(v) * Math.log1p(circle.speed / MODEL.RISE_SPEED * Math.abs(v)); }
+    transform(rising, none, 1);
     circle.drag[axis].forEach(([re, im], at) => {
       const k = 2 * at + 1;
       for (let n = 0; n < MODEL.PERIOD; n++) {
@@ -230,14 +266,12 @@ function known_tails(circle, undone, paths, residual, which) {
         courses[0][n] += across;
         courses[1][n] += k * along;
         courses[2][n] -= k * k * across;
+        courses[3][n] -= Math.PI / (2 * MODEL.PERIOD) * none[k] * k * across;
       }
     });
     const whole = largest(courses[0].map(Math.abs)), wave = [Math.cos, Math.sin][i];
-    [MODEL.TAIL, within, within ** 2].forEach((size, order) => {
-      columns.push(concatenated(undone.map((each, p) => each.angle.map(angle => {
-        const at = modulo(paths[p].sense * (angle - each.turned[i]), 2 * Math.PI) / step, low = Math.floor(at), part = at - low, own = courses[order];
-        return wave(angle) * (own[low % MODEL.PERIOD] * (1 - part) + own[(low + 1) % MODEL.PERIOD] * part) / whole;
-      }))));
+    [MODEL.TAIL, within, within ** 2, MODEL.RISE_SPREAD].forEach((size, order) => {
+      columns.push(concatenated(undone.map((each, p) => each.angle.map(angle => wave(angle) * at_angle(courses[order], paths[p].sense * (angle - each.turned[i])) / whole))));
       spread.push(size * peak);
     });
   });
@@ -289,15 +323,27 @@ function robust_fit(columns, deviation, spread, blocks) {
   return { values, weights, slopes, noise, shared };
 }
 
-// Covariance of the free values, and Student's quantile for intervals of 95 %.
-function covariance_of(columns, residual, robust, spread, blocks, students) {
+// Every direction of the second derivatives at least CURVATURE of the weighted normal matrix.
+function bounded(curved, weighted) {
+  const { values, vectors } = eigen(weighted), most = largest(values), usable = rows_where(values, each => each > 1e-14 * most), scaled_by = power => vectors.map(row => Float64Array.from(usable, k => row[k] * values[k] ** power));
+  const inverse = scaled_by(-0.5), shares = eigen(product(product(transposed(inverse), curved), inverse));
+  if (least(shares.values) >= MODEL.CURVATURE) return curved;
+  const along = product(scaled_by(0.5), shares.vectors);
+  return product(along.map(row => row.map((each, k) => each * Math.max(shares.values[k], MODEL.CURVATURE))), transposed(along));
+}
+
+// Covariance of the free values, and its degrees of freedom.
+function covariance_of(columns, residual, robust, spread, blocks) {
   const terms = columns.length, own = terms - spread.length, known = with_known(Array.from({ length: terms }, () => new Float64Array(terms)), spread, robust.shared ** 2);
-  const inverse = pseudo_inverse(with_known(normal_matrix(columns, robust.slopes), spread, robust.shared ** 2), 1e-15), influence = residual.map((each, k) => robust.weights[k] * each);
+  const prior = weights => with_known(normal_matrix(columns, weights), spread, robust.shared ** 2), inverse = pseudo_inverse(bounded(prior(robust.slopes), prior(robust.weights)), 1e-15), influence = residual.map((each, k) => robust.weights[k] * each);
   const sums = columns.map(column => by_block(blocks, column.map((each, k) => influence[k] * each)).sums), count = sums[0].length, free = Math.max(count - own, 2);
   const around = inner => product(product(inverse, inner), inverse), single = around(normal_matrix(columns, influence.map(each => each ** 2))), blockwise = around(normal_matrix(sums)), besides = around(known);
   const part = count / free, scale = single.map((row, i) => Math.sqrt(Math.max(row[i] / Math.max(blockwise[i][i] * part, 1e-300), 1)));
-  return { covariance: blockwise.map((row, i) => row.map((each, j) => scale[i] * each * part * scale[j] + robust.shared ** 2 * besides[i][j])), quantile: student(free, students) };
+  return { covariance: blockwise.map((row, i) => row.map((each, j) => scale[i] * each * part * scale[j] + robust.shared ** 2 * besides[i][j])), free };
 }
+
+// Radius, in standard deviations, of the circle that holds 95 % of two values.
+const pair_quantile = free => Math.sqrt(free * Math.expm1(Math.log(20) * 2 / free));
 
 // Quantile 0.975 of Student's distribution; of few degrees of freedom from a table that the page carries (from 2 on).
 function student(free, students) {

@@ -232,6 +232,12 @@ class LinearSystem {
     return this.answering(loops, own, this.drives.map((drive, i) => i === own ? plus(scaled(drive.gain, drive.setpoint_delay(s)), mul(scaled(1 / this.machine.I_P[axis], s), drive.feedforward(s))) : NONE));
   }
 
+  // How an axis follows an error of its measured position, -x_a over it; of a motor encoder the speed errs, too.
+  following(axis, loops) {
+    const own = this.axes.indexOf(axis), drive = this.drives[own], { s } = loops, position = this.answering(loops, own, this.drives.map((_, i) => i === own ? [drive.gain, 0] : NONE));
+    return drive.indirect ? plus(position, mul(this.drag(axis, loops), mul(drive.from_speed(s), scaled(1 / this.machine.I_P[axis], s)))) : position;
+  }
+
   // x_a over M_add, a torque at the motor but for the current loop [m/(N.m)].
   drag(axis, loops) {
     const own = this.axes.indexOf(axis), { pushed } = loops;

@@ -16,6 +16,8 @@ function applied(data, state) {
 
 // Of the loops' response to friction: frequencies up to this [Hz], and up to this multiple of the circle's.
 const DRAG = { HIGHEST: 200, MOST: 401 };
+// Harmonics of errors that repeat with the pitch, beyond z of cos(z cos t), in cube roots of z.
+const PITCH_HARMONICS = 4;
 
 class Work {
   constructor(data, module, files, given) {
@@ -57,15 +59,17 @@ class Work {
 
   // Why the circles of a run are not round.
   causes(state, { trace, tasks, figures }) {
-    const { machine } = this.data, system = this.linear(state), gain = {}, drag = {}, circle = tasks.find(each => each.kind === "circle");
+    const { machine } = this.data, system = this.linear(state), gain = {}, drag = {}, following = {}, circle = tasks.find(each => each.kind === "circle");
     if (!circle) return {};
     const first = 1 / (circle.turn.end - circle.turn.begin), highest = Math.max(2, Math.min(DRAG.HIGHEST / first, 0.4 / machine.cycles.T_c / first, DRAG.MOST));
-    const loops = Array.from({ length: Math.ceil((highest - 1) / 2) }, (_, k) => system.position_loops((2 * k + 1) * first));
+    const kept = [], at = k => kept[k] ||= system.position_loops(k * first), loops = Array.from({ length: Math.ceil((highest - 1) / 2) }, (_, k) => at(2 * k + 1));
     for (const axis of circle.axes) {
       gain[axis] = system.position_reference(axis, loops[0]);
       drag[axis] = loops.map(each => system.drag(axis, each));
+      const waves = circle.turn.radius / machine.I_P[axis], count = Math.max(1, Math.floor(Math.min(waves + PITCH_HARMONICS * (1 + Math.cbrt(waves)), 0.4 / machine.cycles.T_c / first, 500)));
+      following[axis] = Array.from({ length: count }, (_, k) => system.following(axis, at(k + 1)));
     }
-    return causes_of(trace, tasks, figures, { pitch: Object.fromEntries(machine.axes.map(axis => [axis, 2 * Math.PI * machine.I_P[axis]])), gain, drag, students: machine.students });
+    return causes_of(trace, tasks, figures, { pitch: Object.fromEntries(machine.axes.map(axis => [axis, 2 * Math.PI * machine.I_P[axis]])), gain, drag, following, students: machine.students });
   }
 
   // All that a run warns of; null where the newest knob has ended it.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, swinging
+from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, separating_radius, swinging
 from feedsim.analysis.circle_figures import FIGURE_UNITS
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.content import Section, Table
@@ -32,7 +32,10 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     )
     if diagnosis.left_out:
         axes = " and ".join(diagnosis.left_out)
-        note += f"\nA larger circle separates errors that repeat with the pitch of {axes}; this one is too small."
+        note += (
+            f"\nA circle of {1e3 * separating_radius(diagnosis.circle, diagnosis.left_out):.3g} mm or more separates "
+            f"errors that repeat with the pitch of {axes}; this one is too small."
+        )
     if words := swinging(diagnosis):
         note += f"\n{typeset(words)}"
     note += "".join(f"\n{typeset(words)}" for words in further(diagnosis))

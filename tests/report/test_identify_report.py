@@ -19,7 +19,7 @@ from feedsim.identify.friction_file import open_loop_line
 from feedsim.identify.result import Balance, Correlation, Identification
 from feedsim.jobs.identify import IdentifyResult
 from feedsim.report.chart import Grid
-from feedsim.report.identify import check_writable, headline, rigid_line, table_lines, terminal_warnings
+from feedsim.report.identify import headline, rigid_line, table_lines, terminal_warnings
 from feedsim.report.identify.plots import (
     _length,
     correlation_picture,
@@ -261,8 +261,8 @@ def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
 def test_place_is_checked_ahead(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="is a file"):
-        check_writable(tmp_path / "file")
-    check_writable(tmp_path / "new")
+        IdentifyResult.check_place(tmp_path / "file")
+    IdentifyResult.check_place(tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 

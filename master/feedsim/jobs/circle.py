@@ -67,10 +67,6 @@ class CircleResult(Result):
         """Content of summary.json."""
         return page.summary(self.recorded, self.diagnosis, self.figures, self.records, names)
 
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
-
 
 def circle(
     records: File | Sequence[File],
@@ -129,7 +125,7 @@ def circle(
         )
     r = None if radius is None else quantity("radius", radius, "m", "150 mm", positive=True)
     v = None if feed is None else quantity("feed", feed, "m/s", "1000 mm/min", positive=True)
-    with kept(out, page.check_writable, watch, files, force=force):
+    with kept(out, CircleResult.check_place, watch, files, force=force):
         recorded = read_circle(
             files,
             (plane[0], plane[1]),

@@ -26,7 +26,7 @@ from feedsim.jobs.result import Result
 from feedsim.outputs import forced, replacing
 from feedsim.report.compare import report as page
 from feedsim.report.content import Report
-from feedsim.report.results import Content, check_place
+from feedsim.report.results import Content
 from feedsim.trace import Series, Trace, as_series, read_series
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ class CompareResult(Result):
     durations: Sequence[float] = ()
 
     kind = "compare"
+    may_write = (JSON, XML)
 
     @property
     def verdict(self) -> Verdict:
@@ -123,10 +124,6 @@ class CompareResult(Result):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return {"verdict": self.verdict, "answer": list(self.answers), "files": list(names)}
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        check_place(folder, (JSON, XML, "report.html", "summary.json"), inputs, kind=self.kind)
 
     @property
     def inputs(self) -> Sequence[Path]:

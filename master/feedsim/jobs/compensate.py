@@ -49,6 +49,7 @@ class CompensateResult(Result):
     uncertainty: Uncertainty | None = None
 
     kind = "compensate"
+    may_write = page.FILES
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -113,10 +114,6 @@ class CompensateResult(Result):
             "uncertain": intervals.summary_part(self.uncertainty, self.figures)
         }  # fmt: skip
 
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
-
 
 def compensate(
     scenario: File,
@@ -173,7 +170,7 @@ def compensate(
     _check_lags(plan, [axis for axis in moving_axes(program) if axis not in delays])
     known, cloud = _open_of(plan, sets, uncertain)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, page.check_writable, watch, [*input_paths(plan), *files.values()], changes, force=force):
+    with kept(out, CompensateResult.check_place, watch, [*input_paths(plan), *files.values()], changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
         done = compensation.compensate(
             plan, program, frictions=sets, delays=delays, table=table,

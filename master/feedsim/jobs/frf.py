@@ -52,6 +52,7 @@ class FrfResult(Result, Mapping[str, Complexes]):
     responses: Responses
 
     kind = "frf"
+    may_write = page.FILES
 
     @property
     def response(self) -> FrequencyResponse:
@@ -118,10 +119,6 @@ class FrfResult(Result, Mapping[str, Complexes]):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.subject, self.responses, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
 
 
 def frf(
@@ -206,7 +203,7 @@ def frf(
     overlays, warnings = _overlays(overlay, wanted)
     warnings += doubts
     inputs = [*(file for _, file in loaded.files), *(overlay.file for overlay in overlays)]
-    with kept(out, page.check_writable, watch, inputs, texts, force=force):
+    with kept(out, FrfResult.check_place, watch, inputs, texts, force=force):
         watch.progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
         linear_result = linear.evaluate(system, chosen)

@@ -43,6 +43,7 @@ class IdentifyResult(Result):
     inputs_read: Sequence[Path] = ()
 
     kind = "identify"
+    may_write = page.FILES
 
     @property
     def found(self) -> Identification:
@@ -98,10 +99,6 @@ class IdentifyResult(Result):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.identified, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
 
     def __repr__(self) -> str:
         return repr(self.found)
@@ -177,7 +174,7 @@ def identify(
     inputs += [file for _, file in subject.files] if subject is not None else []
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
     asked_for = [f"{name}={value}" for name, value in settings.items()]
-    with kept(folder, page.check_writable, watch, inputs, asked_for, force=force):
+    with kept(folder, IdentifyResult.check_place, watch, inputs, asked_for, force=force):
         for sentence in cosim.executing(archives / f"{unit}.fmu", "friction law") if archives is not None else ():
             watch.announce(sentence)
         with FrictionLaw(archives, unit) as friction:

@@ -33,6 +33,7 @@ class ModesResult(Result):
     identified: page.ModesReport
 
     kind = page.KIND
+    may_write = page.FILES
 
     @property
     def axis(self) -> AxisModes:
@@ -80,10 +81,6 @@ class ModesResult(Result):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.identified, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
 
 
 def identify_modes(
@@ -153,7 +150,7 @@ def identify_modes(
     given = {name: str(value) for name, value in asked.items() if value is not None}
     inputs = [path, *(file for _, file in subject.files)]
     named = [f"{name}={text}" for name, text in given.items()]
-    with kept(out, page.check_writable, watch, inputs, [*texts, *named], force=force):
+    with kept(out, ModesResult.check_place, watch, inputs, [*texts, *named], force=force):
         watch.progress("reading", 0, 2)
         if input is not None:
             step = quantity("interval", interval, "s", "0.4 ms") if interval else None

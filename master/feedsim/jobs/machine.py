@@ -132,10 +132,6 @@ class MachineResult(Result):
         """Content of summary.json."""
         return self.record() | {"files": list(names)}
 
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        check_place(folder, ("report.html", "summary.json"), inputs, kind=self.kind)
-
     def save(
         self, folder: str | Path, *, figures: Sequence[str] = PICTURE_FORMATS, force: bool = False, control: str = ""
     ) -> tuple[Path, ...]:
@@ -167,9 +163,10 @@ class BuildResult(MachineResult):
         """The table of modes, and the record of its origin."""
         return {TABLE_FILE: lambda path: write_modes(path, self.info.modes), BUILD_FILE: to_json(self.record())}
 
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        check_place(folder, (TABLE_FILE, BUILD_FILE), inputs, kind=self.kind, own=_of_build(folder))
+    @classmethod
+    def check_place(cls, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """As :meth:`Result.check_place`."""
+        check_place(folder, (TABLE_FILE, BUILD_FILE), inputs, kind=cls.kind, own=_of_build(folder))
 
     def save(
         self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
@@ -256,10 +253,7 @@ def machine_build(
             f"{machine}: has no key structure; modes are computed from a structure file (docs/structure.md)"
         )
 
-    def check(folder: Path, inputs: Sequence[Path]) -> None:
-        check_place(folder, (TABLE_FILE, BUILD_FILE), inputs, kind=BuildResult.kind, own=_of_build(folder))
-
-    with kept(out, check, watch, [file for _, file in described.files], force=force):
+    with kept(out, BuildResult.check_place, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at or {}, cutoff, static_correction, None, watch, fresh=True)
         result = BuildResult(info, described)
         if out is not None:
@@ -310,10 +304,7 @@ def machine_show(
             "file (key structure, docs/structure.md)"
         )
 
-    def check(folder: Path, inputs: Sequence[Path]) -> None:
-        check_place(folder, ("report.html", "summary.json"), inputs, kind=MachineResult.kind)
-
-    with kept(out, check, watch, [file for _, file in described.files], force=force):
+    with kept(out, MachineResult.check_place, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at or {}, cutoff, static_correction, step, watch)
         chosen = list(dict.fromkeys(_mode(entry, info.modes) for entry in mode))
         result = MachineResult(info, described, chosen, factor, animate)

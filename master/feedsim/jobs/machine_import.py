@@ -40,6 +40,7 @@ class MachineImportResult(Result):
     inputs_read: Sequence[Path]
 
     kind = page.KIND
+    may_write = page.FILES
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -82,10 +83,6 @@ class MachineImportResult(Result):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.archives, self.reading, self.made, self.inputs_read, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
 
 
 def machine_import(
@@ -147,7 +144,7 @@ def machine_import(
     made = imported(reading, base, name or paths[0].stem)
     result = MachineImportResult(archives, reading, made, inputs_of(paths, base))
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
-    with kept(out, page.check_writable, watch, inputs_of(paths, base), (), force=force):
+    with kept(out, MachineImportResult.check_place, watch, inputs_of(paths, base), (), force=force):
         if out is not None:
             result.save(out, force=force)
     return result

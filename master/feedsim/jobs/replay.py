@@ -38,6 +38,7 @@ class ReplayResult(Result):
     inputs_read: Sequence[Path]
 
     kind = "replay"
+    may_write = page.FILES
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -80,10 +81,6 @@ class ReplayResult(Result):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.replayed, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
 
 
 def replay(
@@ -137,7 +134,7 @@ def replay(
     archives = None if fmus is None else Path(fmus)
     inputs = [*asked.inputs, own.modes]
     asked_for = [*asked.asked_for, *(["open_loop=yes"] if open_loop else [])]
-    with kept(out, page.check_writable, watch, inputs, asked_for, force=force):
+    with kept(out, ReplayResult.check_place, watch, inputs, asked_for, force=force):
         watch.progress("reading", 0, 3)
         records = asked.records
         announce(watch, own, archives)

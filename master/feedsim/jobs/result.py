@@ -16,7 +16,7 @@ from feedsim.outputs import forced, replacing
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.report.picture import Picture
-from feedsim.report.results import Content, write_report
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
@@ -35,6 +35,7 @@ class Result(ABC):
 
     kind: ClassVar[str]  # of the result, as summary.json has it
     own: ClassVar[Sequence[str]] = ()  # names of files that only results of this kind have
+    may_write: ClassVar[Sequence[str]] = ()  # names of files that one may have besides report.html and summary.json
 
     @property
     def keeps(self) -> Sequence[str]:
@@ -69,9 +70,17 @@ class Result(ABC):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json, where all files have the given names."""
 
-    @abstractmethod
+    @classmethod
+    def check_place(cls, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless a result of this kind can be written to `folder`. Leaves nothing behind.
+
+        inputs: files that are read; none of them is lost.
+        """
+        check_place(folder, (*cls.may_write, REPORT, SUMMARY), inputs, kind=cls.kind, own=cls.own)
+
     def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """Raise OutputError unless the result can be written to `folder` and none of `inputs` is lost."""
+        self.check_place(folder, inputs)
 
     @property
     def inputs(self) -> Sequence[Path]:

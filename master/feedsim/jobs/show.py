@@ -97,10 +97,6 @@ class Overlay(Result):
         """Content of summary.json."""
         return page.summary(self._sources, names)
 
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
-
     def __repr__(self) -> str:
         return "\n".join([f"Overlay of {', '.join(self.names)}", *self.lines])
 
@@ -153,7 +149,7 @@ def show(
         given[name] = run_result
     over = Overlay(given)
     if out is not None:
-        with kept(out, page.check_writable, watch, over.inputs, force=force):
+        with kept(out, Overlay.check_place, watch, over.inputs, force=force):
             over.save(out, figures=figures, force=force, control=control)
     return over
 

@@ -120,10 +120,6 @@ class SweepResult(Result):
         """Content of summary.json."""
         return summary(self.account, names, answer=page.answers(self.account))
 
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
-
     def __repr__(self) -> str:
         return repr(self.table)
 
@@ -186,7 +182,7 @@ def sweep(
         resumed = now.resumed
         watch.progress(loaded.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
 
-    with kept(folder, page.check_writable, watch, inputs_of(loaded), texts, force=force):
+    with kept(folder, SweepResult.check_place, watch, inputs_of(loaded), texts, force=force):
         try:
             table = run_study(
                 loaded,

@@ -7,12 +7,11 @@ from pathlib import Path
 
 from feedsim import cosim
 from feedsim.jobs.run import RunResult
-from feedsim.jobs.show import show
+from feedsim.jobs.show import Overlay, show
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.judge import judged
 from feedsim.report import run as report
 from feedsim.report.changes import change_lines
-from feedsim.report.show import report as show_report
 from feedsim.scenario import load
 from feedsim.tune import Proposal, of_run
 
@@ -33,7 +32,7 @@ class Tried:
 def check_writable(directory: Path) -> None:
     """Raise OutputError unless the second run and the overlay can be written beside the folder of the first."""
     report.check_writable(_second(directory))
-    show_report.check_writable(_overlaid(directory))
+    Overlay.check_place(_overlaid(directory))
 
 
 def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: Watch = NO_WATCH) -> Tried:

@@ -35,6 +35,7 @@ class TuneCompensationResult(Result):
     judged: Judged
 
     kind = "tune"
+    may_write = page.FILES
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -72,10 +73,6 @@ class TuneCompensationResult(Result):
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.judged, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, inputs)
 
 
 def tune_compensation(
@@ -141,7 +138,7 @@ def tune_compensation(
         check_count(uncertain)
         cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, page.check_writable, watch, input_paths(plan), changes, force=force):
+    with kept(out, TuneCompensationResult.check_place, watch, input_paths(plan), changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
         judged = tune(
             plan,

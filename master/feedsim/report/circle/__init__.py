@@ -4,6 +4,6 @@ May use the report's core, what the report of a run draws of circles, and the an
 Start with report.py.
 """
 
-from feedsim.report.circle.report import answers, check_writable, figures_of, report_of, summary
+from feedsim.report.circle.report import answers, figures_of, report_of, summary
 
-__all__ = ["answers", "check_writable", "figures_of", "report_of", "summary"]
+__all__ = ["answers", "figures_of", "report_of", "summary"]

@@ -23,7 +23,6 @@ from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.run import circle_plots
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.style import RECORDED, SIMULATED, Array
@@ -41,11 +40,6 @@ class _Centred:
     angle: Array
     deviation: Array
     sense: int
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPORT, SUMMARY), inputs, kind="circle")
 
 
 def answers(diagnosis: Diagnosis) -> list[str]:

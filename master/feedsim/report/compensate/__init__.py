@@ -6,11 +6,11 @@ Start with report.py.
 
 from feedsim.report.compensate.report import (
     FEEDFORWARD,
+    FILES,
     RESULT,
     TABLE,
     UNCOMPENSATED,
     answers,
-    check_writable,
     report_of,
     summary,
     summary_line,
@@ -18,6 +18,6 @@ from feedsim.report.compensate.report import (
 )
 
 __all__ = [
-    "FEEDFORWARD", "RESULT", "TABLE", "UNCOMPENSATED", "answers", "check_writable", "report_of", "summary",
-    "summary_line", "table_csv",
+    "FEEDFORWARD", "FILES", "RESULT", "TABLE", "UNCOMPENSATED", "answers", "report_of", "summary", "summary_line",
+    "table_csv",
 ]  # fmt: skip

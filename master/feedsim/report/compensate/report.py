@@ -15,7 +15,6 @@ from feedsim.report.compensate.plots import pictures_of
 from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import InputFile, axis_parameters, hashed, inputs_part, quantity
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.run.files import summary as summary_of_run
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.sections import figures_footer, figures_section, files_table
@@ -23,18 +22,9 @@ from feedsim.report.style import remarked
 from feedsim.report.uncertainty import BANDS
 
 RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE = "result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv"
+FILES = (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, BANDS)  # besides report.html and summary.json
 
 Row = tuple[str, float, str, Quality]
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
-
-    inputs: files that are read. Leaves nothing behind.
-    """
-    check_place(
-        directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, BANDS, REPORT, SUMMARY), inputs, kind="compensate"
-    )
 
 
 def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:

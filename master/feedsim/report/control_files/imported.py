@@ -18,20 +18,15 @@ from feedsim.report.content import FOLDER, Bullets, Report, Section, Table, Text
 from feedsim.report.control_files.sources import sources_section
 from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import provenance_section
 from feedsim.scenario.imported import Imported, place_of, written
 from feedsim.scenario.machine import Machine
 
 KIND = "machine import"
 SHEET = "sheet.csv"
+FILES = (SHEET, Machine.IN_FOLDER, "modes.csv")  # besides report.html and summary.json
 MOST_ODD = 20  # lines that were not understood are shown as examples
 MOST_NAMED = 3
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPORT, SUMMARY, SHEET, Machine.IN_FOLDER, "modes.csv"), inputs, kind=KIND)
 
 
 def doubtful(reading: Reading, made: Imported) -> list[Refused]:

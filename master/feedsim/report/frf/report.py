@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
@@ -20,12 +19,13 @@ from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.frf.words import answers
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place
+from feedsim.report.results import Content
 from feedsim.report.style import remarked
 from feedsim.scenario import Subject
 from feedsim.trace.response_files import write_response
 
 CURVES, MEASURED = "frf.csv", "frf_measured.csv"
+FILES = (CURVES, MEASURED)  # besides report.html and summary.json
 TILES = {  # figure of an axis -> label
     "speed.bandwidth_first": "speed loop, −3 dB first",
     "speed.bandwidth_last": "speed loop, −3 dB last",
@@ -39,14 +39,6 @@ AS_DECIBEL = ("gain_margin",)
 MEASURED_PARTS = ("magnitude", "phase", "share")
 
 FRF_FORMAT = 1
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
-
-    inputs: files that are read. Leaves nothing behind.
-    """
-    check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs, kind="frf")
 
 
 def files_of(responses: Responses) -> dict[str, Content]:

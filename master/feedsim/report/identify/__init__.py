@@ -4,7 +4,7 @@ May use the report's core and what `feedsim.identify` found.
 Start with report.py.
 """
 
-from feedsim.report.identify.report import check_writable, draw, files_of, report_of
+from feedsim.report.identify.report import FILES, draw, files_of, report_of
 from feedsim.report.identify.summary import (
     headline,
     rigid_line,
@@ -15,6 +15,6 @@ from feedsim.report.identify.summary import (
 )
 
 __all__ = [
-    "check_writable", "draw", "files_of", "headline", "report_of", "rigid_line", "summary", "table_lines",
+    "FILES", "draw", "files_of", "headline", "report_of", "rigid_line", "summary", "table_lines",
     "terminal_lines", "terminal_warnings",
 ]  # fmt: skip

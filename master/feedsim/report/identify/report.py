@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Identified, friction_file
@@ -16,11 +15,12 @@ from feedsim.report.identify.plots import describe, pictures_of
 from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import software
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place
+from feedsim.report.results import Content
 from feedsim.report.sections import provenance_section
 from feedsim.report.style import remarked
 
 PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
+FILES = (FRICTION_FILE, PLATEAUS, RESIDUALS, OPEN_LOOP)  # besides report.html and summary.json
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
 LEADING = ("F_C", "F_S", "sigma_0", "v_s", "F_log", "sigma_2", "sigma_1", "W", "gamma", "M_0", "J", "delay")
 HEADS = ("Parameter", "Meaning", "Value", "Unit", "95 % interval", "±", "At the slide", "Unit", "Remark")
@@ -34,14 +34,6 @@ OPEN_LOOP_METHOD = (
     "Coulomb friction F_C are therefore taken from the position in open loop, F_S moves with F_C. The load may drift "
     "over a record: M_0 is that in the middle of it."
 )
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
-
-    inputs: files that are read. Leaves nothing behind.
-    """
-    check_place(directory, (FRICTION_FILE, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs, kind="identify")
 
 
 def files_of(identified: Identified) -> dict[str, Content]:

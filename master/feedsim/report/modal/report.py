@@ -19,7 +19,7 @@ from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place
+from feedsim.report.results import Content
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
 from feedsim.report.style import OTHERWISE, RECORDED, SIMULATED, Array, remarked
 from feedsim.scenario import Subject
@@ -28,6 +28,7 @@ from feedsim.trace.response import Complexes, FrequencyResponse
 from feedsim.trace.response_files import write_response
 
 MODES_FILE, RESPONSE_FILE = "modes.csv", "response.csv"
+FILES = (MODES_FILE, RESPONSE_FILE)  # besides report.html and summary.json
 KIND = "identify-modes"
 
 
@@ -87,11 +88,6 @@ class ModesReport:
     def warnings(self) -> list[str]:
         """What a user should know."""
         return [*self.found.warnings, *(Note(text) for text in self.found.notes)]
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """OutputError unless the results can be written to a directory without an input being lost."""
-    check_place(directory, (MODES_FILE, RESPONSE_FILE, REPORT, SUMMARY), inputs, kind=KIND)
 
 
 def files_of(report: ModesReport) -> dict[str, Content]:

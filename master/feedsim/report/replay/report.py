@@ -16,7 +16,6 @@ from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.replay.plots import pictures_of
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import figures_footer, figures_section, parameters_section, provenance_section
 from feedsim.report.style import remarked
 from feedsim.scenario import Subject
@@ -24,6 +23,7 @@ from feedsim.trace import Mark, Trace
 from feedsim.tune import Proposal
 
 REPLAY = "replay.csv"
+FILES = (REPLAY,)  # besides report.html and summary.json
 LEADING = {
     "position_rms": "position error, rms", "torque_rms": "torque error, rms",
     "share_of_lag": "position error, share of the lag",
@@ -51,11 +51,6 @@ class Replayed:
     def figures(self) -> dict[str, Figure]:
         """Of all axes."""
         return {name: figure for comparison in self.comparisons for name, figure in comparison.figures.items()}
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPLAY, REPORT, SUMMARY), inputs, kind="replay")
 
 
 def trace_of(comparisons: Sequence[Comparison]) -> Trace:

@@ -19,7 +19,6 @@ from feedsim.report.content import Bullets, Report, Section, Table, Text, Tile, 
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, display_unit, minus, plain_unit, scale, shown, three
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
 
 FORMAT = 1
@@ -39,11 +38,6 @@ LEADING_FIGURES = {
     "B": "largest reversal value B",
 }
 LARGEST_SHARE = 1000.0  # [%] a change beyond is one from next to nothing, of which a share says nothing
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPORT, SUMMARY), inputs, kind="show")
 
 
 def files_of(sources: Sequence[Source]) -> list[Path]:

@@ -5,6 +5,6 @@ Start with report.py.
 """
 
 from feedsim.report.results import discard
-from feedsim.report.sweep.report import check_writable, question, write
+from feedsim.report.sweep.report import question, write
 
-__all__ = ["check_writable", "discard", "question", "write"]
+__all__ = ["discard", "question", "write"]

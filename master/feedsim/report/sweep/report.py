@@ -13,7 +13,7 @@ import numpy as np
 from feedsim.report.content import FOLDER, LEAD_ROWS, Paragraph, Part, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import counted, minus, number, rounded, three, with_interval
 from feedsim.report.picture import Picture
-from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.results import write_report
 from feedsim.report.sections import parameters_section, provenance_section
 from feedsim.report.style import Array, remarked
 from feedsim.report.sweep.account import QUANTILES, SHARE_HEADING, Account, Input, Measure, measures
@@ -63,14 +63,6 @@ RECORDED = {
     "command": "Command", "workers": "Made by", "began": "Began", "ended": "Ended", "machine": "Computer",
     "versions": "Software of the runs", "fingerprint": "Fingerprint",
 }  # fmt: skip
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost.
-
-    inputs: files that are read. Leaves nothing behind.
-    """
-    check_place(directory, (REPORT, SUMMARY), inputs, kind="sweep")
 
 
 def write(

@@ -5,8 +5,8 @@ Start with report.py.
 """
 
 from feedsim.report.tune.report import (
+    FILES,
     answers,
-    check_writable,
     figures_of,
     findings,
     report_of,
@@ -15,4 +15,4 @@ from feedsim.report.tune.report import (
     summary,
 )
 
-__all__ = ["answers", "check_writable", "figures_of", "findings", "report_of", "settings", "sheet", "summary"]
+__all__ = ["FILES", "answers", "figures_of", "findings", "report_of", "settings", "sheet", "summary"]

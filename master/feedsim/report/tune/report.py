@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, BEFORE
 from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
@@ -30,6 +28,7 @@ from feedsim.variables import parameters
 
 DASHES: tuple[Dash, ...] = ("", "dashed", "dotted")  # of axes in one panel
 SETTINGS, SHEET = "settings.yaml", "sheet.csv"
+FILES = (SETTINGS, SHEET)  # besides report.html and summary.json
 CONTROL_OF_KIND = {"pulse": "sinumerik", "pulse_characteristic": "sinumerik", "table": "twincat"}
 WORDS = {
     "pulse": "a constant pulse on the speed setpoint",
@@ -46,11 +45,6 @@ LIMITS_UNKNOWN = (
     "Of the real control the instant of the pulse, its exact shape and the order within a cycle are not public; here "
     "the pulse begins where the axis reverses. Try the values with one circle, and vary the amplitude first"
 )
-
-
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPORT, SUMMARY, SETTINGS, SHEET), inputs, kind="tune")
 
 
 def figures_of(judged: Judged) -> dict[str, Figure]:

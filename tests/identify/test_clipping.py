@@ -11,6 +11,7 @@ import pytest
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import identify
 from feedsim.identify.clipping import without_clipped
+from feedsim.identify.inertia import inertia
 from feedsim.identify.options import Options
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
@@ -136,6 +137,47 @@ def test_a_limit_beside_it_is_recognised(way: float, load: float, limit: float) 
     assert np.count_nonzero(cut & ~found.clipped) <= 0.05 * np.count_nonzero(cut)
     assert np.count_nonzero(found.clipped & (np.abs(true) < 0.8 * limit * np.max(np.abs(true)))) == 0
     assert f"cut off at {'+' if load > 0 else '-'}" in said[0]
+
+
+def drawn(seed: int, limit: float) -> tuple[Record, Record]:
+    """Moves of a rigid axis, drawn by seed: even and smooth accelerations, one or both directions, a load; with 2 % of
+    noise. As recorded up to a share of its largest torque, and whole."""
+    random = np.random.default_rng(seed)
+    inertia_, load = 0.02 * 1.5 ** random.uniform(-1, 1), random.choice([0.0, 0.0, 5.0])
+    parts = [np.zeros(100)]
+    for k in range(random.integers(2, 5)):
+        top = random.uniform(10, 65) * ((-1) ** k if seed % 3 else 1)
+        ramp = int(random.integers(30, 120))
+        course = np.sin(np.pi * np.arange(ramp) / ramp) ** 2 if random.integers(2) else np.ones(ramp)
+        up = np.cumsum(course) / np.sum(course)
+        parts += [top * up, np.full(random.integers(20, 150), top), top * (1 - up), np.zeros(80)]
+    speed = np.concatenate(parts)
+    true = inertia_ * np.gradient(speed, H) + (1.5 + 0.02 * np.abs(speed)) * np.tanh(2 * speed) + load
+    rest = 0.02 * np.sqrt(np.mean(true**2)) * random.standard_normal(len(true))
+    angle = np.cumsum(speed) * H + 6e-5 * random.standard_normal(len(true))
+    most = limit * np.max(np.abs(true))
+    time = H * np.arange(len(true))
+    return Record("cut", time, np.clip(true, -most, most) + rest, angle), Record("whole", time, true + rest, angle)
+
+
+def counted(limit: float) -> tuple[int, float]:
+    """Of 40 such records, how many are recognised, and the median change of the inertia of the others."""
+    off = []
+    for seed in range(40):
+        cut, whole = drawn(seed, limit)
+        if not without_clipped([cut])[1]:
+            off.append(inertia([cut]).J.value / inertia([whole]).J.value - 1)
+    return 40 - len(off), float(np.median(off)) if off else 0.0
+
+
+def test_what_is_cut_off_mildly_is_hardly_recognised() -> None:
+    """Where an axis accelerates evenly, its torque stands still as well, and simple friction is not better than the 5 %
+    that are missing. At 0.8 of the peak 39 of 40 are recognised, and no whole one is."""
+    shares = {limit: counted(limit) for limit in (1.0, 0.9, 0.8)}
+    assert shares[1.0] == (0, 0.0)
+    assert shares[0.8][0] >= 38
+    assert 10 <= shares[0.9][0] < 38
+    assert -0.05 < shares[0.9][1] < 0
 
 
 def test_a_record_with_a_peak_keeps_it(record: Record) -> None:

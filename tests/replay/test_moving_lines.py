@@ -141,3 +141,16 @@ def test_a_record_without_acceleration() -> None:
     even = AxisRecord("X", record, I_P, np.ones(len(time), dtype=bool))
     lines = found(even, noise(even) + 0.5e-6 * wave(even, 45.0))
     assert [line.frequency for line in lines] == pytest.approx([45.0], abs=0.1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_met_exactly_has_none() -> None:
+    assert found(FAST, np.zeros(len(FAST.record))) == []
+    assert found(FAST, 1e-9 * noise(FAST)) == []
+
+
+def test_of_a_long_motion_the_middle_is_looked_at() -> None:
+    long = axis(((2.0, 12.0),))
+    (line,) = found(long, noise(long) + 0.3e-6 * wave(long, 33.3))
+    assert line.frequency == pytest.approx(33.3, abs=0.02)
+    assert (line.begin, line.end) == (pytest.approx(4.2, abs=0.01), pytest.approx(8.2, abs=0.01))

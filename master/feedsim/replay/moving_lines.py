@@ -32,8 +32,8 @@ Rows = NDArray[np.int64]
 
 MIN_MOTION_TIME = 0.5  # [s] of a motion in one direction
 MIN_COMPARED_TIME = 0.25  # [s] of one that a resonance has to predict
-MAX_MOTION_TIME, MAX_MOTIONS = 10.0, 12  # [s] of a motion, and how many, the longest ones
-MIN_INTERVAL = 1e-3  # [s] of the rows that are looked at: rows that are nearer are averaged
+MAX_MOTION_TIME, MAX_MOTIONS = 4.0, 12  # [s] of a motion, its middle, and how many, the longest ones
+MIN_INTERVAL = 2e-3  # [s] of the rows that are looked at: rows that are nearer are averaged
 MIN_FREQUENCY, MIN_CYCLES = 8.0, 4.0  # [Hz] and per motion: below, errors of friction and drive are broad
 RATE_SHARE = 0.2  # of the rows' rate: above it the position shows nothing
 TAPER_PRODUCT, TAPERS = 1.5, 2  # time-bandwidth product of the tapers, and how many

@@ -16,6 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import rotation
 
 if TYPE_CHECKING:
+    from feedsim.cosim.friction_law import FrictionLaw
     from pint_registry import Registry
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -104,6 +105,15 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
         build.build(build.load(build.unit_directory(unit), compiler), folder / f"{unit}.fmu", compiler)
     exchange.build(folder, compiler)
     return folder
+
+
+@pytest.fixture(scope="module")
+def law(fmus: Path) -> Iterator["FrictionLaw"]:
+    """The friction law of the shipped unit, LuGre with the transmission engaging model."""
+    from feedsim.cosim.friction_law import FrictionLaw
+
+    with FrictionLaw(fmus) as opened:
+        yield opened
 
 
 @pytest.fixture(scope="session")

@@ -4,10 +4,9 @@ order over angle, speed and bristles (pure LuGre), under a controller that holds
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import copysign, exp, log1p, nan, pi, sqrt
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,12 +83,6 @@ def strokes(t: float) -> float:
 @pytest.fixture(scope="module")
 def general() -> Record:
     return driven(strokes, 8.0)
-
-
-@pytest.fixture(scope="module")
-def law(fmus: Path) -> Iterator[FrictionLaw]:
-    with FrictionLaw(fmus) as law:
-        yield law
 
 
 def estimates(changes: Mapping[str, float] | None = None, relative: float = 0.01) -> dict[str, Estimate]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,6 @@ from feedsim.identify.parameters import torque as constant_speed_torque
 from fmi_helpers import Archive, Floats
 
 H = 2.0**-13  # s, near the control cycle; a power of two, see `exact`
-
-
-@pytest.fixture(scope="module")
-def law(fmus: Path) -> Iterator[FrictionLaw]:
-    with FrictionLaw(fmus) as law:
-        yield law
 
 
 @pytest.fixture(scope="module")

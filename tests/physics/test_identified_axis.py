@@ -5,7 +5,7 @@ Goals are those of the method: what a user can rely on at a noise of 5 % of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -48,12 +48,6 @@ def runs(fmus: Path) -> dict[str, dict[str, cosim.Run]]:
         }
         for axis in ("Z", "X")
     }
-
-
-@pytest.fixture(scope="module")
-def law(fmus: Path) -> Iterator[FrictionLaw]:
-    with FrictionLaw(fmus) as opened:
-        yield opened
 
 
 def logs(runs: dict[str, cosim.Run], axis: str, noise: float = 0.0, delay: float = 0.0, seed: int = 0) -> list[Record]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,12 +29,6 @@ TRUE = {
     "v_log": 3.0, "asymmetry": 0.0, "W": 0.04, "gamma": 0.35,
 }  # fmt: skip
 FINE = 16  # steps of the truth per row
-
-
-@pytest.fixture(scope="module")
-def law(fmus: Path) -> Iterator[FrictionLaw]:
-    with FrictionLaw(fmus) as opened:
-        yield opened
 
 
 def record(law: FrictionLaw, angle: Floats, interval: float, true: dict[str, float], step: float = 0.0) -> Record:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -52,12 +52,6 @@ motions:
   - {{kind: dwell, duration: 0.3 s}}
 logging: {{interval: 2 ms}}
 """
-
-
-@pytest.fixture(scope="module")
-def law(fmus: Path) -> Iterator[FrictionLaw]:
-    with FrictionLaw(fmus) as law:
-        yield law
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -18,12 +15,6 @@ from identify_records import FINE, I_P, TRUE, J, constant_speeds, friction, nois
 
 H = 2e-3
 MOVES = ((5e-6, 10.0, 20), (20e-6, 5.0, 10), (100e-6, 2.0, 6), (200e-6, 1.0, 4), (500e-6, 5.0, 8))  # m, Hz, periods
-
-
-@pytest.fixture(scope="module")
-def law(fmus: Path) -> Iterator[FrictionLaw]:
-    with FrictionLaw(fmus) as opened:
-        yield opened
 
 
 def sines() -> Record:

@@ -22,7 +22,7 @@ from report_helpers import FakeRun, circle_run, positioning_run
 
 OPEN_WITHIN = 0.5  # s of a processor, so that a reader does not wait
 # Rows of the table that floats beside the cursor: first what stands at the top, then a curve each.
-TOLD = "#{} .told"
+TOLD = "#{} .readout"
 
 
 @pytest.fixture(scope="module")

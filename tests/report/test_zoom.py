@@ -178,7 +178,7 @@ READ = """async ([figure, reads]) => {
     const middle = whole[0] + half + share * (whole[1] - whole[0] - 2 * half);
     live.zoom(0, [middle - half, middle + half], null);
     live.go(0, middle + (2 * at - 1) * half);
-    found.push(figure.querySelector(".told").innerText);
+    found.push(figure.querySelector(".readout").innerText);
   }
   return found;
 }"""
@@ -237,7 +237,7 @@ def test_far_off_the_cursor_reads_what_was_written(browser: Any, tmp_path: Path)
     assert len(set(ys)) > 0.5 * len(rows)
     assert max(ys) - min(ys) > 100
     assert any(re.fullmatch(r"position − 1999\.\d+ mm \[nm\]", text) for text in drawn[1]), drawn[1]
-    said = page.locator("#one .told").inner_text().replace("−", "-")
+    said = page.locator("#one .readout").inner_text().replace("−", "-")
     at, value = (float(re.search(pattern, said)[1]) for pattern in (r"time ([\d.]+) s", r"axis Z: ([\d.]+) mm"))
     row = int(np.argmin(np.abs(t - at)))
     assert at == pytest.approx(t[row], abs=1e-8)

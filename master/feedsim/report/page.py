@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from feedsim.report.run.sheet import Filled
 
-# What draws the charts and what a reader does with them, in their order.
-SCRIPTS = ("chart_draw.js", "chart_use.js")
+# What computes and draws the charts and what a reader does with them, in their order.
+SCRIPTS = ("chart_scale.js", "chart_draw.js", "chart_use.js")
 # The folders of an absolute path to a file: findings on a page name the file, "Where the numbers come from" has paths.
 PATH = re.compile(r"(?<![\w.:/\\])(?:[A-Za-z]:)?(?:[/\\][^/\\:\s'\"]+)*[/\\](?=[^/\\:\s'\"]+\.\w+\b)")
 

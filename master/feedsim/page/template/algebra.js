@@ -5,12 +5,12 @@ const range_of = values => largest(values) - least(values);
 
 // The symmetric matrix of the columns' products, each sample weighted.
 function normal_matrix(columns, weights) {
-  const K = columns.length, found = Array.from({ length: K }, () => new Float64Array(K));
+  const K = columns.length, result = Array.from({ length: K }, () => new Float64Array(K));
   for (let i = 0; i < K; i++) {
-    const weighted = weights ? columns[i].map((each, k) => each * weights[k]) : columns[i];
-    for (let j = i; j < K; j++) found[i][j] = found[j][i] = dot(weighted, columns[j]);
+    const weighted = weights ? columns[i].map((entry, k) => entry * weights[k]) : columns[i];
+    for (let j = i; j < K; j++) result[i][j] = result[j][i] = dot(weighted, columns[j]);
   }
-  return found;
+  return result;
 }
 
 function dot(a, b) {
@@ -20,14 +20,14 @@ function dot(a, b) {
 }
 
 const times = (matrix, vector) => matrix.map(row => dot(row, vector));
-const product = (A, B) => A.map(row => Float64Array.from(B[0], (_, j) => row.reduce((sum, each, k) => sum + each * B[k][j], 0)));
+const product = (A, B) => A.map(row => Float64Array.from(B[0], (_, j) => row.reduce((sum, entry, k) => sum + entry * B[k][j], 0)));
 const transposed = A => Array.from(A[0], (_, j) => Float64Array.from(A, row => row[j]));
 
 // Sum of columns, each times its value.
 function combined(columns, values, count) {
-  const found = new Float64Array(count);
-  columns.forEach((column, i) => { for (let k = 0; k < count; k++) found[k] += values[i] * column[k]; });
-  return found;
+  const result = new Float64Array(count);
+  columns.forEach((column, i) => { for (let k = 0; k < count; k++) result[k] += values[i] * column[k]; });
+  return result;
 }
 
 // Eigenvalues and, as columns, eigenvectors of a symmetric matrix: cyclic Jacobi rotations.
@@ -66,7 +66,7 @@ function by_block(blocks, values, count = 0) {
 // Blocks numbered from 0 on, without gaps.
 function numbered(blocks) {
   const numbers = new Map();
-  return Int32Array.from(blocks, each => { if (!numbers.has(each)) numbers.set(each, numbers.size); return numbers.get(each); });
+  return Int32Array.from(blocks, entry => { if (!numbers.has(entry)) numbers.set(entry, numbers.size); return numbers.get(entry); });
 }
 
 // Mean over `count` neighbours; fewer at the ends.

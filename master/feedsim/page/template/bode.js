@@ -5,12 +5,12 @@ const KICK = 1e-6, LONGEST_RING = 4, STILL = 1e-7, POINTS = 240, HALVINGS = 24;
 // Positions and following error every T_pos after an impulse at the setpoint of `axis`; slower: by what K_v is divided.
 async function kicked(unit, machine, parameters, axis, slower, between) {
   const { T_c, T_pos } = machine.cycles, ratio = Math.round(T_pos / T_c), wide = 2 * machine.axes.length, count = Math.round(LONGEST_RING / T_pos) + 1;
-  const rows = new Float64Array(count * wide), i = machine.axes.indexOf(axis), own = new Map(parameters.map(each => [each[0], each]));
+  const rows = new Float64Array(count * wide), i = machine.axes.indexOf(axis), own = new Map(parameters.map(entry => [entry[0], entry]));
   const put = (name, value) => { const [reference, kind] = machine.references[name]; own.set(reference, [reference, kind, value]); };
-  for (let n = 0; n < count; n++) machine.axes.forEach((each, j) => { rows[n * wide + 2 * j] = machine.pose[each]; });
+  for (let n = 0; n < count; n++) machine.axes.forEach((entry, j) => { rows[n * wide + 2 * j] = machine.pose[entry]; });
   rows[wide * 2 + 2 * i] += KICK;
   put("coupling.friction", false);
-  for (const each of machine.axes) put(`${each}.M_0`, 0);
+  for (const entry of machine.axes) put(`${entry}.M_0`, 0);
   const K_v = `${axis}.drive.K_v`;
   put(K_v, own.get(machine.references[K_v][0])[2] / slower);
   const reals = ["x_a", "x_e"].map(name => machine.references[`${axis}.${name}`][0]);
@@ -83,11 +83,11 @@ function margins(loop, frequency, gain, imaginary) {
   };
   for (let k = 0; k + 1 < frequency.length; k++) {
     if ((imaginary[k] < 0) !== (imaginary[k + 1] < 0)) {
-      const f = crossing(k, each => each[1]), [re] = loop(f);
+      const f = crossing(k, entry => entry[1]), [re] = loop(f);
       if (re < 0 && -1 / re > 1 && -1 / re < gain_margin) { gain_margin = -1 / re; gain_at = f; }
     }
     if ((gain[k] < 0) !== (gain[k + 1] < 0)) {
-      const f = crossing(k, each => Math.hypot(...each) - 1), [re, im] = loop(f), left = Math.atan2(-im, -re) * 180 / Math.PI;
+      const f = crossing(k, entry => Math.hypot(...entry) - 1), [re, im] = loop(f), left = Math.atan2(-im, -re) * 180 / Math.PI;
       if (Number.isNaN(crossover)) crossover = f;
       if (!(Math.abs(left) >= Math.abs(phase_margin))) { phase_margin = left; phase_at = f; }
     }

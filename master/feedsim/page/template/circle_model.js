@@ -8,38 +8,38 @@ const MODEL = {
 };
 
 const sign_of = value => value > 0 ? 1 : value < 0 ? -1 : 0;
-const concatenated = parts => { const found = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0)); let at = 0; for (const part of parts) { found.set(part, at); at += part.length; } return found; };
+const concatenated = parts => { const result = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0)); let at = 0; for (const part of parts) { result.set(part, at); at += part.length; } return result; };
 const split_like = (values, parts) => { let at = 0; return parts.map(part => values.slice(at, at += part.length)); };
 const enough_pitches = (circle, axis, pitches = MODEL.PITCHES) => axis in circle.pitch && 2 * circle.radius >= pitches * circle.pitch[axis];
 
 // circle: {axes, radius, speed, pitch, gain, drag, following, response}; paths: {angle, deviation, sense, phase}.
 function fit_circle(circle, paths, students) {
-  const found = fit_lost(circle, paths, students, false);
-  if (!found.left_out.some(axis => enough_pitches(circle, axis, MODEL.FEWEST))) return found;
+  const result = fit_lost(circle, paths, students, false);
+  if (!result.left_out.some(axis => enough_pitches(circle, axis, MODEL.FEWEST))) return result;
   const other = fit_lost(circle, paths, students, true);
-  if (other.noise < MODEL.CLEARER * found.noise) return other;
-  if (!found.left_out.some(axis => enough_pitches(circle, axis))) return found;
-  const moved = found.names.map(name => MODEL.DIFFERENCE * (found.of(name) - other.of(name)));
-  return { ...found, covariance: found.covariance.map((row, i) => row.map((each, j) => each + moved[i] * moved[j])) };
+  if (other.noise < MODEL.CLEARER * result.noise) return other;
+  if (!result.left_out.some(axis => enough_pitches(circle, axis))) return result;
+  const moved = result.names.map(name => MODEL.DIFFERENCE * (result.of(name) - other.of(name)));
+  return { ...result, covariance: result.covariance.map((row, i) => row.map((entry, j) => entry + moved[i] * moved[j])) };
 }
 
 function fit_lost(circle, paths, students, pitches) {
-  const found = fit_calm(circle, paths, students, false, pitches);
-  if (Math.max(found.of("lost_0"), found.of("lost_1")) < MODEL.PLAY) return found;
+  const result = fit_calm(circle, paths, students, false, pitches);
+  if (Math.max(result.of("lost_0"), result.of("lost_1")) < MODEL.PLAY) return result;
   const other = fit_calm(circle, paths, students, true, pitches);
-  return behind(other) < behind(found) ? other : found;
+  return behind(other) < behind(result) ? other : result;
 }
 
 // What is left behind the reversals, in squares.
-const behind = found => found.residual.reduce((sum, off, p) => off.reduce((own, each, k) => own + (found.reversal[p][k] >= 0 ? each * each : 0), sum), 0);
+const behind = result => result.residual.reduce((sum, off, p) => off.reduce((own, entry, k) => own + (result.reversal[p][k] >= 0 ? entry * entry : 0), sum), 0);
 
 function fit_calm(circle, paths, students, play, pitches) {
-  let found = null;
+  let result = null;
   for (const degrees of MODEL.BEHIND) {
-    found = fit_windowed(circle, paths, degrees * RADIANS, students, play, pitches);
-    if (calm(found)) break;
+    result = fit_windowed(circle, paths, degrees * RADIANS, students, play, pitches);
+    if (calm(result)) break;
   }
-  return found;
+  return result;
 }
 
 function fit_windowed(whole, paths, window, students, play, pitches) {
@@ -49,56 +49,56 @@ function fit_windowed(whole, paths, window, students, play, pitches) {
   let values = play ? { play: 1 } : {}, tails = { columns: [], spread: [] }, residual = null, undone, parts, windows, names, matrix, robust, kept, blocks;
   for (let number = 0; number < MODEL.PASSES; number++) {
     undone = paths.map(path => undo(circle, path, values));
-    parts = undone.map((each, k) => columns_of(circle, each, paths[k].sense, both, values));
-    windows = undone.map((each, k) => windows_of(each, paths[k].sense, window));
+    parts = undone.map((entry, k) => columns_of(circle, entry, paths[k].sense, both, values));
+    windows = undone.map((entry, k) => windows_of(entry, paths[k].sense, window));
     names = Object.keys(parts[0]);
     matrix = names.map(name => concatenated(parts.map(part => part[name])));
-    const deviation = concatenated(undone.map(each => each.deviation)), which = concatenated(windows.map(each => each.which)), since = concatenated(windows.map(each => each.since));
+    const deviation = concatenated(undone.map(entry => entry.deviation)), which = concatenated(windows.map(entry => entry.which)), since = concatenated(windows.map(entry => entry.since));
     if (number === 2) {
-      const around = usual(undone.map(each => each.angle), split_like(residual, paths.map(path => path.angle)), windows.map(each => each.which));
+      const around = usual(undone.map(entry => entry.angle), split_like(residual, paths.map(path => path.angle)), windows.map(entry => entry.which));
       tails = known ? known_tails(circle, undone, paths, residual, which) : tails_of(undone, paths, left_of(residual, which, since, window, around), window, count);
     }
-    const rows = rows_where(which, each => each < 0), taken = column => Float64Array.from(rows, k => column[k]);
-    blocks = numbered(taken(concatenated(undone.map((each, k) => each.angle.map(angle => 1000 * k + Math.floor(angle / (MODEL.BLOCK * RADIANS)))))));
+    const rows = rows_where(which, entry => entry < 0), taken = column => Float64Array.from(rows, k => column[k]);
+    blocks = numbered(taken(concatenated(undone.map((entry, k) => entry.angle.map(angle => 1000 * k + Math.floor(angle / (MODEL.BLOCK * RADIANS)))))));
     kept = [...matrix, ...tails.columns].map(taken);
     robust = robust_fit(kept, taken(deviation), tails.spread, blocks);
     const step = robust.values.slice(0, names.length);
     values = { ...values, ...Object.fromEntries(names.map((name, i) => [name, (values[name] || 0) + step[i]])) };
     const made = combined(matrix, step, count);
-    residual = deviation.map((each, k) => each - made[k]);
+    residual = deviation.map((entry, k) => entry - made[k]);
     if (number > 1 && largest(step.map(Math.abs)) < MODEL.SETTLED) { robust.rows = rows; break; }
     robust.rows = rows;
   }
   const tail = combined(tails.columns, robust.values.slice(names.length), count);
   // Positions of a run are not rounded: what rounding of a record adds is no part of it here.
   const { covariance, free: freedom } = covariance_of(kept, Float64Array.from(robust.rows, k => residual[k] - tail[k]), robust, tails.spread, blocks);
-  const reversal = concatenated(windows.map(each => each.which)), peak = i => residual.reduce((most, each, k) => reversal[k] >= 0 && reversal[k] % 2 === i ? Math.max(most, Math.abs(each)) : most, 0);
+  const reversal = concatenated(windows.map(entry => entry.which)), peak = i => residual.reduce((most, entry, k) => reversal[k] >= 0 && reversal[k] % 2 === i ? Math.max(most, Math.abs(entry)) : most, 0);
   const wound = known ? { lost_0: MODEL.WOUND * peak(0), lost_1: MODEL.WOUND * peak(1) } : {};
   return {
-    wound, names, values: names.map(name => values[name]), covariance, freedom, student: student(freedom, students), tails: tails.columns, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
-    reversal: windows.map(each => each.which), since: windows.map(each => each.since), tail: split_like(tail, paths.map(path => path.angle)), columns: parts,
+    wound, names, values: names.map(name => values[name]), covariance, freedom, student: student(freedom, students), tails: tails.columns, angle: undone.map(entry => entry.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
+    reversal: windows.map(entry => entry.which), since: windows.map(entry => entry.since), tail: split_like(tail, paths.map(path => path.angle)), columns: parts,
     left_out: asked.filter(axis => !enough_pitches(circle, axis)), unsure: known ? Math.hypot(MODEL.KNOWN * largest([0, ...Array.from(robust.rows, k => Math.abs(tail[k]))]), MODEL.SPEED_SHARE * Math.max(peak(0), peak(1))) : 0, of: name => names.includes(name) ? values[name] : 0,
   };
 }
 
-const rows_where = (values, fits) => { const found = []; for (let k = 0; k < values.length; k++) if (fits(values[k], k)) found.push(k); return found; };
+const rows_where = (values, fits) => { const result = []; for (let k = 0; k < values.length; k++) if (fits(values[k], k)) result.push(k); return result; };
 
 // Half of the interval of a term; of an amplitude with two parts, along its direction.
-function half_of(found, ...names) {
-  const rows = names.map(name => found.names.indexOf(name)), part = rows.map(row => found.values[row]), length = rows.length === 2 ? Math.hypot(...part) : 0;
-  const along = length > 0 ? part.map(each => each / length) : rows.map(() => 1 / Math.sqrt(rows.length));
+function half_of(result, ...names) {
+  const rows = names.map(name => result.names.indexOf(name)), part = rows.map(row => result.values[row]), length = rows.length === 2 ? Math.hypot(...part) : 0;
+  const along = length > 0 ? part.map(entry => entry / length) : rows.map(() => 1 / Math.sqrt(rows.length));
   let sum = 0;
-  rows.forEach((i, a) => rows.forEach((j, b) => { sum += along[a] * found.covariance[i][j] * along[b]; }));
-  const half = Math.hypot(found.student * Math.sqrt(Math.max(sum, 0)), found.unsure, found.wound[names[0]] || 0);
-  return rows.length === 2 && length < pair_quantile(found.freedom) * half / found.student ? Math.max(half, length) : half;
+  rows.forEach((i, a) => rows.forEach((j, b) => { sum += along[a] * result.covariance[i][j] * along[b]; }));
+  const half = Math.hypot(result.student * Math.sqrt(Math.max(sum, 0)), result.unsure, result.wound[names[0]] || 0);
+  return rows.length === 2 && length < pair_quantile(result.freedom) * half / result.student ? Math.max(half, length) : half;
 }
 
 // Standard deviation of the model's own deviation where it is known least well, behind the reversals.
-function rest_error(found) {
+function rest_error(result) {
   let worst = 0;
-  const row = new Float64Array(found.names.length), covariance = found.covariance;
-  found.reversal.forEach((which, p) => {
-    const columns = found.names.map(name => found.columns[p][name]);
+  const row = new Float64Array(result.names.length), covariance = result.covariance;
+  result.reversal.forEach((which, p) => {
+    const columns = result.names.map(name => result.columns[p][name]);
     for (let k = 0; k < which.length; k++) {
       if (which[k] < 0) continue;
       for (let i = 0; i < row.length; i++) row[i] = columns[i][k];
@@ -113,8 +113,8 @@ function rest_error(found) {
 function undo(circle, path, values) {
   const of = name => values[name] || 0, R = circle.radius, r = of("radius") / R, k = of("scale") / R, q = (of("squareness") + path.sense * of("servo")) / R;
   const a = 1 + r + k, d = 1 + r - k, determinant = a * d - q * q, turned = [Math.atan2(q, a), Math.atan2(d, q)], n = path.angle.length;
-  const x = path.angle.map((each, i) => (R + path.deviation[i]) * Math.cos(each)), y = path.angle.map((each, i) => (R + path.deviation[i]) * Math.sin(each));
-  const p = [x.map(each => each - of("offset_0")), y.map(each => each - of("offset_1"))], angle = p[0].map((each, i) => Math.atan2(p[1][i], each));
+  const x = path.angle.map((entry, i) => (R + path.deviation[i]) * Math.cos(entry)), y = path.angle.map((entry, i) => (R + path.deviation[i]) * Math.sin(entry));
+  const p = [x.map(entry => entry - of("offset_0")), y.map(entry => entry - of("offset_1"))], angle = p[0].map((entry, i) => Math.atan2(p[1][i], entry));
   for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, [x, y], path.sense, turned, values))) {
     const value = of(name);
     if (value) for (let i = 0; i < n; i++) p[axis][i] -= value * displacement[i];
@@ -130,28 +130,28 @@ function undo(circle, path, values) {
 
 // Play of `values` is used up behind a reversal before it is lost.
 function displacements(circle, angle, positions, sense, turned, values) {
-  const found = {};
+  const result = {};
   for (const i of [0, 1]) {
-    const lost = values.play ? values[`lost_${i}`] || 0 : 0, part = each => lost > 0 ? Math.min(Math.max(circle.radius * (1 - Math.cos(modulo(sense * (each - turned[i]), Math.PI))) / lost - 0.5, -0.5), 0.5) : 0.5;
-    found[`lost_${i}`] = [i, angle.map(each => sense * sign_of(Math.sin(each - turned[i])) * part(each))];
+    const lost = values.play ? values[`lost_${i}`] || 0 : 0, part = entry => lost > 0 ? Math.min(Math.max(circle.radius * (1 - Math.cos(modulo(sense * (entry - turned[i]), Math.PI))) / lost - 0.5, -0.5), 0.5) : 0.5;
+    result[`lost_${i}`] = [i, angle.map(entry => sense * sign_of(Math.sin(entry - turned[i])) * part(entry))];
   }
   circle.axes.forEach((axis, i) => {
     if (!(axis in circle.pitch)) return;
     const [cos, sin] = followed(circle, i, angle, positions[i], sense);
-    found[`pitch_${i}_cos`] = [i, cos];
-    found[`pitch_${i}_sin`] = [i, sin];
+    result[`pitch_${i}_cos`] = [i, cos];
+    result[`pitch_${i}_sin`] = [i, sin];
   });
-  return found;
+  return result;
 }
 
 // What an axis does of errors of its measured position that repeat with the pitch, as far as its loops follow them.
 function followed(circle, i, angle, positions, sense) {
   const axis = circle.axes[i], rate = 2 * Math.PI / circle.pitch[axis], following = circle.following[axis], n = MODEL.POINTS, step = 2 * Math.PI / n;
-  if (!following) return [Math.cos, Math.sin].map(wave => positions.map(each => wave(rate * each)));
+  if (!following) return [Math.cos, Math.sin].map(wave => positions.map(entry => wave(rate * entry)));
   const way = Float64Array.from({ length: n }, (_, k) => rate * circle.radius * (i ? Math.sin : Math.cos)(k * step));
   return [Math.cos, Math.sin].map((wave, part) => {
     const course = responded(way.map(wave), following, true), back = part && i ? sense : 1;
-    return angle.map(each => back * at_angle(course, sense * each));
+    return angle.map(entry => back * at_angle(course, sense * entry));
   });
 }
 
@@ -166,7 +166,7 @@ function responded(course, response, level) {
     im[k] = 2 * k === n ? 0 : u * c + v * a;
   }
   transform(re, im, -1);
-  return re.map(each => each / n);
+  return re.map(entry => entry / n);
 }
 
 // A course over a turn at an angle, linear between its points.
@@ -176,11 +176,11 @@ function at_angle(course, angle) {
 }
 
 function columns_of(circle, undone, sense, both, values) {
-  const { angle } = undone, along = [angle.map(Math.cos), angle.map(Math.sin)], oblique = angle.map(each => Math.sin(2 * each));
-  const found = { offset_0: along[0], offset_1: along[1], radius: angle.map(() => 1), scale: angle.map(each => Math.cos(2 * each)), squareness: oblique };
-  if (both) found.servo = oblique.map(each => sense * each);
-  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, undone.positions, sense, undone.turned, values))) found[name] = displacement.map((each, k) => along[axis][k] * each);
-  return found;
+  const { angle } = undone, along = [angle.map(Math.cos), angle.map(Math.sin)], oblique = angle.map(entry => Math.sin(2 * entry));
+  const result = { offset_0: along[0], offset_1: along[1], radius: angle.map(() => 1), scale: angle.map(entry => Math.cos(2 * entry)), squareness: oblique };
+  if (both) result.servo = oblique.map(entry => sense * entry);
+  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, undone.positions, sense, undone.turned, values))) result[name] = displacement.map((entry, k) => along[axis][k] * entry);
+  return result;
 }
 
 function windows_of(undone, sense, window) {
@@ -199,7 +199,7 @@ function windows_of(undone, sense, window) {
 function usual(angles, residuals, reversals) {
   const around = [];
   angles.forEach((angle, p) => {
-    const rows = rows_where(reversals[p], each => each < 0), { sums, counts } = by_block(numbered(rows.map(k => Math.floor(angle[k] / (MODEL.NEXT * RADIANS)))), rows.map(k => residuals[p][k]));
+    const rows = rows_where(reversals[p], entry => entry < 0), { sums, counts } = by_block(numbered(rows.map(k => Math.floor(angle[k] / (MODEL.NEXT * RADIANS)))), rows.map(k => residuals[p][k]));
     sums.forEach((sum, k) => around.push(sum / counts[k]));
   });
   return absolute_median(around) / MODEL.UNUSUAL;
@@ -207,32 +207,32 @@ function usual(angles, residuals, reversals) {
 
 // What the peak at each half axis leaves at the end of its window, and the angle in which that falls to 1/e.
 function left_of(residual, which, since, window, around) {
-  const width = MODEL.FALLEN * RADIANS, decays = MODEL.DECAYS.map(each => each * RADIANS), found = [[0, 0], [0, 0], [0, 0], [0, 0]];
+  const width = MODEL.FALLEN * RADIANS, decays = MODEL.DECAYS.map(entry => entry * RADIANS), result = [[0, 0], [0, 0], [0, 0], [0, 0]];
   for (const axis of [0, 1]) {
     const sizes = {}, errors = {};
     for (const k of [axis, axis + 2]) {
-      const own = rows_where(which, (each, i) => each === k && since[i] > 0), { sums, counts } = by_block(own.map(i => Math.floor(since[i] / width)), own.map(i => residual[i] / Math.cos(since[i])));
+      const own = rows_where(which, (entry, i) => entry === k && since[i] > 0), { sums, counts } = by_block(own.map(i => Math.floor(since[i] / width)), own.map(i => residual[i] / Math.cos(since[i])));
       let means = sums.map((sum, i) => sum / Math.max(counts[i], 1));
-      const top = means.reduce((best, each, i) => Math.abs(each) > Math.abs(means[best]) ? i : best, 0);
+      const top = means.reduce((best, entry, i) => Math.abs(entry) > Math.abs(means[best]) ? i : best, 0);
       if (!means.length || Math.abs(means[top]) <= MODEL.NEXT * around) continue;
       const sense = sign_of(means[top]);
-      means = means.map(each => sense * each);
+      means = means.map(entry => sense * entry);
       let first = top;
       while (first < means.length && !(means[first] < 0.5 * means[top])) first++;
       if (means.length - first < 3) continue;
-      const middle = mean(means.slice(first)), left = means.slice(first).map(each => each - middle);
+      const middle = mean(means.slice(first)), left = means.slice(first).map(entry => entry - middle);
       sizes[k] = [];
       errors[k] = [];
       for (const decay of decays) {
-        const raw = left.map((_, i) => Math.exp((window - (first + i + 0.5) * width) / decay)), level = mean(raw), tail = raw.map(each => each - level), size = dot(tail, left) / dot(tail, tail);
+        const raw = left.map((_, i) => Math.exp((window - (first + i + 0.5) * width) / decay)), level = mean(raw), tail = raw.map(entry => entry - level), size = dot(tail, left) / dot(tail, tail);
         sizes[k].push(size);
-        errors[k].push(mean(left.map((each, i) => (each - size * tail[i]) ** 2)));
+        errors[k].push(mean(left.map((entry, i) => (entry - size * tail[i]) ** 2)));
       }
     }
-    const sums = decays.map((_, i) => Object.values(errors).reduce((sum, each) => sum + each[i], 0)), best = sums.indexOf(least(sums));
-    for (const k in sizes) if (sizes[k][best] > Math.sqrt(errors[k][best])) found[k] = [sizes[k][best], decays[best]];
+    const sums = decays.map((_, i) => Object.values(errors).reduce((sum, entry) => sum + entry[i], 0)), best = sums.indexOf(least(sums));
+    for (const k in sizes) if (sizes[k][best] > Math.sqrt(errors[k][best])) result[k] = [sizes[k][best], decays[best]];
   }
-  return found;
+  return result;
 }
 
 function tails_of(undone, paths, left, window, count) {
@@ -240,8 +240,8 @@ function tails_of(undone, paths, left, window, count) {
   left.forEach(([size, decay], k) => {
     if (size < MODEL.TAIL_FLOOR) return;
     const wave = k % 2 === 0 ? Math.cos : Math.sin;
-    columns.push(concatenated(undone.map((each, p) => each.angle.map(angle => {
-      const since = modulo(paths[p].sense * (angle - each.turned[k % 2] - (k > 1 ? Math.PI : 0)), 2 * Math.PI);
+    columns.push(concatenated(undone.map((entry, p) => entry.angle.map(angle => {
+      const since = modulo(paths[p].sense * (angle - entry.turned[k % 2] - (k > 1 ? Math.PI : 0)), 2 * Math.PI);
       return since < Math.PI ? Math.abs(wave(angle)) * Math.exp((window - since) / decay) : 0;
     }))));
     spread.push(MODEL.TAIL * size);
@@ -271,7 +271,7 @@ function known_tails(circle, undone, paths, residual, which) {
     });
     const whole = largest(courses[0].map(Math.abs)), wave = [Math.cos, Math.sin][i];
     [MODEL.TAIL, within, within ** 2, MODEL.RISE_SPREAD].forEach((size, order) => {
-      columns.push(concatenated(undone.map((each, p) => each.angle.map(angle => wave(angle) * at_angle(courses[order], paths[p].sense * (angle - each.turned[i])) / whole))));
+      columns.push(concatenated(undone.map((entry, p) => entry.angle.map(angle => wave(angle) * at_angle(courses[order], paths[p].sense * (angle - entry.turned[i])) / whole))));
       spread.push(size * peak);
     });
   });
@@ -279,13 +279,13 @@ function known_tails(circle, undone, paths, residual, which) {
 }
 
 // Whether the peaks have died away where their windows end, as far as noise and what else is left let one see.
-function calm(found) {
-  const off = found.residual.map((residual, p) => residual.map((each, k) => each - found.tail[p][k])), around = usual(found.angle, off, found.reversal);
-  return found.angle.every((angle, p) => [0, 1, 2, 3].every(k => {
-    const own = rows_where(found.reversal[p], each => each === k);
+function calm(result) {
+  const off = result.residual.map((residual, p) => residual.map((entry, k) => entry - result.tail[p][k])), around = usual(result.angle, off, result.reversal);
+  return result.angle.every((angle, p) => [0, 1, 2, 3].every(k => {
+    const own = rows_where(result.reversal[p], entry => entry === k);
     if (!own.length) return true;
-    const last = angle[own.reduce((best, i) => found.since[p][i] > found.since[p][best] ? i : best, own[0])];
-    const next = rows_where(found.reversal[p], (each, i) => each < 0 && Math.abs(modulo(angle[i] - last + Math.PI, 2 * Math.PI) - Math.PI) < MODEL.NEXT * RADIANS);
+    const last = angle[own.reduce((best, i) => result.since[p][i] > result.since[p][best] ? i : best, own[0])];
+    const next = rows_where(result.reversal[p], (entry, i) => entry < 0 && Math.abs(modulo(angle[i] - last + Math.PI, 2 * Math.PI) - Math.PI) < MODEL.NEXT * RADIANS);
     if (!next.length) return true;
     return Math.abs(mean(next.map(i => off[p][i]))) <= Math.max(MODEL.CALM * largest(own.map(i => Math.abs(off[p][i]))), 4 * around);
   }));
@@ -296,7 +296,7 @@ function calm(found) {
 // What is known of the last values beforehand, an inverse covariance, times `factor`, added to a matrix.
 function with_known(matrix, spread, factor) {
   const first = matrix.length - spread.length;
-  spread.forEach((each, i) => { matrix[first + i][first + i] += factor / each ** 2; });
+  spread.forEach((entry, i) => { matrix[first + i][first + i] += factor / entry ** 2; });
   return matrix;
 }
 
@@ -304,20 +304,20 @@ function robust_fit(columns, deviation, spread, blocks) {
   const n = deviation.length;
   let weights = new Float64Array(n).fill(1), slopes = weights, shared = 0, values = null, noise = 0;
   for (let pass = 0; pass < MODEL.PASSES; pass++) {
-    const weighted = deviation.map((each, k) => weights[k] * each);
+    const weighted = deviation.map((entry, k) => weights[k] * entry);
     values = times(pseudo_inverse(with_known(normal_matrix(columns, weights), spread, shared ** 2)), columns.map(column => dot(column, weighted)));
-    const made = combined(columns, values, n), off = deviation.map((each, k) => each - made[k]);
+    const made = combined(columns, values, n), off = deviation.map((entry, k) => entry - made[k]);
     noise = absolute_median(off) / MODEL.UNUSUAL;
     if (noise < MODEL.SETTLED) break;
     const reach = MODEL.BIWEIGHT * noise;
     if (spread.length) {
-      const { sums } = by_block(blocks, off.map(each => Math.min(Math.max(each, -reach), reach)));
+      const { sums } = by_block(blocks, off.map(entry => Math.min(Math.max(entry, -reach), reach)));
       shared = Math.max(noise, Math.sqrt(dot(sums, sums) / n));
     }
     let most = 0;
-    const before = weights, inner = off.map(each => Math.max(1 - (each / reach) ** 2, 0));
-    weights = inner.map((each, k) => { most = Math.max(most, Math.abs(each ** 2 - before[k])); return each ** 2; });
-    slopes = inner.map(each => each * (5 * each - 4));
+    const before = weights, inner = off.map(entry => Math.max(1 - (entry / reach) ** 2, 0));
+    weights = inner.map((entry, k) => { most = Math.max(most, Math.abs(entry ** 2 - before[k])); return entry ** 2; });
+    slopes = inner.map(entry => entry * (5 * entry - 4));
     if (most < 0.01) break;
   }
   return { values, weights, slopes, noise, shared };
@@ -325,21 +325,21 @@ function robust_fit(columns, deviation, spread, blocks) {
 
 // Every direction of the second derivatives at least CURVATURE of the weighted normal matrix.
 function bounded(curved, weighted) {
-  const { values, vectors } = eigen(weighted), most = largest(values), usable = rows_where(values, each => each > 1e-14 * most), scaled_by = power => vectors.map(row => Float64Array.from(usable, k => row[k] * values[k] ** power));
+  const { values, vectors } = eigen(weighted), most = largest(values), usable = rows_where(values, entry => entry > 1e-14 * most), scaled_by = power => vectors.map(row => Float64Array.from(usable, k => row[k] * values[k] ** power));
   const inverse = scaled_by(-0.5), shares = eigen(product(product(transposed(inverse), curved), inverse));
   if (least(shares.values) >= MODEL.CURVATURE) return curved;
   const along = product(scaled_by(0.5), shares.vectors);
-  return product(along.map(row => row.map((each, k) => each * Math.max(shares.values[k], MODEL.CURVATURE))), transposed(along));
+  return product(along.map(row => row.map((entry, k) => entry * Math.max(shares.values[k], MODEL.CURVATURE))), transposed(along));
 }
 
 // Covariance of the free values, and its degrees of freedom.
 function covariance_of(columns, residual, robust, spread, blocks) {
   const terms = columns.length, own = terms - spread.length, known = with_known(Array.from({ length: terms }, () => new Float64Array(terms)), spread, robust.shared ** 2);
-  const prior = weights => with_known(normal_matrix(columns, weights), spread, robust.shared ** 2), inverse = pseudo_inverse(bounded(prior(robust.slopes), prior(robust.weights)), 1e-15), influence = residual.map((each, k) => robust.weights[k] * each);
-  const sums = columns.map(column => by_block(blocks, column.map((each, k) => influence[k] * each)).sums), count = sums[0].length, free = Math.max(count - own, 2);
-  const around = inner => product(product(inverse, inner), inverse), single = around(normal_matrix(columns, influence.map(each => each ** 2))), blockwise = around(normal_matrix(sums)), besides = around(known);
+  const prior = weights => with_known(normal_matrix(columns, weights), spread, robust.shared ** 2), inverse = pseudo_inverse(bounded(prior(robust.slopes), prior(robust.weights)), 1e-15), influence = residual.map((entry, k) => robust.weights[k] * entry);
+  const sums = columns.map(column => by_block(blocks, column.map((entry, k) => influence[k] * entry)).sums), count = sums[0].length, free = Math.max(count - own, 2);
+  const around = inner => product(product(inverse, inner), inverse), single = around(normal_matrix(columns, influence.map(entry => entry ** 2))), blockwise = around(normal_matrix(sums)), besides = around(known);
   const part = count / free, scale = single.map((row, i) => Math.sqrt(Math.max(row[i] / Math.max(blockwise[i][i] * part, 1e-300), 1)));
-  return { covariance: blockwise.map((row, i) => row.map((each, j) => scale[i] * each * part * scale[j] + robust.shared ** 2 * besides[i][j])), free };
+  return { covariance: blockwise.map((row, i) => row.map((entry, j) => scale[i] * entry * part * scale[j] + robust.shared ** 2 * besides[i][j])), free };
 }
 
 // Radius, in standard deviations, of the circle that holds 95 % of two values.

@@ -14,17 +14,17 @@ const three = value => value.toFixed(Math.min(Math.max(0, 2 - Number(value.toExp
 const in_um = value => `${three(value * 1e6)} um`;
 const term_of = (diagnosis, key) => diagnosis.terms.find(term => term.key === key);
 
-function told_terms({ terms, G }) {
-  const able = terms.filter(term => term.certain && term.key !== "rest" && term.key !== "radius" && (term.gain > 0 || !(Math.abs(term.value) < SAID.CERTAINTY * term.half))), found = able.filter(term => term.share >= SAID.LITTLE && term.size >= SAID.LITTLE * G);
-  const besides = able.filter(term => !found.includes(term) && term.key !== "offset" && term.size >= SAID.BESIDES * G);
-  return [...found.sort((a, b) => b.gain - a.gain || b.share - a.share), ...besides.sort((a, b) => b.size - a.size)];
+function named_terms({ terms, G }) {
+  const able = terms.filter(term => term.certain && term.key !== "rest" && term.key !== "radius" && (term.gain > 0 || !(Math.abs(term.value) < SAID.CERTAINTY * term.half))), result = able.filter(term => term.share >= SAID.LITTLE && term.size >= SAID.LITTLE * G);
+  const besides = able.filter(term => !result.includes(term) && term.key !== "offset" && term.size >= SAID.BESIDES * G);
+  return [...result.sort((a, b) => b.gain - a.gain || b.share - a.share), ...besides.sort((a, b) => b.size - a.size)];
 }
 
 // Why the circle is not round, in a sentence or two.
 function answer_of(diagnosis) {
-  const told = told_terms(diagnosis), G = `circular deviation G ${in_um(diagnosis.G)}`, rest = term_of(diagnosis, "rest");
-  if (!told.length) return `${G}: no single cause stands out; what remains is ${in_um(rest.size)}.`;
-  const said = [`${G}, ${told[0].share > 0.5 ? "mostly: " : "first: "}${sentence_of(diagnosis, told[0])}`, ...told.slice(1, 3).map(term => `Then ${sentence_of(diagnosis, term)}`)];
+  const named = named_terms(diagnosis), G = `circular deviation G ${in_um(diagnosis.G)}`, rest = term_of(diagnosis, "rest");
+  if (!named.length) return `${G}: no single cause stands out; what remains is ${in_um(rest.size)}.`;
+  const said = [`${G}, ${named[0].share > 0.5 ? "mostly: " : "first: "}${sentence_of(diagnosis, named[0])}`, ...named.slice(1, 3).map(term => `Then ${sentence_of(diagnosis, term)}`)];
   const trust = diagnosis.noise > SAID.NOISY * diagnosis.G ? ` Noise of ${in_um(diagnosis.noise)} hides much: measure again, or more slowly.`
     : Math.max(Math.abs(rest.share), rest.size / diagnosis.G) > 0.5 ? " The model explains less than half of G: look at the picture before acting on it." : "";
   return `${said.join(". ")}.${trust}`;
@@ -79,7 +79,7 @@ function peak_words({ peaks }, { axis }) {
 }
 
 function swinging_words({ vibrations }) {
-  return vibrations.length ? `Between the reversals swings ${vibrations.map(each => `${each.axis} ${in_um(each.amplitude)} (amplitude) at ${general(each.frequency, 3)} Hz`).join(", ")}.` : "";
+  return vibrations.length ? `Between the reversals swings ${vibrations.map(entry => `${entry.axis} ${in_um(entry.amplitude)} (amplitude) at ${general(entry.frequency, 3)} Hz`).join(", ")}.` : "";
 }
 
 function name_of(term) {
@@ -89,14 +89,14 @@ function name_of(term) {
 
 // Figures whose names promise something else, of one circle: feedsim.analysis.circle_figures.misleading.
 function misleading(diagnosis, figures) {
-  const found = [];
+  const result = [];
   for (const axis of diagnosis.circle.axes) {
     const { height } = largest_peak(diagnosis.peaks, axis), [old, unit] = figures[`glitch_${axis}`], off = Math.abs(old * 1e-6 - height);
     if (!(off > Math.max(0.2 * Math.abs(height), 1e-6))) continue;
     const form = diagnosis.terms.filter(term => term.key !== "peaks" && term.key !== "rest").reduce((best, term) => term.size > best.size ? term : best);
-    found.push(`glitch_${axis}, ${general(old, 4)} ${unit}, is the largest deviation in the quadrant whatever its cause; what stands out where ${axis} reverses is peak_${axis}, ${general(height * 1e6, 3)} um. The rest is form, most of it ${name_of(form)}`);
+    result.push(`glitch_${axis}, ${general(old, 4)} ${unit}, is the largest deviation in the quadrant whatever its cause; what stands out where ${axis} reverses is peak_${axis}, ${general(height * 1e6, 3)} um. The rest is form, most of it ${name_of(form)}`);
   }
-  return found;
+  return result;
 }
 
 // Cells of a cause: name, amount to the digits that its interval leaves it, what it makes alone, share of G, what it means.

@@ -25,9 +25,9 @@ function median(values) {
 // The stop that an entry of `evaluate` asks for: {axis, band, start, end, until, origin, target, steady}, or why there is none.
 function approach_of(item, segments, duration) {
   const { axis } = item, chosen = item.motion === null ? segments : segments.slice(item.motion, item.motion + 1);
-  const moved = chosen.filter(each => each.origin[axis] !== each.target[axis]), segment = moved[moved.length - 1];
+  const moved = chosen.filter(entry => entry.origin[axis] !== entry.target[axis]), segment = moved[moved.length - 1];
   if (!segment) return { problem: `positioning of axis ${axis}: no motion takes it to another position` };
-  const next = segments.slice(segment.index + 1).find(each => each.axes.includes(axis));
+  const next = segments.slice(segment.index + 1).find(entry => entry.axes.includes(axis));
   return {
     kind: "positioning", prefix: axis, axis, band: item.band, start: segment.start, end: segment.end, until: next ? next.start : duration,
     origin: segment.origin[axis], target: segment.target[axis], steady: segment.steady || null, sense: Math.sign(segment.target[axis] - segment.origin[axis]),
@@ -78,14 +78,14 @@ function ringing(time, speed, stop) {
 
 // numpy.gradient over even instants of recorded times
 function gradient(y, x) {
-  const n = y.length, found = new Float64Array(n);
-  found[0] = (y[1] - y[0]) / (x[1] - x[0]);
-  found[n - 1] = (y[n - 1] - y[n - 2]) / (x[n - 1] - x[n - 2]);
+  const n = y.length, result = new Float64Array(n);
+  result[0] = (y[1] - y[0]) / (x[1] - x[0]);
+  result[n - 1] = (y[n - 1] - y[n - 2]) / (x[n - 1] - x[n - 2]);
   for (let k = 1; k < n - 1; k++) {
     const before = x[k] - x[k - 1], behind = x[k + 1] - x[k];
-    found[k] = (before ** 2 * y[k + 1] + (behind ** 2 - before ** 2) * y[k] - behind ** 2 * y[k - 1]) / (before * behind * (before + behind));
+    result[k] = (before ** 2 * y[k + 1] + (behind ** 2 - before ** 2) * y[k] - behind ** 2 * y[k - 1]) / (before * behind * (before + behind));
   }
-  return found;
+  return result;
 }
 
 function stop_figures(trace, stop, name) {
@@ -104,19 +104,19 @@ function stop_figures(trace, stop, name) {
 
 function positioning(trace, stop) {
   const { axis } = stop, { time } = trace, n_a = trace[`${axis}.n_a`], M_a = trace[`${axis}.M_a`], M_fr = trace[`${axis}.M_fr`];
-  const found = { duration: [stop.end - stop.start, "s"], ...stop_figures(trace, stop, `${axis}.x_a`) };
-  found.ringing_frequency = [ringing(time, n_a.map(each => stop.sense * each), stop), "Hz"];
-  found.peak_torque = [largest(M_a.slice(...stop_rows(time, stop)).map(Math.abs)), "N.m"];
+  const result = { duration: [stop.end - stop.start, "s"], ...stop_figures(trace, stop, `${axis}.x_a`) };
+  result.ringing_frequency = [ringing(time, n_a.map(entry => stop.sense * entry), stop), "Hz"];
+  result.peak_torque = [largest(M_a.slice(...stop_rows(time, stop)).map(Math.abs)), "N.m"];
   if (stop.steady) {
     const [begin, end] = PLATEAU.map(share => stop.steady[0] + share * (stop.steady[1] - stop.steady[0]));
     const inside = M_a.filter((_, k) => time[k] >= begin && time[k] <= end);
-    found.plateau_torque = [inside.length && stop.steady[1] - stop.steady[0] >= SHORTEST_PLATEAU ? mean(inside) : NaN, "N.m"];
+    result.plateau_torque = [inside.length && stop.steady[1] - stop.steady[0] >= SHORTEST_PLATEAU ? mean(inside) : NaN, "N.m"];
   }
-  const instant = stop.end + REST, k = Math.min(Math.max(1, time.findIndex(each => each >= instant)), time.length - 1);
+  const instant = stop.end + REST, k = Math.min(Math.max(1, time.findIndex(entry => entry >= instant)), time.length - 1);
   const reached = instant <= Math.min(stop.until, time[time.length - 1]);
-  found.rest_torque = [reached ? M_fr[k - 1] + (M_fr[k] - M_fr[k - 1]) / (time[k] - time[k - 1]) * (instant - time[k - 1]) : NaN, "N.m"];
-  for (const [name, figure] of Object.entries(stop_figures(trace, stop, `tcp.x_${axis}`))) found[`tool.${name}`] = figure;
-  return found;
+  result.rest_torque = [reached ? M_fr[k - 1] + (M_fr[k] - M_fr[k - 1]) / (time[k] - time[k - 1]) * (instant - time[k - 1]) : NaN, "N.m"];
+  for (const [name, figure] of Object.entries(stop_figures(trace, stop, `tcp.x_${axis}`))) result[`tool.${name}`] = figure;
+  return result;
 }
 
 // --- circles ----------------------------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ function positioning(trace, stop) {
 // The turns that an entry of `evaluate` asks for: {turn, back}, or why there is none.
 function turns_of(item, segments) {
   const chosen = item.motion === null ? segments : segments.slice(item.motion, item.motion + 1);
-  const circles = chosen.filter(each => each.kind === "circle").pop();
+  const circles = chosen.filter(entry => entry.kind === "circle").pop();
   if (!circles) return { problem: "circularity: the program has no circle" };
   const turns = [];
   for (const circle of circles.circles) {
@@ -136,7 +136,7 @@ function turns_of(item, segments) {
     else return { problem: "circularity: no full turn is driven at constant speed; lower the feed, or give the circle more turns in the scenario" };
   }
   const axes = turns[0].axes;
-  return { kind: "circle", prefix: axes.join(axes.every(each => each.length === 1) ? "" : "-"), axes, turn: turns[0], back: turns[1] || null };
+  return { kind: "circle", prefix: axes.join(axes.every(entry => entry.length === 1) ? "" : "-"), axes, turn: turns[0], back: turns[1] || null };
 }
 
 const seen_contours = new WeakMap(), length_of = (x, y) => Math.sqrt(x * x + y * y); // Math.hypot takes ten times as long
@@ -152,12 +152,12 @@ function contour(trace, turn, names = turn.axes.map(axis => `${axis}.x_a`)) {
 function contour_of(trace, turn, names) {
   let [first, last] = rows_within(trace.time, turn.begin, turn.end);
   if (trace.time[last - 1] >= turn.end) last--;
-  const time = trace.time.slice(first, last), [x, y] = names.map((name, i) => trace[name].slice(first, last).map(each => each - turn.centre[i]));
-  const angle = x.map((each, k) => Math.atan2(y[k], each)), deviation = x.map((each, k) => length_of(each, y[k]) - turn.radius), middle = median(deviation);
+  const time = trace.time.slice(first, last), [x, y] = names.map((name, i) => trace[name].slice(first, last).map(entry => entry - turn.centre[i]));
+  const angle = x.map((entry, k) => Math.atan2(y[k], entry)), deviation = x.map((entry, k) => length_of(entry, y[k]) - turn.radius), middle = median(deviation);
   const glitches = [0, 1, 2, 3].map(quarter => {
     let peak = -1;
-    angle.forEach((each, k) => {
-      const off = Math.abs(modulo(each - quarter * QUARTER + Math.PI, 2 * Math.PI) - Math.PI);
+    angle.forEach((entry, k) => {
+      const off = Math.abs(modulo(entry - quarter * QUARTER + Math.PI, 2 * Math.PI) - Math.PI);
       if (off <= QUARTER / 2 && (peak < 0 || deviation[k] > deviation[peak])) peak = k;
     });
     const axis = turn.axes[quarter % 2];
@@ -169,7 +169,7 @@ const modulo = (value, by) => ((value % by) + by) % by;
 
 // Centre of the least-squares circle; Gauss-Newton, four passes.
 function fitted_centre({ angle, deviation }, radius) {
-  const x = angle.map((each, k) => (radius + deviation[k]) * Math.cos(each)), y = angle.map((each, k) => (radius + deviation[k]) * Math.sin(each));
+  const x = angle.map((entry, k) => (radius + deviation[k]) * Math.cos(entry)), y = angle.map((entry, k) => (radius + deviation[k]) * Math.sin(entry));
   let p = 0, q = 0;
   for (let pass = 0; pass < 4; pass++) {
     const A = [[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]];
@@ -186,74 +186,74 @@ function fitted_centre({ angle, deviation }, radius) {
 
 // Range of the distance from it.
 function least_squares_deviation({ angle, deviation }, radius) {
-  const [p, q] = fitted_centre({ angle, deviation }, radius), far = angle.map((each, k) => length_of((radius + deviation[k]) * Math.cos(each) - p, (radius + deviation[k]) * Math.sin(each) - q));
+  const [p, q] = fitted_centre({ angle, deviation }, radius), far = angle.map((entry, k) => length_of((radius + deviation[k]) * Math.cos(entry) - p, (radius + deviation[k]) * Math.sin(entry) - q));
   return largest(far) - least(far);
 }
 
 function turn_figures(trace, turn, names) {
-  const measured = contour(trace, turn, names), e = measured.deviation, um = value => [value * 1e6, "um"], found = {
+  const measured = contour(trace, turn, names), e = measured.deviation, um = value => [value * 1e6, "um"], result = {
     G: um(largest(e) - least(e)), G_ls: um(least_squares_deviation(measured, turn.radius)), F_max: um(largest(e)), F_min: um(least(e)), mean: um(mean(e)), median: um(measured.median),
   };
-  for (const axis of turn.axes) found[`glitch_${axis}`] = um(largest(measured.glitches.filter(each => each.axis === axis).map(each => each.height)));
-  for (const glitch of measured.glitches) found[`glitch_${glitch.name}`] = um(glitch.height);
-  return found;
+  for (const axis of turn.axes) result[`glitch_${axis}`] = um(largest(measured.glitches.filter(entry => entry.axis === axis).map(entry => entry.height)));
+  for (const glitch of measured.glitches) result[`glitch_${glitch.name}`] = um(glitch.height);
+  return result;
 }
 
 function circularity(trace, turn) {
-  const found = turn_figures(trace, turn), tool = turn_figures(trace, turn, turn.axes.map(axis => `tcp.x_${axis}`));
-  for (const name in tool) found[`tool.${name}`] = tool[name];
-  return found;
+  const result = turn_figures(trace, turn), tool = turn_figures(trace, turn, turn.axes.map(axis => `tcp.x_${axis}`));
+  for (const name in tool) result[`tool.${name}`] = tool[name];
+  return result;
 }
 
 // --- all that the scenario asks for -----------------------------------------------------------------------------------
 
 function tasks_of(evaluate, segments, duration) {
-  const found = [];
+  const result = [];
   for (const item of evaluate) {
     const task = item.kind === "positioning" ? approach_of(item, segments, duration) : turns_of(item, segments);
     if (task.problem) throw new Error(task.problem);
-    const same = found.filter(each => each.plain === task.prefix).length;
-    found.push({ ...task, plain: task.prefix, prefix: same ? `${task.prefix}#${same + 1}` : task.prefix });
+    const same = result.filter(entry => entry.plain === task.prefix).length;
+    result.push({ ...task, plain: task.prefix, prefix: same ? `${task.prefix}#${same + 1}` : task.prefix });
   }
-  return found;
+  return result;
 }
 
 function figures_of(trace, tasks) {
-  const found = {};
+  const result = {};
   for (const task of tasks) {
     const own = task.kind === "positioning" ? positioning(trace, task) : circularity(trace, task.turn);
     if (task.back) {
       Object.assign(own, bidirectional(trace, task.turn, task.back));
       for (const [name, figure] of Object.entries(circularity(trace, task.back))) own[`clockwise.${name}`] = figure;
     }
-    for (const name in own) found[`${task.prefix}.${name}`] = own[name];
+    for (const name in own) result[`${task.prefix}.${name}`] = own[name];
   }
-  return found;
+  return result;
 }
 
 // Why circles are not round: of every one its cause figures, what was found, and in words. known: see diagnosed().
 function causes_of(trace, tasks, figures, known) {
-  const found = {};
+  const result = {};
   for (const { kind, prefix, turn, back } of tasks) {
     const diagnosis = kind === "circle" ? diagnosed(trace, back ? [turn, back] : [turn], known) : null;
     if (!diagnosis) continue;
     const own = Object.fromEntries(Object.entries(figures).filter(([name]) => name.startsWith(`${prefix}.`)).map(([name, figure]) => [name.slice(prefix.length + 1), figure]));
-    found[prefix] = {
+    result[prefix] = {
       figures: Object.fromEntries(Object.entries(cause_figures(diagnosis)).map(([name, figure]) => [`${prefix}.${name}`, figure])), answer: answer_of(diagnosis), swinging: swinging_words(diagnosis),
       rows: diagnosis.terms.map(term => cause_row(diagnosis, term)),
       peaks: diagnosis.peaks.map(({ name, sense, height }) => ({ name, sense, height })),
       doubts: misleading(diagnosis, own).map(sentence => `${prefix}: ${sentence}`),
     };
   }
-  return found;
+  return result;
 }
 
 // What a run's own limits tell a reader to doubt, in the words of feedsim run (feedsim.judge).
 function limit_warnings(machine, trace) {
-  const found = [], percent = value => general(value, 2);
+  const result = [], percent = value => general(value, 2);
   for (const axis of machine.axes) for (const limit of machine.flags) {
-    const flags = trace[`${axis}.${limit}`], share = flags.reduce((sum, each) => sum + (each ? 1 : 0), 0) / flags.length;
-    if (share > 0) found.push(`axis ${axis}: ${limit.replace("_", " ")} in ${percent(100 * share)} % of the recorded instants`);
+    const flags = trace[`${axis}.${limit}`], share = flags.reduce((sum, entry) => sum + (entry ? 1 : 0), 0) / flags.length;
+    if (share > 0) result.push(`axis ${axis}: ${limit.replace("_", " ")} in ${percent(100 * share)} % of the recorded instants`);
   }
-  return found;
+  return result;
 }

@@ -7,26 +7,26 @@ const geometric = (from, to, count, whole = true) => Array.from({ length: count 
 
 // All loops of a system in both states; null where `between` ends it. locked: [omega, damping, peak per K_v] of modes with motors held.
 async function judge(system, locked, between) {
-  const { T_c, T_pos } = system.machine.cycles, found = [];
+  const { T_c, T_pos } = system.machine.cycles, result = [];
   const speed = await along(system, s => speed_level(system, s), frequencies(0.5 / T_c, free_resonances(system)), between);
   const position = speed && await along(system, s => position_level(system, s), frequencies(0.5 / T_pos, locked_resonances(system, locked)), between);
   if (!position) return null;
   STATES.forEach((state, k) => {
-    const of_speed = -windings(speed.map(each => each[k][0])), closed = of_speed - windings(position.map(each => each[k][0]));
+    const of_speed = -windings(speed.map(entry => entry[k][0])), closed = of_speed - windings(position.map(entry => entry[k][0]));
     system.axes.forEach((axis, i) => {
       for (const [kind, level, gain, growing, inner] of [["speed", speed, system.drives[i].K_p, of_speed, 0], ["position", position, system.drives[i].K_v, closed, of_speed]])
-        if (gain > 0) found.push(judged(axis, kind, state, gain, level.map(each => less(over(each[k][0], each[k][1 + i]), ONE)), growing, closed, inner));
+        if (gain > 0) result.push(judged(axis, kind, state, gain, level.map(entry => less(over(entry[k][0], entry[k][1 + i]), ONE)), growing, closed, inner));
     });
   });
-  return found;
+  return result;
 }
 
 function judged(axis, kind, state, gain, L, growing, closed, inner) {
   const near = limits_of(L, JUDGED.WITHIN), gain_margin = gain_margin_of(near, 1), phase_margin = phase_margin_of(L, 1), base = { axis, kind, state, gain, growing: closed };
-  const nearest = factors => factors.length ? factors.reduce((best, each) => far(each) < far(best) ? each : best) : null, of_gain = factor => factor === null ? null : gain * factor;
+  const nearest = factors => factors.length ? factors.reduce((best, entry) => far(entry) < far(best) ? entry : best) : null, of_gain = factor => factor === null ? null : gain * factor;
   if (!growing && gain_margin >= JUDGED.GAIN_MARGIN && phase_margin >= JUDGED.PHASE_MARGIN) return { ...base, unstable: false, limit: of_gain(nearest(near)), gain_margin, phase_margin, advised: gain, thin: false };
-  const limits = limits_of(L, [GAINS[0], GAINS[GAINS.length - 1]]), ends = [GAINS[0], ...limits, GAINS[GAINS.length - 1]], winds = windings(L.map(each => plus(ONE, each)));
-  const counts = ends.slice(1).map((end, k) => growing + winds - windings(L.map(each => plus(ONE, scaled(Math.sqrt(end * ends[k]), each))))), fewest_count = Math.min(...counts, growing + winds), fewest = counts.map(each => each === fewest_count);
+  const limits = limits_of(L, [GAINS[0], GAINS[GAINS.length - 1]]), ends = [GAINS[0], ...limits, GAINS[GAINS.length - 1]], winds = windings(L.map(entry => plus(ONE, entry)));
+  const counts = ends.slice(1).map((end, k) => growing + winds - windings(L.map(entry => plus(ONE, scaled(Math.sqrt(end * ends[k]), entry))))), fewest_count = Math.min(...counts, growing + winds), fewest = counts.map(entry => entry === fewest_count);
   const unstable = growing > fewest_count && !inner;
   if (growing && !unstable) return { ...base, unstable: false, limit: null, gain_margin: Infinity, phase_margin: 180, advised: null, thin: false };
   const good = [...GAINS].sort((a, b) => far(a) - far(b)).filter(k => { let at = 0; while (at < limits.length && limits[at] < k) at++; return fewest[at]; });
@@ -39,30 +39,30 @@ const below_zero = value => value < 0 || Object.is(value, -0);
 
 // Factors on an open-loop gain, ascending, that take it through -1, between two.
 function limits_of(L, [low, high]) {
-  const found = [];
+  const result = [];
   for (let k = 0; k + 1 < L.length; k++) {
     const a = angle_of(scaled(-1, L[k])), b = angle_of(scaled(-1, L[k + 1])), turn = b - a;
     if (below_zero(a) === below_zero(b) || !(Math.abs(turn) < Math.PI)) continue;
     const size = Math.log(Math.max(size_of(L[k]), JUDGED.TINY)), next = Math.log(Math.max(size_of(L[k + 1]), JUDGED.TINY)), factor = Math.exp(-(size - a / turn * (next - size)));
-    if (factor > low && factor < high) found.push(factor);
+    if (factor > low && factor < high) result.push(factor);
   }
   // Half the sampling rate: the mirror image of the contour meets it there.
   const end = L[L.length - 1], last = 1 / Math.max(size_of(end), JUDGED.TINY);
-  if (Math.abs(angle_of(scaled(-1, end))) < JUDGED.REAL && last > low && last < high) found.push(last);
-  return found.sort((a, b) => a - b);
+  if (Math.abs(angle_of(scaled(-1, end))) < JUDGED.REAL && last > low && last < high) result.push(last);
+  return result.sort((a, b) => a - b);
 }
 
-const gain_margin_of = (limits, factor) => limits.length ? Math.exp(Math.min(...limits.map(each => Math.abs(Math.log(each / factor))))) : Infinity;
+const gain_margin_of = (limits, factor) => limits.length ? Math.exp(Math.min(...limits.map(entry => Math.abs(Math.log(entry / factor))))) : Infinity;
 
 function phase_margin_of(L, factor) {
-  let found = 180;
+  let result = 180;
   for (let k = 0; k + 1 < L.length; k++) {
     const size = Math.log(Math.max(size_of(L[k]) * factor, JUDGED.TINY)), next = Math.log(Math.max(size_of(L[k + 1]) * factor, JUDGED.TINY));
     if ((next < 0) === (size < 0)) continue;
     const angle = angle_of(scaled(-1, L[k])) + size / (size - next) * angle_of(over(L[k + 1], L[k]));
-    found = Math.min(found, Math.abs(modulo(angle + Math.PI, 2 * Math.PI) - Math.PI) * 180 / Math.PI);
+    result = Math.min(result, Math.abs(modulo(angle + Math.PI, 2 * Math.PI) - Math.PI) * 180 / Math.PI);
   }
-  return found;
+  return result;
 }
 
 // How often values along half the contour, whose other half is the mirror image, wind around 0.
@@ -76,23 +76,23 @@ function windings(values) {
 async function along(system, level, frequency, between) {
   let begun = Date.now();
   const evaluated = async list => {
-    const found = [];
+    const result = [];
     for (const f of list) {
-      found.push(level([JUDGED.GROWTH, 2 * Math.PI * f]));
+      result.push(level([JUDGED.GROWTH, 2 * Math.PI * f]));
       if (between && Date.now() - begun > 15) { if (!(await between())) return null; begun = Date.now(); }
     }
-    return found;
+    return result;
   };
   let values = await evaluated(frequency);
   if (!values) return null;
-  if (values.some(states => states.some(each => each.some(pair => !Number.isFinite(pair[0]) || !Number.isFinite(pair[1])))))
+  if (values.some(states => states.some(entry => entry.some(pair => !Number.isFinite(pair[0]) || !Number.isFinite(pair[1])))))
     throw new Error(`the loops are beyond all numbers that a computer has; K_p [N.m.s/rad], ${system.axes.map((axis, i) => `axis ${axis}: ${general(system.drives[i].K_p, 3)}`).join(", ")}`);
   for (let round = 0; round < JUDGED.ROUNDS; round++) {
-    const gains = values.map(states => states.map(([all, ...open]) => open.map(each => less(over(all, each), ONE)))), wide = [];
+    const gains = values.map(states => states.map(([all, ...open]) => open.map(entry => less(over(all, entry), ONE)))), wide = [];
     const counts = L => { const size = size_of(L); return Math.abs(angle_of(scaled(-1, L))) < JUDGED.SECTOR && size > 1 / JUDGED.COUNTS && size < JUDGED.COUNTS; };
     for (let k = 0; k + 1 < frequency.length; k++) {
-      const turns = values[k].some((each, state) => each.some((value, i) => Math.abs(angle_of(over(values[k + 1][state][i], value))) > JUDGED.TURN));
-      if (turns || gains[k].some((each, state) => each.some((L, i) => { const next = gains[k + 1][state][i]; return size_of(less(next, L)) > JUDGED.CHANGE * size_of(next) && (counts(next) || counts(L)); }))) wide.push(k);
+      const turns = values[k].some((entry, state) => entry.some((value, i) => Math.abs(angle_of(over(values[k + 1][state][i], value))) > JUDGED.TURN));
+      if (turns || gains[k].some((entry, state) => entry.some((L, i) => { const next = gains[k + 1][state][i]; return size_of(less(next, L)) > JUDGED.CHANGE * size_of(next) && (counts(next) || counts(L)); }))) wide.push(k);
     }
     if (!wide.length) break;
     const middles = wide.map(k => 0.5 * (frequency[k] + frequency[k + 1])), made = await evaluated(middles), more_f = [], more = [];
@@ -113,16 +113,16 @@ function frequencies(highest, near) {
   return [...new Set(all)].sort((a, b) => a - b);
 }
 
-const about = list => list.filter(([, , peak]) => peak > JUDGED.SHOWS).flatMap(([omega, damping]) => JUDGED.ABOUT.map(each => (omega + Math.max(damping * omega, JUDGED.GROWTH) * each) / (2 * Math.PI)));
+const about = list => list.filter(([, , peak]) => peak > JUDGED.SHOWS).flatMap(([omega, damping]) => JUDGED.ABOUT.map(entry => (omega + Math.max(damping * omega, JUDGED.GROWTH) * entry) / (2 * Math.PI)));
 
 function free_resonances({ axes, machine, drives, plant: { table: { omega_0, damping, rotor, scale } } }) {
-  const found = [];
+  const result = [];
   omega_0.forEach((omega, mode) => {
     if (!(omega > 0)) return;
     const seen = Math.max(...axes.map((axis, i) => Math.max(Math.abs(rotor[i][mode]), Math.abs(scale[i][mode]) / machine.I_P[axis]))), driven = Math.max(...drives.map((drive, i) => Math.abs(rotor[i][mode]) * drive.K_p));
-    found.push([omega, damping[mode], seen * driven / Math.max(2 * damping[mode] * omega, JUDGED.GROWTH)]);
+    result.push([omega, damping[mode], seen * driven / Math.max(2 * damping[mode] * omega, JUDGED.GROWTH)]);
   });
-  return about(found);
+  return about(result);
 }
 
 function locked_resonances({ drives }, locked) {
@@ -136,18 +136,18 @@ function speed_loops(system, s) {
   return STATES.map(state => {
     let { n, x } = motor;
     if (state === "at rest") {
-      const angle = scaled(0.5 * T_c, over(plus(exponential(scaled(T_c, s)), ONE), exponential_less_1(scaled(T_c, s)))), R = system.bristles.map(each => plus(scaled(each.stiffness, angle), [each.damping, 0]));
-      n = solved(with_one(friction.n.map(row => row.map((each, j) => mul(each, R[j])))), motor.n).x;
-      const held = matrix_product(friction.x, n.map((row, i) => row.map(each => mul(R[i], each))));
-      x = motor.x.map((row, i) => row.map((each, j) => less(each, held[i][j])));
+      const angle = scaled(0.5 * T_c, over(plus(exponential(scaled(T_c, s)), ONE), exponential_less_1(scaled(T_c, s)))), R = system.bristles.map(entry => plus(scaled(entry.stiffness, angle), [entry.damping, 0]));
+      n = solved(with_one(friction.n.map(row => row.map((entry, j) => mul(entry, R[j])))), motor.n).x;
+      const held = matrix_product(friction.x, n.map((row, i) => row.map(entry => mul(R[i], entry))));
+      x = motor.x.map((row, i) => row.map((entry, j) => less(entry, held[i][j])));
     }
     const { loop, measured } = system.torque_loop(s, torques, n, x);
-    return { measured, loop, fixed: n.map((row, i) => row.map(each => mul(torques[i][1], each))), torques };
+    return { measured, loop, fixed: n.map((row, i) => row.map(entry => mul(torques[i][1], entry))), torques };
   });
 }
 
 // Determinant of 1 + loop, and of that with each row in turn taken from `opened`.
-const determinants = (loop, opened) => [loop, ...loop.map((_, i) => loop.map((row, j) => i === j ? opened[i] : row))].map(each => solved(with_one(each), null).determinant);
+const determinants = (loop, opened) => [loop, ...loop.map((_, i) => loop.map((row, j) => i === j ? opened[i] : row))].map(entry => solved(with_one(entry), null).determinant);
 
 const speed_level = (system, s) => speed_loops(system, s).map(({ loop, fixed }) => determinants(loop, fixed));
 
@@ -157,10 +157,10 @@ function position_level(system, s) {
     const at = [s[0], s[1] + 2 * Math.PI * component / T_pos], answer = system.drives.map(drive => mul(drive.from_setpoint(at), drive.ramp(at)));
     speed_loops(system, at).forEach(({ measured, loop, torques }, state) => {
       const given = system.axes.map((_, i) => system.axes.map((__, j) => i === j ? mul(torques[i][0], answer[i]) : NONE));
-      sums[state] = matrix_product(measured, solved(with_one(loop), given).x).map((row, i) => row.map((each, j) => plus(sums[state][i][j], each)));
+      sums[state] = matrix_product(measured, solved(with_one(loop), given).x).map((row, i) => row.map((entry, j) => plus(sums[state][i][j], entry)));
     });
   }
-  return sums.map(sum => determinants(sum.map((row, i) => row.map(each => scaled(system.drives[i].gain, each))), sum.map(row => row.map(() => NONE))));
+  return sums.map(sum => determinants(sum.map((row, i) => row.map(entry => scaled(system.drives[i].gain, entry))), sum.map(row => row.map(() => NONE))));
 }
 
 // --- in words ---------------------------------------------------------------------------------------------------------
@@ -171,17 +171,17 @@ const decibels = factor => 20 * Math.log10(factor);
 
 // Loops that are unstable or have less than the usual margins, with the gain that would do.
 function loop_warnings(loops) {
-  const found = [], usual = `the usual ${decibels(JUDGED.GAIN_MARGIN).toFixed(0)} dB and ${JUDGED.PHASE_MARGIN} deg`;
+  const result = [], usual = `the usual ${decibels(JUDGED.GAIN_MARGIN).toFixed(0)} dB and ${JUDGED.PHASE_MARGIN} deg`;
   for (const name of new Set(loops.map(loop => `${loop.axis} ${loop.kind}`))) {
     const states = loops.filter(loop => `${loop.axis} ${loop.kind}` === name), { axis, kind, gain } = states[0], unstable = states.filter(loop => loop.unstable), thin = states.filter(loop => loop.thin);
     if (!unstable.length && !thin.length) continue;
     const now = gain_words(kind, gain), advised = (unstable.length ? unstable : thin).map(loop => loop.advised), better = advised.includes(null) ? `; no ${LOOP_GAIN[kind][0]} was found with which it has` : `; with ${gain_words(kind, Math.min(...advised))} it has`;
     if (!unstable.length) {
       const margins = thin.map(loop => `gain ${Number.isFinite(loop.gain_margin) ? decibels(loop.gain_margin).toFixed(1) : "inf"} dB, phase ${loop.phase_margin.toFixed(0)} deg ${LOOP_STATE[loop.state]}`).join("; ");
-      found.push(`axis ${axis}: the ${kind} loop has thin margins with ${now}: ${margins}${better} ${usual}`);
-    } else found.push(`axis ${axis}: the ${kind} loop is unstable with ${now}: ${states.map(limit_words).join("; ")}${better} ${usual}. A run shows this instability, whatever coupling.substeps are`);
+      result.push(`axis ${axis}: the ${kind} loop has thin margins with ${now}: ${margins}${better} ${usual}`);
+    } else result.push(`axis ${axis}: the ${kind} loop is unstable with ${now}: ${states.map(limit_words).join("; ")}${better} ${usual}. A run shows this instability, whatever coupling.substeps are`);
   }
-  return found;
+  return result;
 }
 
 function limit_words({ kind, state, gain, limit, unstable }) {
@@ -201,7 +201,7 @@ function exchange_warnings({ axes, cycles, scheme }, of, { rotor }) {
 
 // rows: setpoints, those of the axes at every second place.
 function reach_warnings({ axes, pose, limits, reach }, rows) {
-  const found = [], wide = 2 * axes.length, mm = value => general(value * 1e3, 4);
+  const result = [], wide = 2 * axes.length, mm = value => general(value * 1e3, 4);
   const ends = axes.map((axis, i) => {
     let low = Infinity, high = -Infinity;
     for (let k = 2 * i; k < rows.length; k += wide) { low = Math.min(low, rows[k]); high = Math.max(high, rows[k]); }
@@ -211,28 +211,28 @@ function reach_warnings({ axes, pose, limits, reach }, rows) {
     const cells = reach.grid[axis], [low, high] = ends[i], { travel } = limits[axis];
     if (!cells) return;
     const beyond = Math.max(cells[0] - Math.max(low, travel[0]), Math.min(high, travel[1]) - cells[1]);
-    if (beyond > reach.near) found.push(`axis ${axis} leaves the plant's grid of poses (${general(cells[0] * 1e3, 6)} mm to ${general(cells[1] * 1e3, 6)} mm) by ${mm(beyond)} mm: the modes there are those of the last cell; pack a wider grid`);
+    if (beyond > reach.near) result.push(`axis ${axis} leaves the plant's grid of poses (${general(cells[0] * 1e3, 6)} mm to ${general(cells[1] * 1e3, 6)} mm) by ${mm(beyond)} mm: the modes there are those of the last cell; pack a wider grid`);
   });
   axes.forEach((axis, i) => {
     const over = reach.over[axis], [low, high] = [Math.min(ends[i][0], pose[axis]), Math.max(ends[i][1], pose[axis])], distance = Math.max(pose[axis] - low, high - pose[axis]);
     if (!over || distance <= reach.near) return;
     const away = `axis ${axis} moves ${mm(distance)} mm away from the pose that the modes belong to`;
-    if (low < over.low - 1e-4 || high > over.high + 1e-4) { found.push(`${away}: farther than this page knows of; feedsim run says how the modes have changed there`); return; }
+    if (low < over.low - 1e-4 || high > over.high + 1e-4) { result.push(`${away}: farther than this page knows of; feedsim run says how the modes have changed there`); return; }
     if (!over.position) return;
     let largest = 0, mode = 0;
     for (const end of [low, high]) if (Math.abs(end - pose[axis]) > reach.near) frequencies_at(over, Math.round(end * 1e4) / 1e4).forEach((f, k) => {
       const change = f / over.frequency[k] - 1;
       if (Math.abs(change) > Math.abs(largest)) [largest, mode] = [change, k];
     });
-    if (Math.abs(largest) > reach.large) found.push(`${away}; there the mode at ${general(over.frequency[mode], 4)} Hz (${over.moving[mode]}) has changed its frequency by ${largest > 0 ? "+" : ""}${general(100 * largest, 2)} %; for a plant that follows: feedsim machine pack ... --poses ${axis}=20mm`);
+    if (Math.abs(largest) > reach.large) result.push(`${away}; there the mode at ${general(over.frequency[mode], 4)} Hz (${over.moving[mode]}) has changed its frequency by ${largest > 0 ? "+" : ""}${general(100 * largest, 2)} %; for a plant that follows: feedsim machine pack ... --poses ${axis}=20mm`);
   });
-  return found;
+  return result;
 }
 
 // Cubics through the four nearest positions.
 function frequencies_at({ position, there }, at) {
   const n = position.length;
-  let first = position.findIndex(each => each > at);
+  let first = position.findIndex(entry => entry > at);
   first = Math.min(Math.max((first < 0 ? n : first) - 2, 0), Math.max(n - 4, 0));
   const near = position.slice(first, first + 4), weights = near.map((x, i) => near.reduce((weight, other, j) => i === j ? weight : weight * (at - other) / (x - other), 1));
   return there[0].map((_, mode) => weights.reduce((sum, weight, i) => sum + weight * there[first + i][mode], 0));

@@ -1,17 +1,17 @@
 // Guided tours: what is wrong at first, which knobs to turn, when it is done. A lesson fits a page that has its picture and knobs.
-const circle_of = held => held.evaluate.find(each => each.kind === "circle") && held.plane, stop_axis = held => (held.evaluate.find(each => each.kind === "positioning") || {}).axis;
+const circle_of = held => held.evaluate.find(entry => entry.kind === "circle") && held.plane, stop_axis = held => (held.evaluate.find(entry => entry.kind === "positioning") || {}).axis;
 const key_of = (axis, name) => `machine.axes.${axis}.${name}`;
 const has = (held, axes, names) => axes.every(axis => names.every(name => held.knobs.some(knob => knob.key === key_of(axis, name))));
 // null while the figure is not known: causes come after the pictures.
-const figure_of = (view, end) => { const name = Object.keys(view.found.figures).find(each => each.endsWith(end) && !each.includes("tool.") && !each.includes("clockwise.")); return name ? view.found.figures[name][0] : null; };
+const figure_of = (view, end) => { const name = Object.keys(view.result.figures).find(entry => entry.endsWith(end) && !entry.includes("tool.") && !entry.includes("clockwise.")); return name ? view.result.figures[name][0] : null; };
 const COMPENSATION = "drive.backlash_compensation.value";
-const written_of = (held, end) => held.written[Object.keys(held.written).find(each => each.endsWith(end))][0];
+const written_of = (held, end) => held.written[Object.keys(held.written).find(entry => entry.endsWith(end))][0];
 const um = value => value === null ? "…" : `${value.toFixed(1)} µm`;
 
 // Of a turn: half the difference of its radii at 45° and 135°, what axes of unequal delay make.
-function oblique({ found }) {
-  const { angle, deviation } = contour(found.trace, found.tasks.find(each => each.kind === "circle").turn);
-  return 1e6 * 2 * mean(deviation.map((each, k) => each * Math.sin(2 * angle[k])));
+function oblique({ result }) {
+  const { angle, deviation } = contour(result.trace, result.tasks.find(entry => entry.kind === "circle").turn);
+  return 1e6 * 2 * mean(deviation.map((entry, k) => entry * Math.sin(2 * angle[k])));
 }
 
 const LESSONS = [

@@ -22,10 +22,10 @@ function solved(matrix, right) {
       for (let j = k + 1; j < wide; j++) A[i][j] = less(A[i][j], mul(f, A[k][j]));
     }
   }
-  return { determinant, x: right && A.map((row, i) => row.slice(n).map(each => over(each, row[i]))) };
+  return { determinant, x: right && A.map((row, i) => row.slice(n).map(entry => over(entry, row[i]))) };
 }
-const matrix_product = (A, B) => A.map(row => B[0].map((_, j) => row.reduce((sum, each, k) => plus(sum, mul(each, B[k][j])), NONE)));
-const with_one = A => A.map((row, i) => row.map((each, j) => i === j ? plus(ONE, each) : each));
+const matrix_product = (A, B) => A.map(row => B[0].map((_, j) => row.reduce((sum, entry, k) => plus(sum, mul(entry, B[k][j])), NONE)));
+const with_one = A => A.map((row, i) => row.map((entry, j) => i === j ? plus(ONE, entry) : entry));
 
 // --- the drive of an axis ---------------------------------------------------------------------------------------------
 
@@ -56,13 +56,13 @@ function linear_drive(of, { T_c, T_pos }, I_P) {
       return scaled(1 / ticks, sum);
     },
     // Measured positions, of those of a row of speeds and one of positions.
-    measured: (s, n, x) => indirect ? (turned => n.map(each => mul(turned, each)))(scaled(0.5 * T_c * I_P, over(plus(exponential(scaled(T_c, s)), ONE), exponential_less_1(scaled(T_c, s))))) : x,
+    measured: (s, n, x) => indirect ? (turned => n.map(entry => mul(turned, entry)))(scaled(0.5 * T_c * I_P, over(plus(exponential(scaled(T_c, s)), ONE), exponential_less_1(scaled(T_c, s))))) : x,
     speed_of_position: s => window ? scaled(-1 / (window * I_P), exponential_less_1(scaled(-window, s))) : null,
     from_speed: s => plus([of("K_p"), 0], integrator(s)),
     from_setpoint: s => plus([of("K_p"), 0], mul(integrator(s), reference(s))),
     // E and G_n with M_a = E M_s - G_n n_a.
     torque(s) {
-      const filtered = filters.reduce((found, { above, below, factor }) => mul(found, bilinear(s, above, below, factor, T_c)), ONE);
+      const filtered = filters.reduce((result, { above, below, factor }) => mul(result, bilinear(s, above, below, factor, T_c)), ONE);
       if (of("ideal_current_loop")) return [filtered, NONE];
       // At standstill the torque-forming current is alone: of the motor's equations its row is left.
       const R = of("R"), L_q = of("L_q"), K_t = of("K_t"), Phi = Math.exp(-R * T_c / L_q), per_voltage = R ? -Math.expm1(-R * T_c / L_q) / R : T_c / L_q, z = exponential(scaled(T_c, s)), late = scaled(-1, exponential_less_1(scaled(-T_c, s)));
@@ -74,7 +74,7 @@ function linear_drive(of, { T_c, T_pos }, I_P) {
 
 function bilinear(s, above, below, factor, T) {
   const difference = scaled(factor, exponential_less_1(scaled(T, s))), total = plus(exponential(scaled(T, s)), ONE), terms = [mul(difference, difference), mul(difference, total), mul(total, total)];
-  const sum = weights => terms.reduce((found, each, k) => plus(found, scaled(weights[k], each)), NONE);
+  const sum = weights => terms.reduce((result, entry, k) => plus(result, scaled(weights[k], entry)), NONE);
   return over(sum(above), sum(below));
 }
 
@@ -110,13 +110,13 @@ class ModalPlant {
 
   // Of every mode its pairs of poles, with weights: near critical damping ratios above and below it stand for it.
   kinds(hold) {
-    const found = [];
+    const result = [];
     this.table.omega_0.forEach((omega, mode) => {
       const zeta = this.table.damping[mode];
-      if (omega === 0) found.push({ mode, rigid: true });
-      else for (const [weight, away] of Math.abs(zeta - 1) < 1e-4 ? [[2 / 3, 2e-4], [2 / 3, -2e-4], [-1 / 6, 4e-4], [-1 / 6, -4e-4]] : [[1, 0]]) found.push({ mode, weight, ...this.poles(omega, zeta + away, hold) });
+      if (omega === 0) result.push({ mode, rigid: true });
+      else for (const [weight, away] of Math.abs(zeta - 1) < 1e-4 ? [[2 / 3, 2e-4], [2 / 3, -2e-4], [-1 / 6, 4e-4], [-1 / 6, -4e-4]] : [[1, 0]]) result.push({ mode, weight, ...this.poles(omega, zeta + away, hold) });
     });
-    return found;
+    return result;
   }
 
   poles(omega, zeta, hold) {
@@ -186,8 +186,8 @@ class LinearSystem {
   // Speeds and positions per torque of the motors (each running as its drive has it), and per torque of friction.
   ports(s) {
     const linear = this.plant.at(s, "linear");
-    if (!this.ideal.some(each => each)) return { motor: linear, friction: linear };
-    const held = this.plant.at(s, "held"), mixed = name => linear[name].map((row, i) => row.map((each, j) => this.ideal[j] ? held[name][i][j] : each));
+    if (!this.ideal.some(entry => entry)) return { motor: linear, friction: linear };
+    const held = this.plant.at(s, "held"), mixed = name => linear[name].map((row, i) => row.map((entry, j) => this.ideal[j] ? held[name][i][j] : entry));
     return { motor: { n: mixed("n"), x: mixed("x") }, friction: linear };
   }
 
@@ -196,7 +196,7 @@ class LinearSystem {
     const measured = this.drives.map((drive, i) => drive.measured(s, n[i], x[i]));
     const loop = this.drives.map((drive, i) => {
       const [E, G_n] = torques[i], C = mul(E, drive.from_speed(s)), V = drive.speed_of_position(s);
-      return n[i].map((each, j) => plus(mul(C, V ? mul(V, measured[i][j]) : each), mul(G_n, each)));
+      return n[i].map((entry, j) => plus(mul(C, V ? mul(V, measured[i][j]) : entry), mul(G_n, entry)));
     });
     return { loop, measured };
   }
@@ -209,7 +209,7 @@ class LinearSystem {
     for (let k = 0; k < m; k++) {
       const at = [0, s[1] + 2 * Math.PI * k / T_pos], { motor: { n, x } } = this.ports(at), torques = this.drives.map(drive => drive.torque(at)), { loop, measured } = this.torque_loop(at, torques, n, x);
       const given = this.drives.map((drive, i) => this.axes.map((_, j) => i === j ? mul(torques[i][0], drive.from_setpoint(at)) : NONE)), M = solved(with_one(loop), given).x, ramp = this.drives.map(drive => drive.ramp(at));
-      slow = matrix_product(measured, M).map((row, i) => row.map((each, j) => plus(slow[i][j], mul(each, ramp[j]))));
+      slow = matrix_product(measured, M).map((row, i) => row.map((entry, j) => plus(slow[i][j], mul(entry, ramp[j]))));
       if (k === 0) {
         const torque = solved(with_one(loop), this.axes.map((_, i) => this.axes.map((__, j) => i === j ? torques[i][0] : NONE))).x;
         fast = matrix_product(x, M);
@@ -217,13 +217,13 @@ class LinearSystem {
         pushed = { x: matrix_product(x, torque), measured: matrix_product(measured, torque) };
       }
     }
-    return { s, fast, ramps, pushed, controlled: with_one(slow.map((row, i) => row.map(each => scaled(this.drives[i].gain, each)))) };
+    return { s, fast, ramps, pushed, controlled: with_one(slow.map((row, i) => row.map(entry => scaled(this.drives[i].gain, entry)))) };
   }
 
   // The position of an axis as the position controllers answer.
   answering({ fast, ramps, controlled }, own, answer) {
-    const answers = solved(controlled, answer.map(each => [each])).x;
-    return answers.reduce((sum, each, j) => plus(sum, mul(fast[own][j], mul(ramps[j], each[0]))), NONE);
+    const answers = solved(controlled, answer.map(entry => [entry])).x;
+    return answers.reduce((sum, entry, j) => plus(sum, mul(fast[own][j], mul(ramps[j], entry[0]))), NONE);
   }
 
   // x_a over x_s, n_ffw being the setpoint's derivative over the lead.

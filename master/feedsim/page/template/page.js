@@ -1,7 +1,7 @@
 // The page: knobs, states, what the worker answers, figures, exports. Charts are made by pictures.js and drawn as in reports.
 const HELD = JSON.parse(document.getElementById("feedsim-page").textContent), KNOBS = HELD.knobs;
 const by = id => document.getElementById(id), START = KNOBS.map(knob => knob.value);
-const view = { state: [...START], undo: [], redo: [], found: null, causes: {}, loop: null, kept: null, kept_loop: null, lesson: null, step: 0 };
+const view = { state: [...START], undo: [], redo: [], result: null, causes: {}, loop: null, kept: null, kept_loop: null, lesson: null, step: 0 };
 const STEPS = 400; // of a slider
 
 // --- values -------------------------------------------------------------------------------------------------------------
@@ -41,15 +41,15 @@ function answered({ data }) {
   by("progress").value = 1;
   if (data.causes) {
     view.causes = data.causes;
-    for (const each of Object.values(data.causes)) Object.assign(view.found.figures, each.figures);
+    for (const entry of Object.values(data.causes)) Object.assign(view.result.figures, entry.figures);
     show_causes();
-    for (const task of view.found.tasks) if (data.causes[task.prefix]) draw_chart(`contour-${slug(task.prefix)}`, contour_now(task));
+    for (const task of view.result.tasks) if (data.causes[task.prefix]) draw_chart(`contour-${slug(task.prefix)}`, contour_now(task));
     show_figures();
     lesson_look();
     return;
   }
   if (data.warnings) {
-    view.found.warnings = data.warnings;
+    view.result.warnings = data.warnings;
     show_warnings();
     document.documentElement.dataset.warned = String(asked);
     return;
@@ -66,7 +66,7 @@ function answered({ data }) {
     tell(`With these values there is no run: ${data.problem}`, true);
     document.documentElement.dataset.shown = String(asked);
   } else {
-    view.found = data.found;
+    view.result = data.result;
     view.causes = null;
     for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.add("stale");
     by("warned").classList.add("stale");
@@ -94,11 +94,11 @@ function tell(text, wrong = false) {
 }
 
 function draw_chart(stem, chart) {
-  const figure = by(stem), live = lives.find(each => each.stem === stem), before = DATA.charts[stem];
+  const figure = by(stem), live = lives.find(entry => entry.stem === stem), before = DATA.charts[stem];
   DATA.charts[stem] = chart;
   if (!live) begin(figure);
   else {
-    const names = each => JSON.stringify([each.panels.length, each.panels.map(panel => (panel.curves || []).map(curve => curve.name))]);
+    const names = entry => JSON.stringify([entry.panels.length, entry.panels.map(panel => (panel.curves || []).map(curve => curve.name))]);
     live.chart = chart;
     live.told_apart();
     if (names(before) !== names(chart)) { live.hidden.clear(); live.bar.replaceChildren(); live.buttons(); live.zooms = chart.panels.map(() => ({ x: null, y: null })); }
@@ -127,18 +127,18 @@ function draw_on() {
 }
 
 // A kept state, where it has the circles and stops of the present one.
-const comparable = () => view.kept && view.kept.tasks.map(each => each.prefix).join() === view.found.tasks.map(each => each.prefix).join() ? view.kept : null;
-const contour_now = task => contour_chart(task, view.found, comparable(), view.causes?.[task.prefix]?.peaks);
+const comparable = () => view.kept && view.kept.tasks.map(entry => entry.prefix).join() === view.result.tasks.map(entry => entry.prefix).join() ? view.kept : null;
+const contour_now = task => contour_chart(task, view.result, comparable(), view.causes?.[task.prefix]?.peaks);
 
 function show() {
   tell("");
-  const { found, kept } = view, charts = [], same = comparable();
-  for (const task of found.tasks) {
+  const { result, kept } = view, charts = [], same = comparable();
+  for (const task of result.tasks) {
     const end = slug(task.prefix);
-    if (task.kind === "circle") charts.push([`contour-${end}`, () => contour_now(task)], [`torque-${end}`, () => torque_chart(task, found, same, HELD.signs)]);
-    else charts.push([`stop-${end}`, () => stop_chart(task, found, same, HELD.signs)]);
+    if (task.kind === "circle") charts.push([`contour-${end}`, () => contour_now(task)], [`torque-${end}`, () => torque_chart(task, result, same, HELD.signs)]);
+    else charts.push([`stop-${end}`, () => stop_chart(task, result, same, HELD.signs)]);
   }
-  charts.push(["following", () => following_chart(HELD.moved, found, kept)]);
+  charts.push(["following", () => following_chart(HELD.moved, result, kept)]);
   const seen = charts.map(([stem]) => { const { top, bottom } = by(stem).getBoundingClientRect(); return bottom > 0 && top < innerHeight; });
   to_draw = [...charts.filter((_, k) => seen[k]), ...charts.filter((_, k) => !seen[k])];
   drawing = asked;
@@ -159,7 +159,7 @@ function show_loop() {
 }
 
 function show_warnings() {
-  const list = view.found ? view.found.warnings.map(typeset) : [];
+  const list = view.result ? view.result.warnings.map(typeset) : [];
   by("warnings").replaceChildren(...list.map(text => { const item = document.createElement("li"); item.textContent = text; return item; }));
   by("warned").hidden = !list.length;
   by("warned").classList.remove("stale");
@@ -173,7 +173,7 @@ function show_causes() {
   for (const [prefix, { answer, swinging, rows }] of Object.entries(view.causes)) {
     const section = by(`why-${slug(prefix)}`);
     if (!section) continue;
-    section.querySelector(".answer").textContent = typeset([answer[0].toUpperCase() + answer.slice(1), swinging].filter(each => each).join(" "));
+    section.querySelector(".answer").textContent = typeset([answer[0].toUpperCase() + answer.slice(1), swinging].filter(entry => entry).join(" "));
     section.querySelector("tbody").replaceChildren(...rows.map(cells => {
       const row = document.createElement("tr");
       cells.forEach((text, k) => element("td", { class: ["", "number", "number", "number", "meaning"][k] }, row, text));
@@ -192,13 +192,13 @@ function figure_names({ figures, tasks }) {
 // Rows stay as long as their names and columns do: only what has changed is written.
 function show_figures() {
   for (const tile of document.querySelectorAll("#keys .key")) {
-    const name = tile.dataset.figure, figure = view.found.figures[name], written = HELD.written[name];
+    const name = tile.dataset.figure, figure = view.result.figures[name], written = HELD.written[name];
     tile.querySelector("b").textContent = figure ? three_digits(...figure) : "–";
     tile.querySelector("small").textContent = `as written ${three_digits(...written)}`;
     tile.classList.toggle("changed", Boolean(figure) && three_digits(...figure) !== three_digits(...written));
   }
-  const { found, kept } = view, heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"], names = figure_names(found), table = by("figures"), body = table.tBodies[0];
-  const text = figures => name => figures[name] ? four(...figures[name]) : "–", columns = [name => found.figures[name] ? four(...found.figures[name]) : null, ...(kept ? [text(kept.figures)] : []), text(HELD.written)];
+  const { result, kept } = view, heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"], names = figure_names(result), table = by("figures"), body = table.tBodies[0];
+  const text = figures => name => figures[name] ? four(...figures[name]) : "–", columns = [name => result.figures[name] ? four(...result.figures[name]) : null, ...(kept ? [text(kept.figures)] : []), text(HELD.written)];
   const layout = [...heads, ...names].join("\n");
   if (table.dataset.layout !== layout) {
     table.dataset.layout = layout;
@@ -231,7 +231,7 @@ const inputs = KNOBS.map((knob, k) => {
     if (!knob.choices.length && !Number.isFinite(value)) return;
     if (before === null) before = [...view.state];
     view.state[k] = knob.choices.length ? value : limited(knob, value);
-    if (done) { if (before.some((each, i) => each !== view.state[i])) { view.undo.push(before); view.redo.length = 0; } before = null; settle(); }
+    if (done) { if (before.some((entry, i) => entry !== view.state[i])) { view.undo.push(before); view.redo.length = 0; } before = null; settle(); }
     sync();
     ask();
   };
@@ -262,7 +262,7 @@ function sync() {
 }
 
 function go_to(state, remember = true) {
-  if (remember && state.some((each, k) => each !== view.state[k])) { view.undo.push([...view.state]); view.redo.length = 0; }
+  if (remember && state.some((entry, k) => entry !== view.state[k])) { view.undo.push([...view.state]); view.redo.length = 0; }
   view.state = [...state];
   settle();
   sync();
@@ -279,7 +279,7 @@ const changed = () => KNOBS.flatMap((knob, k) => view.state[k] === START[k] ? []
 function from_address() {
   const state = [...START];
   for (const part of location.hash.slice(1).split("&")) {
-    const [key, value] = part.split("=").map(each => { try { return decodeURIComponent(each || ""); } catch { return ""; } }), k = KNOBS.findIndex(knob => knob.key === key);
+    const [key, value] = part.split("=").map(entry => { try { return decodeURIComponent(entry || ""); } catch { return ""; } }), k = KNOBS.findIndex(knob => knob.key === key);
     if (k < 0) continue;
     if (KNOBS[k].choices.length ? KNOBS[k].choices.includes(value) : value !== "" && Number.isFinite(Number(value))) state[k] = KNOBS[k].choices.length ? value : limited(KNOBS[k], Number(value));
   }
@@ -293,7 +293,7 @@ const set_line = () => changed().map(([key, value, knob]) => `--set "${key}=${qu
 const yaml_text = () => `set:\n${changed().map(([key, value, knob]) => `  ${key}: ${quantity(knob, value)}\n`).join("")}`;
 
 function csv_text() {
-  const { trace } = view.found, names = Object.keys(trace), rows = [names.join(",")];
+  const { trace } = view.result, names = Object.keys(trace), rows = [names.join(",")];
   for (let k = 0; k < trace.time.length; k++) rows.push(names.map(name => String(trace[name][k])).join(","));
   return `${rows.join("\n")}\n`;
 }
@@ -324,17 +324,17 @@ on("more", () => {
 on("reset", () => go_to(START));
 on("keep", () => {
   const clear = view.kept !== null;
-  view.kept = clear ? null : view.found;
+  view.kept = clear ? null : view.result;
   view.kept_loop = clear ? null : view.loop;
   by("keep").setAttribute("aria-pressed", String(!clear));
   by("keep").textContent = clear ? "Keep this state" : "Drop the kept state";
-  if (view.found) show();
+  if (view.result) show();
   if (view.loop) show_loop();
 });
 on("link", () => { settle(); copy(location.href, "link"); });
 on("set", () => copy(set_line(), "settings for feedsim run"));
 on("yaml", () => copy(yaml_text(), "YAML of the changes"));
-on("csv", () => { if (view.found) save("result.csv", csv_text()); });
+on("csv", () => { if (view.result) save("result.csv", csv_text()); });
 by("axis").addEventListener("change", () => { chosen_axis = by("axis").value; ask(); });
 addEventListener("keydown", event => {
   if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.matches("input[type=number], textarea")) return;
@@ -363,7 +363,7 @@ function lesson_begin(lesson) {
 
 function lesson_look() {
   const { lesson } = view;
-  if (!lesson || !view.found) return;
+  if (!lesson || !view.result) return;
   const { text, done } = lesson.look(HELD, view);
   by("lesson-state").textContent = done ? `✓ ${text} ${lesson.after}` : text;
   by("lesson").classList.toggle("done", done);

@@ -34,57 +34,57 @@ const over = (name, x, y, colour, look) => curve(name, ...thinned(x, y), colour,
 function ring_step(most) {
   if (most >= 2 && most <= 20) return 10;
   const decade = 10 ** Math.floor(Math.log10(Math.max(most, 0.1)));
-  return [1, 2, 5, 10].map(each => each * decade).find(each => Math.max(most, 0.1) <= 1.5 * each);
+  return [1, 2, 5, 10].map(entry => entry * decade).find(entry => Math.max(most, 0.1) <= 1.5 * entry);
 }
 
 // peaks: heights over the fitted rest of the circle, once they are known; until then the marks carry no number.
-function contour_chart(task, found, kept, peaks) {
-  const { turn, back } = task, seen = contour(found.trace, turn), curves = [], unrolled = [];
+function contour_chart(task, result, kept, peaks) {
+  const { turn, back } = task, seen = contour(result.trace, turn), curves = [], unrolled = [];
   const draw = (name, measured, colour, look = {}) => {
-    const y = measured.deviation.map(each => each * 1e6), degrees = measured.angle.map(each => modulo(each * 180 / Math.PI, 360));
+    const y = measured.deviation.map(entry => entry * 1e6), degrees = measured.angle.map(entry => modulo(entry * 180 / Math.PI, 360));
     curves.push(curve(name, measured.angle, y, colour, { ascending: false, ...look }));
     const order = Array.from(degrees.keys()).sort((a, b) => degrees[a] - degrees[b]);
     unrolled.push(curve(name, order.map(k => degrees[k]), order.map(k => y[k]), colour, look));
   };
-  if (kept) draw("kept", contour(kept.trace, kept.tasks.find(each => each.prefix === task.prefix).turn), KEPT.colour, KEPT);
-  draw("tool point", contour(found.trace, turn, turn.axes.map(axis => `tcp.x_${axis}`)), "orange", { dash: "dashed", width: 1.2 });
+  if (kept) draw("kept", contour(kept.trace, kept.tasks.find(entry => entry.prefix === task.prefix).turn), KEPT.colour, KEPT);
+  draw("tool point", contour(result.trace, turn, turn.axes.map(axis => `tcp.x_${axis}`)), "orange", { dash: "dashed", width: 1.2 });
   draw("linear scales", seen, "blue", { width: 1.6 });
-  if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(found.trace, back), "blue", { dash: "dashed", width: 1.2 });
+  if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(result.trace, back), "blue", { dash: "dashed", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
-  const heights = peaks && new Map(peaks.filter(each => each.sense === turn.sense).map(each => [each.name, each.height]));
-  const marks = seen.glitches.filter(each => !heights || heights.get(each.name)).map(each => mark(each.angle, each.deviation * 1e6, heights ? `${each.name.replace("-", "−")}: ${fixed(heights.get(each.name) * 1e6, 2)} µm` : ""));
+  const heights = peaks && new Map(peaks.filter(entry => entry.sense === turn.sense).map(entry => [entry.name, entry.height]));
+  const marks = seen.glitches.filter(entry => !heights || heights.get(entry.name)).map(entry => mark(entry.angle, entry.deviation * 1e6, heights ? `${entry.name.replace("-", "−")}: ${fixed(heights.get(entry.name) * 1e6, 2)} µm` : ""));
   return { widths: [1.2, 1], panels: [
     { kind: "polar", title: `Contour error, ${turn.axes.join("-")}, R ${number(turn.radius * 1e3)} mm`, axes: turn.axes, radius: turn.radius * 1e3, ring, rings: most < 1.1 * ring ? 1 : 2, curves, marks,
       sense: back ? 0 : turn.sense, note: "" },
     panel("Over the angle", axis_of(`angle from ${turn.axes[0]}+`, "°", { span: [0, 360] }), axis_of("radius deviation", "µm"), unrolled, {
-      levels: [ZERO, level(seen.median * 1e6, "median (scales)", { dash: "dotted" })], marks: marks.map(each => ({ ...each, x: modulo(each.x * 180 / Math.PI, 360), text: "" })), linked: "angle" }),
+      levels: [ZERO, level(seen.median * 1e6, "median (scales)", { dash: "dotted" })], marks: marks.map(entry => ({ ...entry, x: modulo(entry.x * 180 / Math.PI, 360), text: "" })), linked: "angle" }),
   ] };
 }
 
-function torque_chart(task, found, kept, signs) {
+function torque_chart(task, result, kept, signs) {
   const panels = [];
   for (const axis of task.axes) {
     const sign = signs[axis], part = trace => { const [a, b] = rows_within(trace.time, task.turn.begin, task.turn.end); return name => trace[name].slice(a, b + 1); };
-    const now = part(found.trace), speed = now(`${axis}.n_a`), torque = name => now(name).map(each => sign * each), near = 0.12 * (largest(speed.map(Math.abs)) || 1);
+    const now = part(result.trace), speed = now(`${axis}.n_a`), torque = name => now(name).map(entry => sign * entry), near = 0.12 * (largest(speed.map(Math.abs)) || 1);
     const both = (x, look) => [over("motor M_a", x, torque(`${axis}.M_a`), "blue", { width: 1.2, ...look }), over("friction M_fr", x, torque(`${axis}.M_fr`), "purple", { width: 1.2, ...look })];
     const y = axis_of(sign > 0 ? "torque" : "torque, sign reversed", "N·m"), n_a = axis_of("motor speed n_a", "rad/s"), loops = () => {
-      const found = [curve("motor M_a", speed, torque(`${axis}.M_a`), "blue", { width: 1.2, ascending: false }), curve("friction M_fr", speed, torque(`${axis}.M_fr`), "purple", { width: 1.2, ascending: false })];
-      if (kept) { const before = part(kept.trace); found.unshift(curve("kept", before(`${axis}.n_a`), before(`${axis}.M_fr`).map(each => sign * each), KEPT.colour, { ...KEPT, ascending: false })); }
-      return found;
+      const result = [curve("motor M_a", speed, torque(`${axis}.M_a`), "blue", { width: 1.2, ascending: false }), curve("friction M_fr", speed, torque(`${axis}.M_fr`), "purple", { width: 1.2, ascending: false })];
+      if (kept) { const before = part(kept.trace); result.unshift(curve("kept", before(`${axis}.n_a`), before(`${axis}.M_fr`).map(entry => sign * entry), KEPT.colour, { ...KEPT, ascending: false })); }
+      return result;
     };
     const zeros = [ZERO, level(0, "", { dash: "", upright: true })];
-    panels.push(panel(`Axis ${axis}: torque over time`, TIME, y, both(found.trace.time.slice(...rows_of(found.trace, task.turn))), { levels: [ZERO], linked: "t" }),
-      panel("Torque over speed", n_a, y, loops(), { levels: zeros }), panel("Friction around the reversal", { ...n_a, span: [-near, near] }, y, loops().filter(each => each.name !== "motor M_a"), { levels: zeros }));
+    panels.push(panel(`Axis ${axis}: torque over time`, TIME, y, both(result.trace.time.slice(...rows_of(result.trace, task.turn))), { levels: [ZERO], linked: "t" }),
+      panel("Torque over speed", n_a, y, loops(), { levels: zeros }), panel("Friction around the reversal", { ...n_a, span: [-near, near] }, y, loops().filter(entry => entry.name !== "motor M_a"), { levels: zeros }));
   }
   return { widths: [1.25, 1, 1], panels };
 }
 const rows_of = (trace, turn) => { const [a, b] = rows_within(trace.time, turn.begin, turn.end); return [a, b + 1]; };
 
-function stop_chart(task, found, kept, signs) {
-  const { axis } = task, { trace, figures } = found, [a, b] = stop_rows(trace.time, task), t = trace.time.slice(a, b), sign = signs[axis], of = (name, factor = 1) => trace[name].slice(a, b).map(each => factor * each);
-  const end = level(task.end, "end of NC motion", { upright: true, dash: "dotted" }), past = (source, of_task, name, signal, colour, look) => { const seen = beyond(source, of_task, signal); return over(name, seen.time.map(each => (each - of_task.end) * 1e3), seen.y.map(each => each * 1e6), colour, look); };
+function stop_chart(task, result, kept, signs) {
+  const { axis } = task, { trace, figures } = result, [a, b] = stop_rows(trace.time, task), t = trace.time.slice(a, b), sign = signs[axis], of = (name, factor = 1) => trace[name].slice(a, b).map(entry => factor * entry);
+  const end = level(task.end, "end of NC motion", { upright: true, dash: "dotted" }), past = (source, of_task, name, signal, colour, look) => { const seen = beyond(source, of_task, signal); return over(name, seen.time.map(entry => (entry - of_task.end) * 1e3), seen.y.map(entry => entry * 1e6), colour, look); };
   const figure = name => figures[`${task.prefix}.${name}`][0], band = task.band * 1e6, curves = [], marks = [], own = beyond(trace, task, `${axis}.x_a`);
-  if (kept) curves.push(past(kept.trace, kept.tasks.find(each => each.prefix === task.prefix), "kept", `${axis}.x_a`, KEPT.colour, KEPT));
+  if (kept) curves.push(past(kept.trace, kept.tasks.find(entry => entry.prefix === task.prefix), "kept", `${axis}.x_a`, KEPT.colour, KEPT));
   curves.push(past(trace, task, "tool point", `tcp.x_${axis}`, "orange", { dash: "dashed" }), past(trace, task, "linear scale x_a", `${axis}.x_a`, "blue"));
   if (figure("overshoot") > 0) marks.push(mark((own.time[own.y.indexOf(largest(own.y))] - task.end) * 1e3, figure("overshoot"), `overshoot ${fixed(figure("overshoot"), 2)} µm`, "blue"));
   const most = Math.max(2.2 * band, ...[figure("overshoot"), figure("tool.overshoot")].filter(Number.isFinite)), last = Math.min(0.4, Math.max(task.until - task.end, 0.05)) * 1e3, settled = figure("settling_time");
@@ -97,8 +97,8 @@ function stop_chart(task, found, kept, signs) {
   ] };
 }
 
-function following_chart(axes, found, kept) {
-  const { trace } = found, rows = (name, colours, factor, source, look) => axes.map((axis, k) => over(look ? `kept, axis ${axis}` : `axis ${axis}`, source.time, source[`${axis}.${name}`].map(each => factor * each), colours(k), look || { width: 1.2 }));
+function following_chart(axes, result, kept) {
+  const { trace } = result, rows = (name, colours, factor, source, look) => axes.map((axis, k) => over(look ? `kept, axis ${axis}` : `axis ${axis}`, source.time, source[`${axis}.${name}`].map(entry => factor * entry), colours(k), look || { width: 1.2 }));
   const colours = k => COLOURS[k % COLOURS.length];
   return { widths: [1], panels: [
     panel("Following error", TIME, axis_of("following error", "µm"), [...(kept ? rows("x_e", colours, 1e6, kept.trace, { dash: "dotted", width: 1.1 }) : []), ...rows("x_e", colours, 1e6, trace)], { levels: [ZERO], linked: "t" }),
@@ -110,7 +110,7 @@ function bode_chart(loop, kept) {
   const f = axis_of("frequency", "Hz", { log: true }), axis = `axis ${loop.axis}`, levels = [level(0, "", { dash: "" })], under = [level(-180, "−180°")];
   if (loop.gain_at) levels.push(level(loop.gain_at, `gain margin ${fixed(20 * Math.log10(loop.gain_margin), 1)} dB`, { upright: true }));
   if (loop.phase_at) under.push(level(loop.phase_at, `phase margin ${fixed(loop.phase_margin, 0)}°`, { upright: true }));
-  const shown = (name, each) => [...(kept && kept.frequency.length ? [curve("kept", kept.frequency, kept[each], KEPT.colour, KEPT)] : []), curve(name, loop.frequency, loop[each], "blue")];
+  const shown = (name, entry) => [...(kept && kept.frequency.length ? [curve("kept", kept.frequency, kept[entry], KEPT.colour, KEPT)] : []), curve(name, loop.frequency, loop[entry], "blue")];
   return { widths: [1, 1], panels: [
     panel("Gain of the open position loop", f, axis_of("gain", "dB"), shown(axis, "gain"), { levels, linked: "f" }),
     panel("Phase of the open position loop", f, axis_of("phase", "°"), shown(axis, "phase"), { levels: under, linked: "f" }),

@@ -27,12 +27,12 @@ function rest_to_rest(length, speed, acceleration, jerk) {
     profile.a.push(a + t * j);
     profile.j.push(j);
   });
-  profile.times = profile.times.map(each => each * unit);
-  profile.s = profile.s.map(each => each * length);
+  profile.times = profile.times.map(entry => entry * unit);
+  profile.s = profile.s.map(entry => entry * length);
   profile.s[7] = length;
-  profile.v = profile.v.map(each => each * (length / unit));
-  profile.a = profile.a.map(each => each * (length / unit ** 2));
-  profile.j = profile.j.map(each => each * jerk);
+  profile.v = profile.v.map(entry => entry * (length / unit));
+  profile.a = profile.a.map(entry => entry * (length / unit ** 2));
+  profile.j = profile.j.map(entry => entry * jerk);
   profile.duration = profile.times[7];
   profile.steady = coast > 1e-9 * (4 * ramp + 2 * hold + coast) ? [profile.times[3], profile.times[4]] : null;
   return profile;
@@ -71,12 +71,12 @@ function line(motion, position) {
     axes: Object.keys(share), length,
     place: (axis, s) => origin[axis] + share[axis] * s,
     peaks(profile) {
-      const most = each => Math.max(...each.map(Math.abs)), peak = Math.max(...profile.v, at(profile, profile.duration / 2).v), found = {};
+      const most = entry => Math.max(...entry.map(Math.abs)), peak = Math.max(...profile.v, at(profile, profile.duration / 2).v), result = {};
       for (const axis in share) {
         const ends = [origin[axis], origin[axis] + share[axis] * length];
-        found[axis] = { low: Math.min(...ends), high: Math.max(...ends), speed: Math.abs(share[axis]) * peak, acceleration: Math.abs(share[axis]) * most(profile.a) };
+        result[axis] = { low: Math.min(...ends), high: Math.max(...ends), speed: Math.abs(share[axis]) * peak, acceleration: Math.abs(share[axis]) * most(profile.a) };
       }
-      return found;
+      return result;
     },
   };
 }
@@ -89,8 +89,8 @@ function circular(motion, position, sense) {
     axes: motion.plane, length: R * sweep, centre, sense,
     place: (axis, s) => axis === first ? centre[0] + R * Math.cos(angle(s)) : centre[1] + R * Math.sin(angle(s)),
     peaks(profile, step) {
-      const found = {}, quarter = Math.PI / 2, instants = [];
-      for (const axis of motion.plane) found[axis] = { low: Infinity, high: -Infinity, speed: 0, acceleration: 0 };
+      const result = {}, quarter = Math.PI / 2, instants = [];
+      for (const axis of motion.plane) result[axis] = { low: Infinity, high: -Infinity, speed: 0, acceleration: 0 };
       for (let k = 0; k < profile.j.length; k++) for (let i = 0; i < POINTS_PER_PHASE; i++)
         instants.push(profile.times[k] + (profile.times[k + 1] - profile.times[k]) * i / (POINTS_PER_PHASE - 1));
       for (let t = 0; t < profile.duration; t += step) instants.push(t);
@@ -99,14 +99,14 @@ function circular(motion, position, sense) {
       for (const t of instants) {
         const { s, v, a } = at(profile, t), phi = angle(s), along = [-sense * Math.sin(phi), sense * Math.cos(phi)], inward = [-Math.cos(phi), -Math.sin(phi)];
         motion.plane.forEach((axis, i) => {
-          const x = this.place(axis, s), peak = found[axis];
+          const x = this.place(axis, s), peak = result[axis];
           peak.low = Math.min(peak.low, x);
           peak.high = Math.max(peak.high, x);
           peak.speed = Math.max(peak.speed, Math.abs(v * along[i]));
           peak.acceleration = Math.max(peak.acceleration, Math.abs(a * along[i] + v * v / R * inward[i]));
         });
       }
-      return found;
+      return result;
     },
   };
 }
@@ -126,7 +126,7 @@ function points_of(machine, motions) {
     for (const axis of path.axes) for (let k = 1; k <= cycles; k++) points[axis].push(path.place(axis, at(profile, k * T_ipo).s));
     hold(machine.axes.filter(axis => !path.axes.includes(axis)), cycles);
     const peaks = path.peaks(profile, T_ipo);
-    for (const axis in peaks) problems.push(...violations(machine, axis, position[axis], peaks[axis]).map(each => `motions.${index} (${motion.kind}): ${each}`));
+    for (const axis in peaks) problems.push(...violations(machine, axis, position[axis], peaks[axis]).map(entry => `motions.${index} (${motion.kind}): ${entry}`));
     const start = instant * T_ipo;
     instant += cycles;
     return { start, end: start + profile.duration, profile, path };
@@ -144,7 +144,7 @@ function points_of(machine, motions) {
       Object.assign(position, motion.to || {});
       segment.end = done.end;
       segment.axes = path.axes.filter(axis => path.place(axis, 1) !== path.place(axis, 0));
-      segment.steady = done.profile.steady && done.profile.steady.map(each => done.start + each);
+      segment.steady = done.profile.steady && done.profile.steady.map(entry => done.start + entry);
     } else {
       const senses = motion.direction === "both" ? [1, -1] : [motion.direction === "counterclockwise" ? 1 : -1];
       senses.forEach((sense, k) => {
@@ -156,8 +156,8 @@ function points_of(machine, motions) {
         const path = circular(motion, position, sense), { start, end, profile } = drive(path, motion, index), once = 2 * Math.PI * motion.radius;
         segment.circles.push({
           axes: motion.plane, centre: path.centre, radius: motion.radius, sense,
-          turns: Array.from({ length: motion.turns }, (_, n) => [n, n + 1].map(each => start + time_at(profile, motion.radius * (2 * Math.PI * each)))),
-          steady: profile.steady && profile.steady.map(each => start + each), turn_time: once / Math.max(...profile.v),
+          turns: Array.from({ length: motion.turns }, (_, n) => [n, n + 1].map(entry => start + time_at(profile, motion.radius * (2 * Math.PI * entry)))),
+          steady: profile.steady && profile.steady.map(entry => start + entry), turn_time: once / Math.max(...profile.v),
         });
         segment.end = end;
       });
@@ -170,19 +170,19 @@ function points_of(machine, motions) {
 }
 
 function violations(machine, axis, start, peaks) {
-  const limit = machine.limits[axis], [least, most] = limit.travel, found = [], digits = (value, n) => String(Number(value.toPrecision(n)));
+  const limit = machine.limits[axis], [least, most] = limit.travel, result = [], digits = (value, n) => String(Number(value.toPrecision(n)));
   const outside = [...new Set([peaks.low, peaks.high])].filter(x => x !== start && !(x >= least - ROUNDING && x <= most + ROUNDING));
-  if (outside.length) found.push(`axis ${axis} reaches ${outside.map(x => digits(x * 1e3, 7)).join(" and ")} mm; allowed travel ${digits(least * 1e3, 7)} to ${digits(most * 1e3, 7)} mm`);
-  if (peaks.speed > limit.speed * (1 + ROUNDING)) found.push(`axis ${axis} reaches a speed of ${digits(peaks.speed * 60, 5)} m/min; allowed at most ${digits(limit.speed * 60, 5)} m/min`);
-  if (peaks.acceleration > limit.acceleration * (1 + ROUNDING)) found.push(`axis ${axis} reaches an acceleration of ${digits(peaks.acceleration, 5)} m/s^2; allowed at most ${digits(limit.acceleration, 5)} m/s^2`);
-  return found;
+  if (outside.length) result.push(`axis ${axis} reaches ${outside.map(x => digits(x * 1e3, 7)).join(" and ")} mm; allowed travel ${digits(least * 1e3, 7)} to ${digits(most * 1e3, 7)} mm`);
+  if (peaks.speed > limit.speed * (1 + ROUNDING)) result.push(`axis ${axis} reaches a speed of ${digits(peaks.speed * 60, 5)} m/min; allowed at most ${digits(limit.speed * 60, 5)} m/min`);
+  if (peaks.acceleration > limit.acceleration * (1 + ROUNDING)) result.push(`axis ${axis} reaches an acceleration of ${digits(peaks.acceleration, 5)} m/s^2; allowed at most ${digits(limit.acceleration, 5)} m/s^2`);
+  return result;
 }
 
 // Position and slope of the C2 cubic spline through `points` a knot apart, at rest on both sides, `ratio` values per knot.
 function spline(points, ratio) {
   const origin = points[0], last = points.length - 1, N = points.length + 2 * REST_POINTS;
   const x = new Float64Array(last * ratio + 1), v = new Float64Array(last * ratio + 1);
-  if (points.every(each => each === origin)) return { x: x.fill(origin), v };
+  if (points.every(entry => entry === origin)) return { x: x.fill(origin), v };
   const y = new Float64Array(N), slope = new Float64Array(N), over = new Float64Array(N);
   for (let k = 0; k < N; k++) y[k] = points[Math.min(Math.max(k - REST_POINTS, 0), last)] - origin;
   for (let k = 1; k < N - 1; k++) { // elimination of 1 4 1; the slopes at both ends are 0

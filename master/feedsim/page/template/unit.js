@@ -55,7 +55,7 @@ class Unit {
 
   call(name, ...values) {
     this.said.length = 0;
-    if (this.of[name](...values) > WARNING) throw new Error(this.said.map(each => each[1]).join("; ") || `${name} failed`);
+    if (this.of[name](...values) > WARNING) throw new Error(this.said.map(entry => entry[1]).join("; ") || `${name} failed`);
   }
 
   set([reference, kind, value]) {
@@ -67,7 +67,7 @@ class Unit {
   async run({ parameters, feeds, rows, ratio, every, T_c, reals, flags }, between) {
     const total = (rows.length / feeds.length - 1) * ratio, width = reals.length + flags.length, count = Math.floor(total / every) + 1;
     this.call("page_reset");
-    for (const each of parameters) this.set(each);
+    for (const entry of parameters) this.set(entry);
     const real = this.references("reals", reals), flag = this.references("flags", flags), fed = this.references("feeds", feeds);
     const fedRows = this.numbers("rows", rows), out = this.room("out", width * count);
     this.call("page_begin", total * T_c, feeds.length, fed, fedRows);
@@ -78,9 +78,9 @@ class Unit {
       this.call("page_run", first, last, end, T_c, ratio, feeds.length, fed, fedRows, every, reals.length, real, flags.length, flag, at);
       if (between && !end && !(await between(last / total))) return null;
     }
-    const found = new Float64Array(this.of.memory.buffer, out, width * count);
+    const result = new Float64Array(this.of.memory.buffer, out, width * count);
     const columns = Array.from({ length: width }, () => new Float64Array(count));
-    for (let k = 0, at = 0; k < count; k++) for (let i = 0; i < width; i++) columns[i][k] = found[at++];
+    for (let k = 0, at = 0; k < count; k++) for (let i = 0; i < width; i++) columns[i][k] = result[at++];
     return { time: Float64Array.from({ length: count }, (_, k) => k * every * T_c), columns };
   }
 }

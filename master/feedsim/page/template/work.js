@@ -2,7 +2,7 @@
 
 // Motions and parameters of a state: values of the knobs, in the order of data.knobs, SI.
 function applied(data, state) {
-  const motions = structuredClone(data.motions), own = new Map(data.parameters.map(each => [each[0], each]));
+  const motions = structuredClone(data.motions), own = new Map(data.parameters.map(entry => [entry[0], entry]));
   data.knobs.forEach((knob, k) => {
     const value = knob.choices.length && knob.sets.length ? Number(state[k] === "true") : state[k];
     for (const [reference, kind, name, factor] of knob.sets) if (own.has(reference) || state[k] !== knob.value) own.set(reference, [reference, kind, value * factor, name]);
@@ -49,23 +49,23 @@ class Work {
     const wide = 2 * machine.axes.length, { rows, segments, problems } = plan(machine, motions, this.given);
     if (problems.length) throw new Error(problems.join("\n"));
     const duration = (rows.length / wide - 1) * T_pos, tasks = tasks_of(data.evaluate, segments, duration);
-    const found = await this.unit.run({ parameters, feeds: machine.feeds, rows, ratio: Math.round(T_pos / T_c), every: machine.every, T_c,
+    const result = await this.unit.run({ parameters, feeds: machine.feeds, rows, ratio: Math.round(T_pos / T_c), every: machine.every, T_c,
       reals: machine.signals.map(name => machine.references[name][0]), flags: machine.axes.flatMap(axis => machine.flags.map(flag => machine.references[`${axis}.${flag}`][0])) }, between);
-    if (!found) return null;
-    const trace = { time: found.time }, names = [...machine.signals, ...machine.axes.flatMap(axis => machine.flags.map(flag => `${axis}.${flag}`))];
-    names.forEach((name, k) => { trace[name] = found.columns[k]; });
+    if (!result) return null;
+    const trace = { time: result.time }, names = [...machine.signals, ...machine.axes.flatMap(axis => machine.flags.map(flag => `${axis}.${flag}`))];
+    names.forEach((name, k) => { trace[name] = result.columns[k]; });
     return { trace, rows, segments, tasks, figures: figures_of(trace, tasks), warnings: limit_warnings(machine, trace) };
   }
 
   // Why the circles of a run are not round.
   causes(state, { trace, tasks, figures }) {
-    const { machine } = this.data, system = this.linear(state), gain = {}, drag = {}, following = {}, circle = tasks.find(each => each.kind === "circle");
+    const { machine } = this.data, system = this.linear(state), gain = {}, drag = {}, following = {}, circle = tasks.find(entry => entry.kind === "circle");
     if (!circle) return {};
     const first = 1 / (circle.turn.end - circle.turn.begin), highest = Math.max(2, Math.min(DRAG.HIGHEST / first, 0.4 / machine.cycles.T_c / first, DRAG.MOST));
     const kept = [], at = k => kept[k] ||= system.position_loops(k * first), loops = Array.from({ length: Math.ceil((highest - 1) / 2) }, (_, k) => at(2 * k + 1));
     for (const axis of circle.axes) {
       gain[axis] = system.position_reference(axis, loops[0]);
-      drag[axis] = loops.map(each => system.drag(axis, each));
+      drag[axis] = loops.map(entry => system.drag(axis, entry));
       const waves = circle.turn.radius / machine.I_P[axis], count = Math.max(1, Math.floor(Math.min(waves + PITCH_HARMONICS * (1 + Math.cbrt(waves)), 0.4 / machine.cycles.T_c / first, 500)));
       following[axis] = Array.from({ length: count }, (_, k) => system.following(axis, at(k + 1)));
     }
@@ -73,10 +73,10 @@ class Work {
   }
 
   // All that a run warns of; null where the newest knob has ended it.
-  async warnings(state, found, between) {
+  async warnings(state, result, between) {
     const { machine } = this.data, system = this.linear(state, this.judged_plant);
     const loops = await judge(system, machine.locked, between);
-    return loops && [...machine.warnings, ...loop_warnings(loops), ...exchange_warnings(machine, this.named(state), this.judged_plant.table), ...reach_warnings(machine, found.rows), ...found.warnings];
+    return loops && [...machine.warnings, ...loop_warnings(loops), ...exchange_warnings(machine, this.named(state), this.judged_plant.table), ...reach_warnings(machine, result.rows), ...result.warnings];
   }
 
   bode(state, axis, between) {

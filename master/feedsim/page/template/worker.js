@@ -11,20 +11,20 @@ onmessage = async ({ data: asked }) => {
     return;
   }
   const { id, state, axis } = asked, latest = async () => { await breath(); return id === newest; };
-  let told = performance.now();
+  let reported = performance.now();
   const on = async share => {
-    if (performance.now() - told > PROGRESS) { postMessage({ id, share }); told = performance.now(); }
+    if (performance.now() - reported > PROGRESS) { postMessage({ id, share }); reported = performance.now(); }
     return latest();
   };
   newest = id;
   if (!(await latest())) return;
   try {
-    const found = await work.run(state, on);
-    if (!found) return;
-    postMessage({ id, found });
+    const result = await work.run(state, on);
+    if (!result) return;
+    postMessage({ id, result });
     if (!(await latest())) return;
-    postMessage({ id, causes: work.causes(state, found) });
-    const warnings = await work.warnings(state, found, latest);
+    postMessage({ id, causes: work.causes(state, result) });
+    const warnings = await work.warnings(state, result, latest);
     if (!warnings) return;
     postMessage({ id, warnings });
   } catch (error) { postMessage({ id, problem: String(error.message || error) }); }

@@ -1,206 +1,6 @@
 // Draws charts (feedsim.report.chart) as SVG: panels, polar panels, grids. Colours are the page's CSS variables, so that
-// one drawing serves light, dark and paper. chart_use.js has what a reader does with them.
-const SPACE = "http://www.w3.org/2000/svg";
-const {
-  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, FINER_UNITS, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
-  NARROWEST, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP,
-} = LAYOUT; // feedsim.report.chart.layout
-const NARROW = 640, COLUMN = 250;
-const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
-
-function make(name, attributes = {}, parent = null, text = null) {
-  const found = document.createElementNS(SPACE, name);
-  for (const key in attributes) found.setAttribute(key, attributes[key]);
-  if (text !== null) found.textContent = text;
-  if (parent) parent.append(found);
-  return found;
-}
-
-const colour = name => `var(--${name})`;
-const number = (value, digits = 6) => Number.isFinite(value) ? written(Number(value.toPrecision(digits))) : "–";
-
-function written(value) {
-  const size = Math.abs(value), [mantissa, power] = value.toExponential().replace("+", "").split("e");
-  const text = size && (size < 1e-4 || size >= 1e7) ? `${mantissa}×10${[...power].map(each => each === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[each]).join("")}` : String(value);
-  return text.replaceAll("-", "−");
-}
-const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(?=0(\.0*)?$)/, "").replace("-", "−");
-
-// Three digits that count, alike in all cells.
-const three = value => Math.abs(value) >= 100 || (value && Math.abs(value) < 1e-4) ? number(value, 3) : value.toPrecision(3).replace("-", "−");
-
-const unit_of = axis => axis.unit ? ` ${axis.unit}` : "";
-// Words over curves.
-const HALO = { "fill": "var(--ink)", "font-size": 11, "paint-order": "stroke", stroke: "var(--ground)", "stroke-width": 3, "stroke-linejoin": "round" };
-const label_of = axis => axis.unit ? `${axis.label} [${axis.unit}]` : axis.label;
-
-// A scale from values to pixels and back; within: linear to this distance from zero, beyond logarithmic both ways.
-function scale(low, high, first, last, { log, symlog: within }) {
-  const by = within ? value => Math.sign(value) * Math.log10(1 + Math.abs(value) / within) : log ? Math.log10 : value => value;
-  const back = within ? seen => Math.sign(seen) * within * (10 ** Math.abs(seen) - 1) : log ? seen => 10 ** seen : seen => seen;
-  const from = by(low), per = (last - first) / (by(high) - from || 1);
-  const to = value => first + (by(value) - from) * per;
-  to.back = pixel => back(from + (pixel - first) / per);
-  return to;
-}
-
-function step_of(rough) {
-  const decade = 10 ** Math.floor(Math.log10(rough));
-  return decade * [1, 2, 5, 10].find(each => each * decade >= rough * 0.999);
-}
-
-function ticks(axis, low, high, most) {
-  if (axis.names.length) {
-    const every = Math.ceil(axis.names.length / Math.max(1, most));
-    return axis.names.map((name, k) => ({ at: k, text: name })).filter((each, k) => k % every === 0 && k >= low && k <= high);
-  }
-  if (axis.symlog) {
-    const decades = [];
-    for (let at = 10 ** Math.ceil(Math.log10(axis.symlog * 2) - 1e-9); at <= Math.max(-low, high); at *= 10) decades.push(at);
-    const seen = [...decades.map(at => -at).reverse(), 0, ...decades].filter(at => at >= low && at <= high);
-    if (seen.length > 1) return seen.map(at => ({ at, text: number(at) }));
-  }
-  if (axis.log && high / low > 8) {
-    const found = [], decades = Math.log10(high / low), few = decades < 2.2, every = Math.max(1, Math.round(decades / most));
-    for (let k = Math.floor(Math.log10(low)); k <= Math.log10(high); k++)
-      for (const part of [1, 2, 3, 4, 5, 6, 7, 8, 9]) {
-        const at = part * 10 ** k;
-        if (at >= low * 0.9999 && at <= high * 1.0001)
-          found.push({ at, text: (part === 1 && k % every === 0) || (few && (part === 2 || part === 5)) ? number(at) : "" });
-      }
-    return found;
-  }
-  const turns = axis.unit === "°" && high - low > 60;
-  let step = turns ? PHASES.find(each => (high - low) / each <= most) || 3600 : step_of((high - low) / most);
-  const marked = each => Math.floor(high / each + 1e-9) - Math.ceil(low / each - 1e-9) + 1;
-  for (let less; marked(step) < MIN_TICKS; step = less) { // one or two ticks are no scale
-    less = finer(step, turns);
-    if (!less || (marked(step) > 1 && marked(less) > most + 2)) break;
-  }
-  return marks_of(axis, low, high, step);
-}
-
-// Ticks a step apart, with as many digits as the step asks for. Where these are many, what they all have in common
-// stands at the axis, and the ticks say what is added to it.
-function marks_of(axis, low, high, step) {
-  const found = [], digits = at => Math.max(6, Math.floor(Math.log10(Math.abs(at) || step)) - Math.floor(Math.log10(step) + 1e-9) + 1);
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push({ at: k * step });
-  if (Math.max(...found.map(each => digits(each.at))) <= MAX_DIGITS) for (const each of found) each.text = number(each.at, digits(each.at));
-  else {
-    const whole = 10 ** Math.ceil(Math.log10(high - low) - 1e-9), common = Math.floor(low / whole + 1e-9) * whole, part = high - common;
-    const [factor, unit] = (FINER_UNITS[axis.unit] || []).find(([factor]) => part * factor >= 1) || (FINER_UNITS[axis.unit] || [[1, axis.unit]]).at(-1);
-    for (const each of found) each.text = number(Math.round((each.at - common) / step) * step * factor, 4);
-    found.common = `${number(common, Math.floor(Math.log10(Math.abs(common) || 1)) - Math.floor(Math.log10(whole) + 1e-9) + 1)}${unit_of(axis)}`;
-    found.unit = unit;
-  }
-  return found;
-}
-
-// Ticks along the abscissa whose words do not touch: fewer of them, in the end every second one without its word.
-// end: where the last word has to stop.
-function apart(found_of, across, most, end = Infinity) {
-  const touching = all => {
-    const words = all.filter(each => each.text), middle = each => Math.min(across(each.at), end - 3.6 * each.text.length);
-    return words.some((each, k) => k && Math.abs(middle(each) - middle(words[k - 1])) < 3.5 * (each.text.length + words[k - 1].text.length) + 6);
-  };
-  let found = found_of(most);
-  while (most > 2 && touching(found)) found = found_of(--most);
-  for (let k = 0; k < 3 && touching(found); k++) found.filter(each => each.text).forEach((each, i) => { if (i % 2) each.text = ""; });
-  return found;
-}
-
-// What stands along an axis: quantity and unit, or what its ticks are added to.
-function title_of(axis, found) {
-  return found.common ? `${axis.label} − ${found.common}${found.unit ? ` [${found.unit}]` : ""}` : label_of(axis);
-}
-
-// A range that a zoom asks for, no narrower than its numbers have digits for.
-function wide_enough([low, high], axis) {
-  const least = axis.log || axis.names.length ? 0 : NARROWEST * Math.max(Math.abs(low), Math.abs(high));
-  return high - low >= least ? [low, high] : [(low + high - least) / 2, (low + high + least) / 2];
-}
-
-// First row whose abscissa is not below; x ascending.
-function row_at(x, value) {
-  let low = 0, high = x.length;
-  while (low < high) { const middle = (low + high) >> 1; if (x[middle] < value) low = middle + 1; else high = middle; }
-  return low;
-}
-
-function nearest(x, value) {
-  const k = row_at(x, value);
-  return k > 0 && (k === x.length || value - x[k - 1] <= x[k] - value) ? k - 1 : k;
-}
-
-// A curve as a path: of each column of pixels its extremes, where there are more rows than can be told apart.
-function path_of(x, y, across, up, range, columns) {
-  const parts = [];
-  let pen = "M", last_a = NaN, last_b = NaN;
-  const point = k => {
-    const a = Math.round(10 * across(x[k])) / 10, b = Math.round(10 * up(y[k])) / 10;
-    if (!Number.isFinite(a) || !Number.isFinite(b)) { pen = "M"; return; }
-    if (pen === "L" && a === last_a && b === last_b) return; // the same tenth of a pixel
-    parts.push(pen, a, " ", b);
-    [pen, last_a, last_b] = ["L", a, b];
-  };
-  if (!range) { for (let k = 0; k < x.length; k++) point(k); return parts.join(""); }
-  const begin = Math.max(0, row_at(x, range[0]) - 1), end = Math.min(x.length, row_at(x, range[1]) + 2);
-  if (end - begin < 4 * columns) { for (let k = begin; k < end; k++) point(k); return parts.join(""); }
-  for (let k = begin; k < end;) {
-    const column = Math.floor(across(x[k]));
-    let least = k, most = k, last = k;
-    for (; last < end && Math.floor(across(x[last])) === column; last++) {
-      if (y[last] < y[least]) least = last;
-      if (y[last] > y[most]) most = last;
-    }
-    for (const each of [...new Set([k, Math.min(least, most), Math.max(least, most), last - 1])]) point(each);
-    k = last;
-  }
-  return parts.join("");
-}
-
-function finer(step, turns) {
-  if (turns) return PHASES.filter(each => each < step).pop();
-  const decade = 10 ** Math.floor(Math.log10(step) + 1e-9);
-  return decade * { 1: 0.5, 2: 1, 5: 2 }[Math.round(step / decade)];
-}
-
-const styled = curve => ({
-  fill: "none", stroke: colour(curve.colour), "stroke-width": curve.width, "stroke-linejoin": "round",
-  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.grey ? { class: `grey-${curve.grey}` } : {}), ...(curve.faint ? { "stroke-opacity": FAINT } : {}),
-});
-
-// Least and largest ordinate of the curves that are seen, with room about them.
-function range_of(panel, curves, values, span) {
-  let low = Infinity, high = -Infinity;
-  const seen = value => {
-    if (Number.isFinite(value) && (!panel.y.log || value > 0)) { low = Math.min(low, value); high = Math.max(high, value); }
-  };
-  for (const curve of curves) {
-    const x = values(curve.x), y = values(curve.y);
-    if (curve.filled) seen(0);
-    for (let k = 0; k < x.length; k++) if (x[k] >= span[0] && x[k] <= span[1]) seen(y[k]);
-  }
-  for (const mark of panel.marks) if (mark.x >= span[0] && mark.x <= span[1]) seen(mark.y);
-  if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
-  if (panel.y.log) return [low / 1.3, high * 1.3];
-  if (panel.y.symlog) { // room in the measure of the axis, on either side of zero
-    const more = (value, sign) => value + sign * (3 * ROOM * Math.abs(value) + (high > low ? 0 : panel.y.symlog));
-    return [more(low, -1), more(high, 1)];
-  }
-  if (high > low) [low, high] = wide_enough([low, high], panel.y);
-  const room = ROOM * (high - low) || 0.05 * Math.abs(high) || 1;
-  return [low - (low === 0 && curves.some(each => each.filled) ? 0 : room), high + room];
-}
-
-function whole_span(panel, values) {
-  if (panel.x.span) return panel.x.span;
-  let low = Infinity, high = -Infinity;
-  for (const curve of panel.curves) for (const each of values(curve.x))
-    if (Number.isFinite(each) && (!panel.x.log || each > 0)) { low = Math.min(low, each); high = Math.max(high, each); }
-  if (low > high) return [0, 1];
-  return high > low ? [low, high] : [low - 0.5, low + 0.5];
-}
+// one drawing serves light, dark and paper. chart_scale.js has what it computes with,
+// chart_use.js what a reader does with the charts.
 
 // The title of a panel, as small as its room makes it.
 function headed(text, x, room, parent) {
@@ -233,7 +33,7 @@ class Taken {
     for (const [, pen, a, b] of d.matchAll(/([ML])(\S+) ([^ML]+)/g)) {
       const point = [Number(a), Number(b)];
       const steps = pen === "L" && last && !dots ? Math.min(500, Math.ceil(Math.hypot(point[0] - last[0], point[1] - last[1]) / 3)) : 1;
-      for (let k = 1; k <= steps; k++) this.dot(...(steps > 1 ? point.map((each, j) => last[j] + (each - last[j]) * k / steps) : point));
+      for (let k = 1; k <= steps; k++) this.dot(...(steps > 1 ? point.map((entry, j) => last[j] + (entry - last[j]) * k / steps) : point));
       last = point;
     }
   }
@@ -248,7 +48,7 @@ class Taken {
         covered += this.cells[Math.floor((b - inner.y) / BLOCK) * this.across + Math.floor((a - inner.x) / BLOCK)] || 0;
       return far + (covered ? 120 + 10 * covered : 0);
     };
-    const costs = places.map(cost), best = places[costs.indexOf(costs.reduce((least, each) => Math.min(least, each), Infinity))] || { x: inner.x + 4, y: inner.y + 12 };
+    const costs = places.map(cost), best = places[costs.indexOf(costs.reduce((least, entry) => Math.min(least, entry), Infinity))] || { x: inner.x + 4, y: inner.y + 12 };
     this.box(best.x, best.y - 10, wide, tall);
     return best;
   }
@@ -256,21 +56,21 @@ class Taken {
 
 // What a panel shows of its curves, its ticks upwards, and the room that these need at the left.
 function frame_of(panel, box, values, hidden, zoom) {
-  const shown = panel.curves.filter(each => !hidden.has(each.name));
+  const shown = panel.curves.filter(entry => !hidden.has(entry.name));
   const span = zoom.x || whole_span(panel, values);
   const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
   const above = top_of(panel), tall = box.height - above - BOTTOM;
   const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / TICK_HEIGHT)));
-  const widest_of = (texts, wide, more) => texts.reduce((most, each) => Math.max(most, wide * each.length + more), 0);
-  const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(each => each.text || ""), 6.6, 30);
+  const widest_of = (texts, wide, more) => texts.reduce((most, entry) => Math.max(most, wide * entry.length + more), 0);
+  const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(entry => entry.text || ""), 6.6, 30);
   return { shown, span, height, above, tall, heights, widest_of, left: Math.min(Math.max(LEFT, beside), box.width * 0.45) };
 }
 
 // The frames of all panels; those below one another begin alike.
 function frames_of(panels, boxes, values, hidden, zooms) {
   const frames = panels.map((panel, k) => panel.kind === "xy" ? frame_of(panel, boxes[k], values, hidden, zooms[k]) : null);
-  frames.forEach((each, k) => {
-    if (each) each.shared = Math.max(...frames.map((other, j) => other && boxes[j].x === boxes[k].x && boxes[j].width === boxes[k].width ? other.left : 0));
+  frames.forEach((entry, k) => {
+    if (entry) entry.shared = Math.max(...frames.map((other, j) => other && boxes[j].x === boxes[k].x && boxes[j].width === boxes[k].width ? other.left : 0));
   });
   return frames;
 }
@@ -278,9 +78,9 @@ function frames_of(panels, boxes, values, hidden, zooms) {
 // What stands upright beside a panel: in two lines where one is longer than the panel, smaller where these are, too.
 // x: of the foot of the outermost line, at the left or (right) at the right.
 function upright(text, x, inner, most, parent, right = false) {
-  const spaces = [...text.matchAll(/ /g)].map(each => each.index), middle = text.length / 2;
-  const cut = 6.4 * text.length > inner.height && spaces.length ? spaces.reduce((best, each) => Math.abs(each - middle) < Math.abs(best - middle) ? each : best) : text.length;
-  const lines = [text.slice(0, cut), text.slice(cut + 1)].filter(Boolean), longest = Math.max(...lines.map(each => each.length));
+  const spaces = [...text.matchAll(/ /g)].map(entry => entry.index), middle = text.length / 2;
+  const cut = 6.4 * text.length > inner.height && spaces.length ? spaces.reduce((best, entry) => Math.abs(entry - middle) < Math.abs(best - middle) ? entry : best) : text.length;
+  const lines = [text.slice(0, cut), text.slice(cut + 1)].filter(Boolean), longest = Math.max(...lines.map(entry => entry.length));
   const size = Math.max(8, Math.min(12, 12 * most / (6.4 * longest)));
   lines.forEach((line, k) => make("text", { transform: `translate(${x + LINE_PITCH * size * (right ? k + 1 - lines.length : k - (lines.length - 1) / 6)} ${inner.y + inner.height / 2}) rotate(-90)`,
     "text-anchor": "middle", fill: colour("ink"), ...(size < 12 ? { "font-size": size.toFixed(1) } : {}) }, parent, line));
@@ -314,17 +114,17 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
     upright(title_of(panel.y, heights), 13, inner, box.height - 8, part);
   if (panel.x.also) {
     const [label, unit, factor] = panel.x.also, named = { label, unit, log: panel.x.log, names: [] };
-    const found = apart(most => ticks(named, span[0] * factor, span[1] * factor, most), at => across(at / factor), Math.max(2, Math.floor(inner.width / TICK_WIDTH)));
-    for (const tick of found)
+    const result = apart(most => ticks(named, span[0] * factor, span[1] * factor, most), at => across(at / factor), Math.max(2, Math.floor(inner.width / TICK_WIDTH)));
+    for (const tick of result)
       if (tick.text) make("text", { x: across(tick.at / factor), y: inner.y - 5, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
-    make("text", { x: inner.x + inner.width / 2, y: inner.y - 20, "text-anchor": "middle", fill: colour("ink") }, part, title_of(named, found));
+    make("text", { x: inner.x + inner.width / 2, y: inner.y - 20, "text-anchor": "middle", fill: colour("ink") }, part, title_of(named, result));
   }
   if (panel.y.also) {
     const [label, unit, factor] = panel.y.also, named = { label, unit, log: panel.y.log, names: [] };
-    const found = ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / TICK_HEIGHT)));
-    for (const tick of found)
+    const result = ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / TICK_HEIGHT)));
+    for (const tick of result)
       if (tick.text) make("text", { x: right + 6, y: up(tick.at / factor) + 4, fill: colour("ink") }, part, tick.text);
-    upright(title_of(named, found), box.width - 5, inner, box.height - 8, part, true);
+    upright(title_of(named, result), box.width - 5, inner, box.height - 8, part, true);
   }
   const clip = make("clipPath", { id }, part);
   make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height }, clip);
@@ -434,10 +234,10 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   make("circle", { cx: centre[0], cy: centre[1], r: half + 8 }, clip);
   const field = make("g", { "clip-path": `url(#${id})` }, part);
   part.append(words);
-  const shown = panel.curves.filter(each => !hidden.has(each.name));
+  const shown = panel.curves.filter(entry => !hidden.has(entry.name));
   for (const curve of shown) {
     const angle = values(curve.x), deviation = values(curve.y), n = angle.length;
-    const points = Array.from(angle, (each, k) => place(each, deviation[k]).map(value => Math.round(10 * value) / 10).join(" ")).filter((point, k, all) => point !== all[k - 1]);
+    const points = Array.from(angle, (entry, k) => place(entry, deviation[k]).map(value => Math.round(10 * value) / 10).join(" ")).filter((point, k, all) => point !== all[k - 1]);
     const ends = n ? Math.abs(deviation[n - 1] - deviation[0]) < CLOSED * reach : false;
     make("path", { ...styled(curve), d: n ? `M${points.join("L")}${ends ? "Z" : ""}` : "" }, field);
   }
@@ -452,8 +252,8 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   }
   if (half > 190) panel.note.split("\n").forEach((line, k) => make("text", { x: centre[0], y: centre[1] - 0.3 * one + 14 * k, "text-anchor": "middle", fill: colour("muted"), "font-size": 11 }, part, line));
   if (panel.sense) {
-    const arc = [50, 130].map(each => each * Math.PI / 180).sort((a, b) => panel.sense * (a - b)), r = 0.16 * one, low = centre[1] + 0.36 * one;
-    const [from, to] = arc.map(each => [centre[0] + r * Math.cos(each), low - r * Math.sin(each)]);
+    const arc = [50, 130].map(entry => entry * Math.PI / 180).sort((a, b) => panel.sense * (a - b)), r = 0.16 * one, low = centre[1] + 0.36 * one;
+    const [from, to] = arc.map(entry => [centre[0] + r * Math.cos(entry), low - r * Math.sin(entry)]);
     make("path", { d: `M${from.join(" ")}A${r} ${r} 0 0 ${panel.sense > 0 ? 0 : 1} ${to.join(" ")}`, fill: "none", stroke: colour("muted"), "stroke-width": 1.3 }, part);
     const back = panel.sense;
     make("path", { d: `M${to[0]} ${to[1]}l${7 * back} -1l${-2.5 * back} -5.5Z`, fill: colour("muted") }, part);
@@ -494,15 +294,15 @@ function draw_grid(panel, box, parent, values) {
   if (panel.best) make("rect", { x: left + panel.best[1] * width, y: top + panel.best[0] * height, width, height, fill: "none", stroke: colour("ink"), "stroke-width": 2.2 }, part);
   return { panel, part };
 }
-const grid_left = panel => Math.min(260, 16 + 6.4 * panel.rows.reduce((most, each) => Math.max(most, each.length), 0));
-const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, each) => Math.max(most, each.length), 0);
+const grid_left = panel => Math.min(260, 16 + 6.4 * panel.rows.reduce((most, entry) => Math.max(most, entry.length), 0));
+const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, entry) => Math.max(most, entry.length), 0);
 
 const top_of = panel => TOP + (panel.x.also ? SECOND : 0);
 
 // As many columns as have room; of more than two that are alike half of them, before they stand below one another.
 function columns_of(widths, width) {
   if (width >= Math.max(NARROW, COLUMN * widths.length)) return widths;
-  const half = widths.length / 2, alike = widths.every(each => each === widths[0]);
+  const half = widths.length / 2, alike = widths.every(entry => entry === widths[0]);
   return half > 1 && Number.isInteger(half) && alike ? columns_of(widths.slice(half), width) : [1];
 }
 
@@ -513,14 +313,14 @@ function placed(chart, width, tall = 1) {
   let y = 4;
   for (let k = 0; k < chart.panels.length; k += columns.length) {
     const row = chart.panels.slice(k, k + columns.length);
-    const widths = columns.map(each => (width - GAP * (columns.length - 1)) * each / total);
+    const widths = columns.map(entry => (width - GAP * (columns.length - 1)) * entry / total);
     const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND * Math.min(1, tall + 0.2)) + 24
       : panel.kind === "grid" ? grid_top(panel) + ROW * panel.rows.length + 12
       : panel.y.names.length ? TOP + BOTTOM + 26 * panel.y.names.length : HEIGHT * tall * panel.height + BOTTOM + top_of(panel) - TOP);
     const height = Math.max(...natural);
     let x = 0;
     row.forEach((panel, j) => {
-      const own = row.some(each => each.kind === "polar") && panel.kind === "xy" ? Math.min(height, 360) : height;
+      const own = row.some(entry => entry.kind === "polar") && panel.kind === "xy" ? Math.min(height, 360) : height;
       boxes.push({ x, y, aside, width: widths[j], height: panel.y && panel.y.names.length ? natural[j] : own });
       x += widths[j] + GAP;
     });

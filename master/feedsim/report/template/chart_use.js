@@ -10,20 +10,20 @@ function values(k) {
   if (!arrays.has(k)) {
     const [rows, text] = DATA.arrays[k], raw = atob(text), bytes = new Uint8Array(raw.length);
     for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-    let found = new Float32Array(rows ? 0 : bytes.buffer);
+    let result = new Float32Array(rows ? 0 : bytes.buffer);
     if (rows) {
       let count = 0; // of the blocks: 16 bytes each, and 4 bytes a row
       while (16 * count + 4 * rows * count < raw.length) count++;
       const heads = new Float64Array(bytes.buffer, 0, 2 * count), whole = new Int32Array(bytes.buffer, 16 * count);
-      found = new Float64Array(whole.length);
+      result = new Float64Array(whole.length);
       for (let i = 0; i < whole.length; i++) {
         const block = 2 * Math.floor(i / rows);
-        found[i] = whole[i] === -(2 ** 31) ? NaN : heads[block] + heads[block + 1] * whole[i];
+        result[i] = whole[i] === -(2 ** 31) ? NaN : heads[block] + heads[block + 1] * whole[i];
       }
-      found.steps = heads.filter((each, i) => i % 2);
-      found.in_one = rows;
+      result.steps = heads.filter((entry, i) => i % 2);
+      result.in_one = rows;
     }
-    arrays.set(k, found);
+    arrays.set(k, result);
   }
   return arrays.get(k);
 }
@@ -39,11 +39,11 @@ function counting(k, row, seen = 0) {
 }
 
 function element(name, attributes, parent, text = null) {
-  const found = document.createElement(name);
-  for (const key in attributes) found.setAttribute(key, attributes[key]);
-  if (text !== null) found.textContent = text;
-  parent.append(found);
-  return found;
+  const result = document.createElement(name);
+  for (const key in attributes) result.setAttribute(key, attributes[key]);
+  if (text !== null) result.textContent = text;
+  parent.append(result);
+  return result;
 }
 
 const written_at = (k, row, [low, high]) => {
@@ -66,7 +66,7 @@ class Live {
     this.room.className = "live";
     this.bar = element("div", { class: "bar" }, this.room);
     this.field = element("div", { class: "field" }, this.room);
-    this.told = element("div", { class: "told", hidden: "" }, this.field);
+    this.readout = element("div", { class: "readout", hidden: "" }, this.field);
     this.spoken = element("div", { class: "spoken", role: "status", "aria-live": "polite" }, this.room);
     this.buttons();
     figure.querySelector(".still").replaceWith(this.room);
@@ -74,7 +74,7 @@ class Live {
 
   // On grey paper lines that differ in colour alone are told apart by dashes (style.css.j2).
   told_apart() {
-    const seen = [], lines = this.chart.panels.flatMap(panel => panel.curves || []).filter(each => !each.dots && !each.filled && !each.dash && each.width < 5);
+    const seen = [], lines = this.chart.panels.flatMap(panel => panel.curves || []).filter(entry => !entry.dots && !entry.filled && !entry.dash && entry.width < 5);
     for (const curve of lines) {
       if (!seen.includes(curve.colour)) seen.push(curve.colour);
       curve.grey = seen.indexOf(curve.colour);
@@ -122,7 +122,7 @@ class Live {
     const gap = RING_GAPS[panel.rings] * panel.rings;
     const needed = panel.curves.map(curve => {
       const sizes = Array.from(values(curve.y)).filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
-      const inwards = -values(curve.y).reduce((least, each) => Number.isFinite(each) ? Math.min(least, each) : least, 0);
+      const inwards = -values(curve.y).reduce((least, entry) => Number.isFinite(entry) ? Math.min(least, entry) : least, 0);
       return sizes.length ? Math.max(sizes[sizes.length >> 1] / (1 + 0.16), inwards * gap / 0.9) : 0;
     });
     const most = Math.log2(panel.ring * panel.rings / Math.max(...needed, 1e-9));
@@ -154,7 +154,7 @@ class Live {
     this.svg = svg;
     if (focused) svg.focus({ preventScroll: true });
     this.listen();
-    const polar = this.drawn.find(each => each.panel.kind === "polar");
+    const polar = this.drawn.find(entry => entry.panel.kind === "polar");
     if (polar) {
       const { rings, radius } = polar.panel, times = RING_GAPS[rings] * rings / polar.reach * radius * 1e3;
       this.times.textContent = `${Number(times.toPrecision(3)).toLocaleString("en")}×`;
@@ -241,7 +241,7 @@ class Live {
 
   leave() {
     while (this.over.childNodes.length > 1) this.over.lastChild.remove();
-    this.told.hidden = true;
+    this.readout.hidden = true;
   }
 
   // Values of all panels linked with one at an abscissa; of loops the point nearest to the pointer.
@@ -249,8 +249,8 @@ class Live {
     this.leave();
     const own = this.chart.panels[k], linked = own.kind === "polar" ? "angle" : own.linked, lines = [];
     let head = "";
-    this.drawn.forEach((each, j) => {
-      const { panel, box, inner, across, up, shown } = each;
+    this.drawn.forEach((entry, j) => {
+      const { panel, box, inner, across, up, shown } = entry;
       const polar = panel.kind === "polar" && linked === "angle";
       if (j !== k && !(polar || (linked && panel.linked === linked))) return;
       if (panel.kind === "xy") {
@@ -264,7 +264,7 @@ class Live {
         if (panel.kind === "polar") {
           let least = Infinity;
           for (let i = 0; i < xs.length; i++) { const off = Math.abs(((xs[i] * 180 / Math.PI - x) % 360 + 540) % 360 - 180); if (off < least) { least = off; row = i; } }
-          if (row >= 0) spot = each.place(xs[row], ys[row]);
+          if (row >= 0) spot = entry.place(xs[row], ys[row]);
         } else if (curve.ascending && !curve.dots) {
           row = nearest(xs, x);
           if (!Number.isFinite(ys[row]) || x < xs[0] - 1e-9 * Math.abs(xs[0]) || x > xs[xs.length - 1] * (1 + 1e-9)) continue;
@@ -276,11 +276,11 @@ class Live {
         }
         if (row < 0 || !spot) continue;
         make("circle", { cx: box.x + spot[0], cy: box.y + spot[1], r: 3.4, fill: colour(curve.colour), stroke: colour("ground"), "stroke-width": 1 }, this.over);
-        if (panel.kind === "polar") { if (j === k) lines.push([curve, `${written_at(curve.y, row, [-each.reach, each.reach])} µm`, panel.title]); continue; }
+        if (panel.kind === "polar") { if (j === k) lines.push([curve, `${written_at(curve.y, row, [-entry.reach, entry.reach])} µm`, panel.title]); continue; }
         const loop = !curve.ascending || curve.dots, name = axis => axis.names.length ? axis.names[Math.round(xs[row])] : null;
-        const value = panel.y.names.length ? panel.y.names[Math.round(ys[row])] ?? "" : `${written_at(curve.y, row, each.height)}${unit_of(panel.y)}`;
-        lines.push([curve, loop ? `${value} at ${name(panel.x) ?? written_at(curve.x, row, each.span) + unit_of(panel.x)}` : value, panel.y.label]);
-        if (!loop && j === k && !head) head = `${panel.x.label} ${name(panel.x) ?? written_at(curve.x, row, each.span) + unit_of(panel.x)}`;
+        const value = panel.y.names.length ? panel.y.names[Math.round(ys[row])] ?? "" : `${written_at(curve.y, row, entry.height)}${unit_of(panel.y)}`;
+        lines.push([curve, loop ? `${value} at ${name(panel.x) ?? written_at(curve.x, row, entry.span) + unit_of(panel.x)}` : value, panel.y.label]);
+        if (!loop && j === k && !head) head = `${panel.x.label} ${name(panel.x) ?? written_at(curve.x, row, entry.span) + unit_of(panel.x)}`;
       }
     });
     if (own.kind === "polar") head = `angle ${number(x, 4)}°`;
@@ -290,27 +290,27 @@ class Live {
   }
 
   tell(head, lines, k, x, pointer) {
-    this.told.replaceChildren();
-    if (head) element("b", {}, this.told, head);
+    this.readout.replaceChildren();
+    if (head) element("b", {}, this.readout, head);
     const several = new Set(lines.map(line => line[2])).size > 1;
     let of = "";
     for (const [curve, value, what] of lines) {
-      if (several && what !== of) element("i", {}, this.told, of = what);
-      const row = element("div", {}, this.told);
+      if (several && what !== of) element("i", {}, this.readout, of = what);
+      const row = element("div", {}, this.readout);
       const sample = make("svg", { width: 20, height: 10, "aria-hidden": "true" }, row);
       this.sample(curve, 0, 5, sample);
       element("span", {}, row, ` ${curve.name ? `${curve.name}: ` : ""}${value}`);
     }
-    this.told.hidden = false;
+    this.readout.hidden = false;
     const { box, across, inner, place } = this.drawn[k], scaled = this.svg.getBoundingClientRect().width / this.width;
     const [a, b] = place ? place(x * Math.PI / 180, 0) : [pointer ? pointer.x : across(x), pointer ? pointer.y : inner.y + 20];
-    const left = (box.x + a) * scaled, size = this.told.offsetWidth;
-    this.told.style.left = `${Math.max(0, left + 16 + size > this.room.clientWidth ? left - 16 - size : left + 16)}px`;
-    this.told.style.top = `${Math.max(0, (box.y + b) * scaled - 12)}px`;
+    const left = (box.x + a) * scaled, size = this.readout.offsetWidth;
+    this.readout.style.left = `${Math.max(0, left + 16 + size > this.room.clientWidth ? left - 16 - size : left + 16)}px`;
+    this.readout.style.top = `${Math.max(0, (box.y + b) * scaled - 12)}px`;
   }
 
   key(event) {
-    const usable = this.drawn.map((each, k) => each.panel.kind === "grid" ? -1 : k).filter(k => k >= 0);
+    const usable = this.drawn.map((entry, k) => entry.panel.kind === "grid" ? -1 : k).filter(k => k >= 0);
     if (!usable.length || event.ctrlKey || event.altKey || event.metaKey) return;
     const k = this.cursor ? this.cursor.panel : usable[0], { panel, span, across, inner } = this.drawn[k], polar = panel.kind === "polar";
     const middle = polar ? 0 : across.back(inner.x + inner.width / 2);
@@ -383,7 +383,7 @@ class Live {
         if (this.hidden.has(curve.name)) continue;
         const [x, y] = panel.kind === "polar" ? ["angle [rad]", "radius deviation [µm]"] : [label_of(panel.x), label_of(panel.y)];
         if (curve.x !== last) columns.push([x, values(last = curve.x), last]);
-        columns.push([[panel.title, curve.name, y].filter(each => each).join(", "), values(curve.y), curve.y]);
+        columns.push([[panel.title, curve.name, y].filter(entry => entry).join(", "), values(curve.y), curve.y]);
       }
     });
     const rows = [columns.map(([name]) => quoted(name)).join(",")];

@@ -314,9 +314,9 @@ def shapes() -> Drawing:
 
 
 ANSWER = ("XZ: circular deviation G 8.19 µm, mostly: Z stays behind for a moment",
-          "where it reverses, 7.97 µm, 40.3 ms wide: friction, which friction",
+          "where it reverses, 8.06 µm, 40.6 ms wide: friction, which friction",
           "compensation takes away.")  # fmt: skip
-TILES = (("8.19 µm", "circular deviation G"), ("7.97 µm", "reversal peak of Z"), ("4.96 µm", "reversal peak of X"))
+TILES = (("8.19 µm", "circular deviation G"), ("8.06 µm", "reversal peak of Z"), ("5.00 µm", "reversal peak of X"))
 NOTES = (
     (66, ("The answer: how large, the largest", "cause, and what takes it away.", "Doubts stand ahead of it, in red.")),
     (142, ("Whose numbers these are.",)),

@@ -111,13 +111,34 @@ def test_what_needs_lugre_says_so(fmus: Path) -> None:
     with pytest.raises(InputError, match="axis Z: its friction has the law gms; one unit holds LuGre alone"):
         fs.run(scenario, set=[change, "coupling.units=one"], fmus=fmus)
     with pytest.raises(InputError, match=r"axis Z: its friction has the law gms; .* needs LuGre"):
-        fs.tune_drive(scenario, "Z", set=[change], fmus=fmus)
+        fs.write_page(scenario, set=[change], fmus=fmus)
 
 
-def test_a_compensation_takes_the_file_of_lugre_alone(tmp_path: Path) -> None:
+def test_a_compensation_takes_the_law_of_its_axis(fmus: Path, tmp_path: Path) -> None:
+    """By the same law what is left is no hundredth; a model of the other law, as well as it fits, leaves more."""
+    circle, change = SCENARIOS / "xz_circle.yaml", f"machine.axes.Z.friction={gms()}"
     file = tmp_path / "friction.yaml"
     file.write_text(f"# a remark\n{gms()}\n")
-    with pytest.raises(InputError, match=r"friction\.yaml:2: law: gms is not taken here; allowed: lugre$"):
+    own = fs.compensate(circle, set=[change], table=False, fmus=fmus)
+    by_file = fs.compensate(circle, friction={"Z": file}, set=[change], table=False, fmus=fmus)
+    other = fs.compensate(circle, friction={"Z": file}, table=False, fmus=fmus)
+    before, after = (float(own.figures[f"{when}.glitch_Z"]) for when in ("before", "after"))
+    assert after < 0.01 * before
+    assert float(by_file.figures["after.glitch_Z"]) == after
+    assert float(other.figures["after.glitch_Z"]) > 10 * after
+
+
+def test_errors_of_a_compensation_are_tried_of_what_its_law_has(fmus: Path) -> None:
+    change = [f"machine.axes.{axis}.friction={gms()}" for axis in "XZ"]
+    table = fs.compensate(SCENARIOS / "xz_circle.yaml", set=change, fmus=fmus).compensation.table
+    assert {"spread", "C", "sigma_0", "delay"} <= {row.what for row in table}
+    assert not {"W", "gamma"} & {row.what for row in table}
+
+
+def test_a_compensation_says_whose_law_is_missing(tmp_path: Path) -> None:
+    file = tmp_path / "friction.yaml"
+    file.write_text(f"# a remark\n{gms(W='2 deg')}\n")
+    with pytest.raises(InputError, match=r"friction\.yaml:2: .*the law gms has no W, but spread, skew, C"):
         fs.compensate(SCENARIOS / "xz_circle.yaml", friction={"Z": file}, out=tmp_path / "out")
 
 

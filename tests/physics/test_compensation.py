@@ -67,7 +67,7 @@ def left_with(described: Scenario, error: float, fmus: Path) -> Quality:
     delays = {axis: lag_of(machine.axes[axis].drive, machine.cycles).delay + error for axis in axes}
     with FrictionLaw(fmus) as law:
         frictions = {axis: machine.axes[axis].friction for axis in axes}
-        torque = friction_feedforward(machine, program, frictions, delays, law)
+        torque = friction_feedforward(machine, program, frictions, delays, lambda _: law)
     result = cosim.run(described, program=program, fmus=fmus, torque_feedforward=torque)
     return quality(result.trace, circle_task(described, program).turn)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -36,6 +37,15 @@ def test_display_sign_turns_torques_over_and_says_so() -> None:
     assert "reversed" not in plain.caption
     assert "drawn with reversed sign" in reversed_.caption
     assert plain.svg != reversed_.svg
+
+
+@pytest.mark.parametrize("run", [positioning_run, circle_run])
+def test_files_of_pictures_say_that_the_machine_is_synthetic(run: Callable[[], FakeRun]) -> None:
+    """A picture travels without its page (test_charts.py draws a remark)."""
+    pictures = draw(run(), evaluate(run()))
+    assert len(pictures) > 1
+    for picture in pictures:
+        assert "Synthetic machine" in picture.remark, picture.stem
 
 
 def test_torques_are_drawn_as_they_are_by_default() -> None:

@@ -13,13 +13,13 @@ from feedsim.analysis.compensation_errors import Changed, Quality, Variation, er
 from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.analysis.figures import Array, Figure
 from feedsim.cosim.feedforward import Lag, friction_feedforward, lag_of
-from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.cosim.friction_law import FrictionLaws
 from feedsim.cosim.run import run
 from feedsim.errors import InputError
 from feedsim.findings import Note, Wrong
 from feedsim.judge import JudgedRun, judged
 from feedsim.nc import Program
-from feedsim.scenario import CircleTest, Friction, Machine, Recording, Scenario
+from feedsim.scenario import CircleTest, FrictionParameters, Machine, Recording, Scenario
 from feedsim.trace import Trace
 
 Progress = Callable[[str, int, int], None]
@@ -49,7 +49,7 @@ class Compensation:
     """
 
     task: CircleTask
-    frictions: Mapping[str, Friction]
+    frictions: Mapping[str, FrictionParameters]
     lags: Mapping[str, Lag]
     delays: Mapping[str, float]
     feedforward: Trace
@@ -107,7 +107,7 @@ def compensate(
     scenario: Scenario,
     program: Program,
     *,
-    frictions: Mapping[str, Friction] | None = None,
+    frictions: Mapping[str, FrictionParameters] | None = None,
     delays: Mapping[str, float] | None = None,
     table: bool = True,
     machines: Mapping[str, Machine] | None = None,
@@ -137,7 +137,7 @@ def compensate(
             check_moves(axis, program, f"{what} of axis {axis}: ")
     machine = scenario.machine
     used = {
-        axis: (frictions or {}).get(axis) or machine.shipped_friction(axis, "compensation without friction of its own")
+        axis: (frictions or {}).get(axis) or machine.friction_of(axis, "compensation without friction of its own")
         for axis in axes
     }
     lags = lags_of(scenario, [axis for axis in axes if axis not in (delays or {})])
@@ -148,14 +148,14 @@ def compensate(
     def told(what: str) -> Callable[[int, int], None]:
         return lambda done, total: tell(what, done, total)
 
-    with FrictionLaw(fmus) as law:
-        torque = friction_feedforward(machine, program, used, applied, law)
+    with FrictionLaws(fmus) as laws:
+        torque = friction_feedforward(machine, program, used, applied, laws)
         before = judged(run(plain, program=program, fmus=fmus, progress=told("without compensation")))
         after = judged(
             run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
         )
         variations, changed = errors_and_changes(
-            scenario, program, turn, used, applied, law, machines or {}, fmus=fmus, progress=tell
+            scenario, program, turn, used, applied, laws, machines or {}, fmus=fmus, progress=tell
         ) if table else ((), ())  # fmt: skip
     left_before, left_after = (quality(result.trace, turn) for result in (before, after))
     figures = circle_figures(turn, before.trace, after.trace)
@@ -250,7 +250,7 @@ def _not_judged(axes: Sequence[str], turn: Turn) -> list[str]:
 
 
 def _same_model(
-    machine: Machine, used: Mapping[str, Friction], lags: Mapping[str, Lag], table: Sequence[Variation]
+    machine: Machine, used: Mapping[str, FrictionParameters], lags: Mapping[str, Lag], table: Sequence[Variation]
 ) -> list[str]:
     """That the compensation knows the machine exactly, as it never does a real one, and what errors would leave."""
     same = [axis for axis, friction in used.items() if friction == machine.axes[axis].friction and axis in lags]

@@ -13,14 +13,14 @@ from feedsim.analysis.figures import Array
 from feedsim.cosim.feedforward import Law, friction_feedforward
 from feedsim.cosim.run import run
 from feedsim.nc import Program
-from feedsim.scenario import Friction, Machine, Recording, Scenario
+from feedsim.scenario import FrictionParameters, Machine, Recording, Scenario
 from feedsim.trace import Trace
 
 Progress = Callable[[str, int, int], None]
 
 DELAY_ERRORS = (-1e-3, -0.5e-3, -0.2e-3, 0.2e-3, 0.5e-3, 1e-3)  # s
 # Parameters that are wrong together: a static torque below the Coulomb torque is none.
-VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("sigma_1",), ("v_s",))
+VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("spread",), ("C",), ("sigma_1",), ("v_s",))
 FRICTION_ERROR = 0.1
 OF_ENGAGING = ("W", "gamma")  # of no effect where W is 0
 
@@ -79,9 +79,9 @@ def errors_and_changes(
     scenario: Scenario,
     program: Program,
     turn: Turn,
-    frictions: Mapping[str, Friction],
+    frictions: Mapping[str, FrictionParameters],
     delays: Mapping[str, float],
-    law: Law,
+    laws: Callable[[FrictionParameters], Law],
     machines: Mapping[str, Machine],
     *,
     fmus: Path | None,
@@ -104,7 +104,7 @@ def errors_and_changes(
         n_ffw={axis: n[: last + 1] for axis, n in program.n_ffw.items()},
     )
     instants = last * round(machine.cycles.T_pos / machine.cycles.T_c) + 1
-    wanted: list[tuple[str, float, str, Mapping[str, Friction], Mapping[str, float]]] = [
+    wanted: list[tuple[str, float, str, Mapping[str, FrictionParameters], Mapping[str, float]]] = [
         ("delay", error * 1e3, "ms", frictions, {axis: delay + error for axis, delay in delays.items()})
         for error in DELAY_ERRORS
     ]
@@ -115,9 +115,9 @@ def errors_and_changes(
                 wanted.append((", ".join(names), share * 100, "%", varied, delays))
     total = len(wanted) + len(machines)
 
-    def feedforward(set_: Mapping[str, Friction], delay: Mapping[str, float]) -> dict[str, Array]:
+    def feedforward(set_: Mapping[str, FrictionParameters], delay: Mapping[str, float]) -> dict[str, Array]:
         # Of the whole program, then cut: a delay below 0 looks ahead.
-        torque = friction_feedforward(machine, program, set_, delay, law)
+        torque = friction_feedforward(machine, program, set_, delay, laws)
         return {axis: values[:instants] for axis, values in torque.items()}
 
     def left(own: Machine, torque: Mapping[str, Array] | None) -> Quality:
@@ -137,9 +137,9 @@ def errors_and_changes(
     return tuple(variations), tuple(changed)
 
 
-def _varied(friction: Friction, names: Sequence[str], factor: float) -> Friction:
-    """A set with some parameters multiplied; the same where they have no effect."""
-    if friction.W == 0 and any(name in OF_ENGAGING for name in names):
+def _varied(friction: FrictionParameters, names: Sequence[str], factor: float) -> FrictionParameters:
+    """A set with some parameters multiplied; the same where its law has none of them, or they have no effect."""
+    if not set(names) <= set(type(friction).model_fields) or (set(names) <= set(OF_ENGAGING) and friction.W == 0):
         return friction
     values = {name: getattr(friction, name) * factor for name in names}
     if "gamma" in values:

@@ -40,7 +40,7 @@ from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Port
 from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.scenario import Cycles, Drive, Friction, Machine
+from feedsim.scenario import Cycles, Drive, FrictionParameters, Machine
 from feedsim.scenario.axis_units import FILTER_TYPES, Filter
 from feedsim.trace.trace import suggest
 
@@ -77,15 +77,19 @@ def lag_of(drive: Drive, cycles: Cycles) -> Lag:
 
 
 def friction_feedforward(
-    machine: Machine, program: Program, frictions: Mapping[str, Friction], delays: Mapping[str, float], law: Law
+    machine: Machine,
+    program: Program,
+    frictions: Mapping[str, FrictionParameters],
+    delays: Mapping[str, float],
+    laws: Callable[[FrictionParameters], Law],
 ) -> dict[str, Floats]:
     """Friction torque over time for the axes that `frictions` and `delays` name.
 
     Args:
-        frictions: axis -> parameters of the law.
+        frictions: axis -> parameters of a law.
         delays: axis -> delay T_ff [s] behind n_ffw; below 0 it looks ahead in the program.
-        law: friction torque [N.m] from parameters, speed (N+1,) [rad/s] and its interval [s]; starts with z = c = 0, as
-            the friction units do.
+        laws: the law of a set of parameters: friction torque [N.m] from parameters, speed (N+1,) [rad/s] and its
+            interval [s]; starts with z = c = 0, as the friction units do.
 
     Returns:
         axis -> (cycles + 1,) [N.m] at the instants k T_c. At rest it stays where the motion left it, as friction does.
@@ -95,7 +99,7 @@ def friction_feedforward(
     t = np.arange(count, dtype=np.float64) * T_c
     return {
         # Linear between the setpoints, as the drive ramps them: a motion at rest stays exactly at rest.
-        axis: law(
+        axis: laws(friction)(
             {name: float(value) for name, value in friction.parameters().items()},
             np.interp(t - delays[axis], program.time, program.n_ffw[axis]),
             T_c,

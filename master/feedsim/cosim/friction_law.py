@@ -17,6 +17,7 @@ from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
 from feedsim.installation import mend
 from feedsim.owned import Closing
+from feedsim.scenario import FrictionParameters
 from feedsim.scenario.roles import FRICTION_ROLE
 
 RESPONSE = "response"  # src/friction_fmu/response.h, behind the unit's name
@@ -225,3 +226,24 @@ class FrictionLaw(Closing):
                 unit.check_parameters()
             finally:
                 unit.close()
+
+
+class FrictionLaws(Closing):
+    """The laws of the shipped friction units, each opened when a set of its parameters first asks for it."""
+
+    def __init__(self, fmus: Path | None = None) -> None:
+        """fmus: as of :class:`FrictionLaw`."""
+        self._fmus = fmus
+        self._open: dict[str, FrictionLaw] = {}
+
+    def __call__(self, friction: FrictionParameters) -> FrictionLaw:
+        """The law of a set. Raises InputError: no usable archive of it."""
+        unit = FRICTION_ROLE.archive_name(friction)
+        if unit not in self._open:
+            self._open[unit] = FrictionLaw(self._fmus, unit)
+        return self._open[unit]
+
+    def close(self) -> None:
+        for law in self._open.values():
+            law.close()
+        self._open.clear()

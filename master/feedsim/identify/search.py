@@ -17,6 +17,7 @@ from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 REACH = {"z": 1.0, "c": 0.5}
 VALLEYS, REACHED = 6, 1.5  # tried beside a solution, drawn within so many standard deviations of it
+FARTHEST = 3.0  # of the logarithm, where a standard deviation is larger
 VALLEY_TOLERANCE = 1e-6  # of cost and step there
 START_TOLERANCE = 1e-3  # tolerance of cost and step to compare starts
 FOLLOWED = 3  # of the starts; as many again where none of them explains the torque
@@ -109,8 +110,10 @@ class Search:
             )
             point = {**best.values, EXCESS: best.values["F_S"] - best.values["F_C"]}
             for name in map(inner, free):
-                value = point[name]
-                point[name] = value * float(np.exp(moves[name] / value)) if name in logarithmic else value + moves[name]
+                if name in logarithmic:
+                    point[name] *= float(np.exp(np.clip(moves[name] / point[name], -FARTHEST, FARTHEST)))
+                else:
+                    point[name] += moves[name]
             point["F_S"] = point["F_C"] + max(point.pop(EXCESS), 0.0)
             found.append(self.solve(point, best.states, free, tolerance=VALLEY_TOLERANCE, limit=30))
             best = min(best, found[-1], key=lambda one: one.fit.cost)

@@ -186,7 +186,7 @@ def compensate(
 
 
 def _open_of(
-    plan: scenarios.Scenario, sets: Mapping[str, scenarios.Friction], count: int
+    plan: scenarios.Scenario, sets: Mapping[str, scenarios.FrictionParameters], count: int
 ) -> tuple[dict[str, Known], Cloud | None]:
     """What is known of sets that compensate, by axis, and of the machine. InputError: of neither anything.
 

@@ -129,7 +129,7 @@ def tune_compensation(
     for axis in wanted:
         if axis not in plane:
             raise InputError(f"{spelt('axes')} {','.join(wanted)}: {no_axis(axis, plane)}")
-        plan.machine.shipped_friction(axis, "tuning")
+        plan.machine.friction_of(axis, "tuning")
         check_controlled(plan.machine, axis)
     if not wanted or len(dict.fromkeys(wanted)) < len(wanted):
         raise InputError(f"{spelt('axes')} {','.join(wanted)}: names of axes are needed, each once, such as X,Z")

@@ -54,6 +54,7 @@ PAGE_COLOURS = {name: colour for name, colour, _ in PALETTE} | {"ground": "#ffff
 
 # What stands in small print in every picture that is made inside remarked().
 REMARK: ContextVar[str] = ContextVar("remark", default="")
+NARROW = 95, 2  # characters of a line and lines of it that fit the narrowest figure
 
 
 @contextmanager

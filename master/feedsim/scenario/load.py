@@ -10,13 +10,14 @@ from pathlib import Path
 from feedsim.errors import InputError
 from feedsim.fields import brief
 from feedsim.files import changes
-from feedsim.files.checked import check, fetch, read_checked, read_group
+from feedsim.files.checked import check, checked, fetch, read_group
 from feedsim.files.problems import describe, in_order
 from feedsim.files.source import Place, Source, read
-from feedsim.scenario.axis_units import Friction
+from feedsim.scenario.axis_units import Friction, FrictionParameters, GmsFriction
 from feedsim.scenario.control_keys import translate, translated
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.model import Scenario, contradictions
+from feedsim.scenario.roles import GMS
 
 Setting = tuple[str, Source]  # dotted key, value
 
@@ -154,9 +155,10 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     return machine
 
 
-def read_friction(path: str | Path) -> Friction:
+def read_friction(path: str | Path) -> FrictionParameters:
     """Read a file with the friction of one axis, as identification leaves it. Raises InputError like load()."""
-    return read_checked(path, Friction)
+    source = read_group(Path(path))
+    return checked(source, GmsFriction if source.data.get("law") == GMS else Friction, path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -277,11 +277,16 @@ class Machine(Model):
             name: axis.friction for name, axis in self.axes.items() if isinstance(axis.friction, FrictionParameters)
         }
 
-    def shipped_friction(self, axis: str, who: str) -> Friction:
-        """The parameters of an axis's friction. InputError: as :meth:`shipped_drive`."""
+    def friction_of(self, axis: str, who: str) -> FrictionParameters:
+        """The parameters of an axis's friction, of whatever law. InputError: as :meth:`shipped_drive`."""
         friction = self.axes[axis].friction
         if isinstance(friction, ForeignUnit):
             raise InputError(_foreign(axis, friction, who))
+        return friction
+
+    def shipped_friction(self, axis: str, who: str) -> Friction:
+        """Those of LuGre. InputError: as :meth:`friction_of`, and of another law."""
+        friction = self.friction_of(axis, who)
         if not isinstance(friction, Friction):
             raise InputError(f"axis {axis}: its friction has the law {friction.law}; {who} needs LuGre")
         return friction

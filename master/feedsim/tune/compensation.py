@@ -10,7 +10,7 @@ import numpy as np
 
 from feedsim.analysis.figures import Array
 from feedsim.cosim.feedforward import TorqueFeedforward, friction_feedforward, lag_of
-from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.cosim.friction_law import FrictionLaws
 from feedsim.errors import InputError
 from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
@@ -198,7 +198,7 @@ def _found(
 
 def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str], fmus: Path | None) -> TorqueFeedforward:
     """The friction model of the machine file as torque feedforward, as feedsim compensate has it."""
-    frictions = {axis: machine.shipped_friction(axis, "the model") for axis in axes}
+    frictions = {axis: machine.friction_of(axis, "the model") for axis in axes}
     delays = {axis: lag_of(machine.shipped_drive(axis, "the model"), machine.cycles).delay for axis in axes}
-    with FrictionLaw(fmus) as law:
-        return friction_feedforward(machine, circles.program, frictions, delays, law)
+    with FrictionLaws(fmus) as laws:
+        return friction_feedforward(machine, circles.program, frictions, delays, laws)

@@ -73,7 +73,7 @@ def without(machine: Machine, kind: str, axes: Sequence[str]) -> Machine:
 
 def scale_of(machine: Machine, axis: str) -> float:
     """2 F_C/K_p I_P [m/s]: the speed error whose torque turns the friction round. InputError: another maker's unit."""
-    friction = machine.shipped_friction(axis, "tuning of a compensation")
+    friction = machine.friction_of(axis, "tuning of a compensation")
     drive = machine.shipped_drive(axis, "tuning of a compensation")
     if drive.K_p <= 0:
         raise InputError(f"axis {axis}: K_p is 0; a pulse on the speed setpoint has no effect")
@@ -239,7 +239,7 @@ def instant(machine: Machine, axis: str) -> float:
 def table(trials: Trials, objective: str, *, progress: Progress, axes: Sequence[str]) -> Found:
     """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs."""
     plane, machine = trials.circles.plane, trials.machines[0]
-    level = {axis: machine.shipped_friction(axis, "tuning of a compensation").F_C for axis in axes}
+    level = {axis: machine.friction_of(axis, "tuning of a compensation").F_C for axis in axes}
     delay = {axis: _delay(machine, axis) for axis in axes}
     before = size(trials.errors())
     torques = {axis: np.zeros(len(SPEEDS)) for axis in axes}

@@ -254,6 +254,6 @@ def check_axis(scenario: Scenario, axis: str) -> None:
     machine = scenario.machine
     if axis not in machine.axes:
         raise InputError(f"no axis {axis!r}; there is {', '.join(machine.axes)}")
-    machine.shipped_friction(axis, "tuning")
+    machine.friction_of(axis, "tuning")
     for name in machine.axes:
         check_controlled(machine, name)

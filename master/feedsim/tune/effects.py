@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from feedsim.scenario import Drive, Friction, Machine
+from feedsim.scenario import Drive, Friction, FrictionParameters, Machine
 from feedsim.scenario.axis_units import SHARED_WITH_GUIDE, Guide, Transmission
 from feedsim.structure import checked_modes
 from feedsim.tune.groups import compensated
@@ -62,9 +62,10 @@ def _with(machine: Machine, axis: str, **changes: object) -> Machine:
 def _friction(factors: Mapping[str, float]) -> Callable[[Machine, str], Machine | None]:
     def of(machine: Machine, axis: str) -> Machine | None:
         friction = machine.axes[axis].friction
-        if not isinstance(friction, Friction):
+        if not isinstance(friction, FrictionParameters):
             return None
-        values = {name: factor * float(getattr(friction, name)) for name, factor in factors.items()}
+        own = type(friction).model_fields
+        values = {name: factor * float(getattr(friction, name)) for name, factor in factors.items() if name in own}
         return _with(machine, axis, friction=friction.model_copy(update=values))
 
     return of
@@ -87,7 +88,11 @@ def _guide(machine: Machine, axis: str) -> Machine | None:
 
 def _cogging(machine: Machine, axis: str) -> Machine | None:
     drive, friction = machine.axes[axis].drive, machine.axes[axis].friction
-    if not isinstance(drive, Drive) or not isinstance(friction, Friction) or getattr(drive, "cogging_1", None):
+    if (
+        not isinstance(drive, Drive)
+        or not isinstance(friction, FrictionParameters)
+        or getattr(drive, "cogging_1", None)
+    ):
         return None
     order = 2.0 * drive.p if drive.p else ORDER
     return compensated(machine, axis, "cogging_1", {"order": order, "amplitude": COGGING * friction.F_C})

@@ -15,7 +15,7 @@ from feedsim.analysis.circularity import Contour
 from feedsim.analysis.compensation import Compensation, circle_figures
 from feedsim.analysis.evaluate import Result
 from feedsim.cosim.feedforward import friction_feedforward
-from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.cosim.friction_law import FrictionLaws
 from feedsim.cosim.run import run
 from feedsim.scenario import Recording
 from feedsim.uncertainty.draws import Cloud, Known, draw_named, drawn_friction, on_draw, torque_scale
@@ -112,7 +112,7 @@ def of_compensation(
     machines = cloud.draws(count, seed) if cloud is not None else iter([scenario.machine] * count)
     figures: list[Mapping[str, Figure]] = []
     curves: dict[str, list[Array]] = {"without": [], "with": []}
-    with FrictionLaw(fmus) as law:
+    with FrictionLaws(fmus) as laws:
         for k, machine in enumerate(machines):
             progress("draws", k, count)
             sets = {
@@ -121,7 +121,7 @@ def of_compensation(
             }
             torque = {
                 axis: torque_scale(scenario.machine, machine, axis) * values
-                for axis, values in friction_feedforward(machine, program, sets, compensation.delays, law).items()
+                for axis, values in friction_feedforward(machine, program, sets, compensation.delays, laws).items()
             }
             plan = on_draw(lean, machine)
             with draw_named(k, count):

@@ -14,7 +14,7 @@ from feedsim.analysis.compensation_errors import Quality
 from feedsim.report.compensate.plots import pictures_of
 from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import display_unit, minus, powers, typeset
-from feedsim.report.provenance import InputFile, axis_parameters, hashed, inputs_part, quantity
+from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hashed, inputs_part, quantity
 from feedsim.report.run.files import summary as summary_of_run
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.sections import figures_footer, figures_section, files_table
@@ -142,6 +142,10 @@ def _effects(compensation: Compensation) -> Section:
     return Section("With other effects of the machine", [table], "effects")
 
 
+def _cell(value: Parameter) -> str:
+    return value if isinstance(value, str) else minus(f"{value:.6g}")
+
+
 def _frictions(compensation: Compensation, files: Mapping[str, Path]) -> Section:
     """Parameters of the compensation beside the machine's own."""
     machine = compensation.scenario.machine
@@ -153,7 +157,7 @@ def _frictions(compensation: Compensation, files: Mapping[str, Path]) -> Section
     for name in dict.fromkeys(name for entry in sets for name in entry):
         result = [entry.get(name) for entry in sets]
         unit = next(value[1] for value in result if value is not None)
-        rows.append((code(name), display_unit(unit), *(minus(f"{v[0]:.6g}") if v else "–" for v in result)))
+        rows.append((code(name), display_unit(unit), *(_cell(v[0]) if v else "–" for v in result)))
     whose = [f"{axis}, {whose}" for axis in compensation.frictions for whose in ("compensation", "machine")]
     table = Table("ll" + "r" * len(whose), ("Parameter", "SI unit", *whose), rows)
     given = files_table(friction_files(files)) if files else None

@@ -36,6 +36,7 @@ from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_section
 from feedsim.report.run.pose import pose_section
 from feedsim.report.run.words import accuracy_words, moved_words, next_step, stop_words
+from feedsim.report.style import NARROW, remarked
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace
 from feedsim.tune import of_run
@@ -203,6 +204,12 @@ def tile(name: str, figure: Figure, limit: float | None = None) -> Tile:
 
 def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:
     """The figures of a report: those of every evaluation, and an overview of all axes. causes: as of report_of()."""
+    machine = run.scenario.machine
+    with remarked(f"{machine.name}. {machine.note}", *NARROW):
+        return _drawn(run, figures, causes or {})
+
+
+def _drawn(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Picture]:
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     pictures: list[Picture] = []
     for task in tasks(run.scenario, run.program):
@@ -221,7 +228,7 @@ def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Dia
             )
         elif isinstance(task, CircleTask):
             pictures.append(
-                contour_picture(run.trace, task.turn, f"contour-{stem}", task.back, (causes or {}).get(task.prefix))
+                contour_picture(run.trace, task.turn, f"contour-{stem}", task.back, causes.get(task.prefix))
             )
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []

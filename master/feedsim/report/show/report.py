@@ -20,6 +20,7 @@ from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, display_unit, minus, plain_unit, scale, shown, three
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
+from feedsim.report.style import NARROW, remarked
 
 FORMAT = 1
 MOST_DIFFERING = 3  # parameters that are named outside of the table
@@ -189,6 +190,9 @@ def report_of(sources: Sequence[Source]) -> Report:
     """Content of the report."""
     names = [source.name for source in sources]
     rows = [(f"Source {k}", f"{source.name}: {len(source.time)} rows") for k, source in enumerate(sources, 1)]
+    notes = tuple(dict.fromkeys(note for source in sources for note in source.notes))
+    with remarked(" ".join(filter(None, notes)), *NARROW):
+        pictures = pictures_of(sources)
     return Report(
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
         counted(len(sources), "source"),
@@ -200,9 +204,9 @@ def report_of(sources: Sequence[Source]) -> Report:
         )
         if len(sources) > 1
         else "",
-        notes=tuple(note for source in sources for note in source.notes),
+        notes=notes,
         main=[
-            *pictures_of(sources),
+            *pictures,
             _stops(sources),
             _figures(sources),
             _parameters(sources),

@@ -15,7 +15,7 @@ from feedsim.report.formatting import counted, minus, number, rounded, three, wi
 from feedsim.report.picture import Picture
 from feedsim.report.results import write_report
 from feedsim.report.sections import parameters_section, provenance_section
-from feedsim.report.style import Array, remarked
+from feedsim.report.style import NARROW, Array, remarked
 from feedsim.report.sweep.account import QUANTILES, SHARE_HEADING, Account, Input, Measure, measures
 from feedsim.report.sweep.plots import drawn, pictures_of, varying
 from feedsim.report.sweep.summary import study_files, summary
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from feedsim.sweep.design import Design
     from feedsim.sweep.table import Table as Runs
 
-REMARK_WIDTH, REMARK_LINES = 95, 2  # fits the narrowest figure
 METHODS = {
     "grid": "grid: every combination",
     "latin_hypercube": "Latin hypercube",
@@ -86,7 +85,7 @@ def drawn_report(account: Account) -> Report:
     """Content of the report, with its pictures."""
     study = account.study
     machine = study.base.scenario.machine
-    with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
+    with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), *NARROW):
         whole, single = pictures_of(account)
     return report_of(account, whole, single)
 

@@ -34,7 +34,7 @@ from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, RESIDUAL_COLOUR
+from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, remarked
 from feedsim.report.tune.drive_draws import (
     drawn_answer,
     drawn_findings,
@@ -259,6 +259,8 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
         ("Encoder noise", f"{1e6 * limits.encoder_noise:g} µrad, standard deviation per control cycle"),
         ("Judged in closed form, run", f"{tuned.evaluations[0]}, {tuned.evaluations[1]}"),
     ]  # fmt: skip
+    with remarked(f"{machine.name}. {machine.note}", *NARROW):
+        response = picture(tuned)
     return Report(
         f"Drive of {axis}, tuned within margins" if not tuned.kept else f"Drive of {axis}, kept as it is",
         machine.name,
@@ -267,7 +269,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
         notes=notes,
         tiles=tiles,
         main=[
-            picture(tuned),
+            response,
             *values(tuned, control),
             Section("Why these values", [Bullets(list(why(tuned)))]),
             _margins(tuned),

@@ -17,7 +17,7 @@ from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
-from feedsim.report.style import AFTER, BEFORE
+from feedsim.report.style import AFTER, BEFORE, NARROW, remarked
 from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensation import Errors, Judged
@@ -215,6 +215,8 @@ def report_of(judged: Judged) -> Report:
         ("Minimised", OBJECTIVES[judged.objective]),
         ("Runs to find it", str(judged.found.runs)),
     ]
+    with remarked(f"{machine.name}. {machine.note}", *NARROW):
+        pictures = pictures_of(judged)
     return Report(
         f"Friction compensation of {', '.join(judged.axes)}",
         f"{machine.name} · {WORDS[judged.found.kind]}",
@@ -223,7 +225,7 @@ def report_of(judged: Judged) -> Report:
         notes=notes,
         tiles=tiles,
         main=[
-            *pictures_of(judged),
+            *pictures,
             _values(judged),
             _effects(judged, figures),
             _errors(

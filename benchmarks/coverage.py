@@ -2,7 +2,9 @@
 
 Axis Z of the default machine, synthetic and known, is logged again and again with noise of 5 % on the current and
 identified from every log. Each set gives a band of the contour of a short circle, which the contour of the true machine
-lies in or not. A friction compensation found on a set is judged on the true machine, beside that found on the truth.
+lies in or not. Intervals allow for viscous friction that changes while the log is taken (identify/drift.py). So the
+axis warms or cools by a course drawn from that; with --still it does not. A friction compensation found on a set is
+judged on the true machine, beside that found on the truth.
 
     make band-coverage
     python benchmarks/coverage.py --logs 3 --kinds pulse,pulse_characteristic
@@ -12,6 +14,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,7 +26,8 @@ from numpy.typing import NDArray
 from feedsim import cosim
 from feedsim.analysis import circularity, tasks
 from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import Identified, Options, friction_file, identify
+from feedsim.identify import Identified, Options, drift, friction_file, identify
+from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate
 from feedsim.scenario import Scenario, load
 from feedsim.structure.modes import checked_modes
@@ -44,7 +49,29 @@ def quiet(*_: object) -> None:
     """No progress."""
 
 
-def identified(true: Scenario, logs: int, folder: Path) -> list[Path]:
+def warmed(made: Sequence[Record], sigma_2: float, seed: int) -> list[Record]:
+    """Records with viscous friction that changes: at once, evenly, or at random, by WARMS in standard deviation.
+
+    The control keeps the speed whatever the friction, so that the torque alone differs. The plateaus come first; what
+    follows them has the last value.
+    """
+    random = np.random.default_rng((seed, 1))
+    age = np.linspace(0.0, 1.0, len(made[0].time))
+    courses = (
+        drift.WARMS * random.normal() * (age > 0),
+        drift.WARMS * random.normal() * age,
+        drift.WARMS * np.cumsum(random.normal(size=len(age))) / np.sqrt(len(age)),
+    )
+    change = courses[random.integers(len(courses))]
+    result = []
+    for k, record in enumerate(made):
+        assert record.speed is not None
+        own = change if k == 0 else change[-1]
+        result.append(replace(record, torque=record.torque + own * sigma_2 * record.speed))
+    return result
+
+
+def identified(true: Scenario, logs: int, folder: Path, *, still: bool) -> list[Path]:
     """A friction file of every log."""
     machine = true.machine
     experiment, modes, axis = simulate(AXIS), checked_modes(machine), machine.axes[AXIS]
@@ -52,6 +79,8 @@ def identified(true: Scenario, logs: int, folder: Path) -> list[Path]:
     files = []
     for seed in range(logs):
         made = records(experiment, machine, AXIS, NOISE, seed + 100)
+        if not still:
+            made = warmed(made, machine.shipped_friction(AXIS, "the log").sigma_2, seed)
         with FrictionLaw() as law:
             found = identify(made, law, Options(AXIS, axis.I_P, J=J, modes=modes, delay=0.0))
         file = folder / f"friction_{seed}.yaml"
@@ -86,7 +115,8 @@ def reductions(true: Scenario, found: Scenario, kind: str) -> NDArray[np.float64
 def main() -> int:
     """Identify, and print a row a log."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--logs", type=int, default=20)
+    parser.add_argument("--logs", type=int, default=12)
+    parser.add_argument("--still", action="store_true", help="viscous friction that does not change during a log")
     parser.add_argument("--kinds", default="", help="of compensations, such as pulse,pulse_characteristic,table")
     given = parser.parse_args()
     true = load(CIRCLE, SHORT)
@@ -94,7 +124,7 @@ def main() -> int:
     if unknown := [kind for kind in kinds if kind not in GROUP_OF_KIND]:
         parser.error(f"--kinds {','.join(unknown)}: of {', '.join(GROUP_OF_KIND)}")
     with TemporaryDirectory() as folder:
-        files = identified(true, given.logs, Path(folder))
+        files = identified(true, given.logs, Path(folder), still=given.still)
         nominal = {kind: reductions(true, true, kind) for kind in kinds}
         for kind, (median, least) in nominal.items():
             print(f"{kind} found on the truth: median {median:.1f} %, least {least:.1f} %", flush=True)

@@ -73,6 +73,8 @@ SETTLES = 0.05
 MAX_WINDOW_PASSES = 6
 # Left out, they must leave this share of the noise to be taken in after all.
 CLEARER = 0.5
+# Of errors of fewer than PITCHES only where the model leaves more than this [m].
+CLEAR_NOISE = 20e-9
 # Neither of two models need be right: a term may be off by so much of their difference, as a standard deviation.
 MODEL_DIFFERENCE_FACTOR = 1.5
 REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
@@ -211,7 +213,8 @@ def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape)
     part of the intervals. Of fewer than PITCHES they are no terms, but are kept out of the others.
     """
     shaped = _shaped(circle, paths, shape)
-    if not any(enough_pitches(circle, axis, FEWEST_PITCHES) for axis in shaped.left_out):
+    least = PITCHES if shaped.noise < CLEAR_NOISE else FEWEST_PITCHES
+    if not any(enough_pitches(circle, axis, least) for axis in shaped.left_out):
         return shaped
     other = _shaped(circle, paths, shape._replace(pitches=True))
     if other.noise < CLEARER * shaped.noise:

@@ -2,7 +2,7 @@
 // which both axes' positions are known. What is fitted, and why, stands there; a test holds both to the same digits.
 const RADIANS = Math.PI / 180;
 const MODEL = {
-  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, FEWEST: 0.5, POINTS: 1024, REPEATS: 2,
+  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, FEWEST: 0.5, CLEAR_NOISE: 20e-9, POINTS: 1024, REPEATS: 2,
   KNOWN: 0.1, WOUND: 0.02, SPEED_SHARE: 0.005, RISE_SPEED: 0.012, RISE_SPREAD: 0.5, CURVATURE: 0.5, CLEARER: 0.5, DIFFERENCE: 1.5, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
   MOST: 8000, BIWEIGHT: 4.685, SETTLED: 1e-13, UNUSUAL: 0.6745,
 };
@@ -15,7 +15,7 @@ const enough_pitches = (circle, axis, pitches = MODEL.PITCHES) => axis in circle
 // circle: {axes, radius, speed, pitch, gain, drag, following, response}; paths: {angle, deviation, sense, phase}.
 function fit_circle(circle, paths, students) {
   const result = fit_lost(circle, paths, students, false);
-  if (!result.left_out.some(axis => enough_pitches(circle, axis, MODEL.FEWEST))) return result;
+  if (!result.left_out.some(axis => enough_pitches(circle, axis, result.noise < MODEL.CLEAR_NOISE ? MODEL.PITCHES : MODEL.FEWEST))) return result;
   const other = fit_lost(circle, paths, students, true);
   if (other.noise < MODEL.CLEARER * result.noise) return other;
   if (!result.left_out.some(axis => enough_pitches(circle, axis))) return result;

@@ -10,6 +10,7 @@ import pytest
 
 from drive_helpers import MACHINES, identified
 from feedsim.cli import main
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.replay.closed_loop import read_axes, windowed
 from feedsim.replay.identified import identify_drives
@@ -123,3 +124,20 @@ def test_a_real_axis_under_its_weight_that_moves_one_way(window: str, tmp_path: 
         assert 18.0 < M_0["value"] < 22.0
     else:
         assert status == 2
+
+
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
+def test_intervals_of_stretches_overlap(tmp_path: Path) -> None:
+    """A gentle move and a rapid one of X, 0.3 and 0.5 s, with nothing in common: what either states, the other allows.
+    Each moves one way, so that load and friction are a sum."""
+    words = ["identify-drive", os.environ["FEEDSIM_CAPTURE"], "--axes", "X", "--position-cycle", "125us", "--quiet"]
+    stretches = []
+    for window in ("0.32s..0.6s", "2.85s..3.4s"):
+        assert main([*words, "--window", window, "--out", str(tmp_path / window)]) == 0
+        stretches.append(json.loads((tmp_path / window / "summary.json").read_text())["axes"]["X"]["parameters"])
+    gentle, rapid = stretches
+    for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "J"):
+        both = gentle[name], rapid[name]
+        assert [one["status"] for one in both] == ["estimated"] * 2, name
+        assert abs(both[0]["value"] - both[1]["value"]) <= NORMAL_95 * (both[0]["sigma"] + both[1]["sigma"]), name
+    assert {one["M_0"]["status"] for one in stretches} == {"undetermined"}

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.errors import InputError
-from feedsim.motions.profile import rest_to_rest
+from feedsim.motions.profile import rest_to_rest, speed_change
 from feedsim.nc.spline import RestSpline
 
 JERK = 150.0
@@ -115,6 +115,23 @@ def test_profile_without_length_takes_no_time() -> None:
 def test_profile_refuses_limits_that_make_no_sense(bad: tuple[float, float, float, float]) -> None:
     with pytest.raises(InputError, match="not allowed; allowed: limits above 0"):
         rest_to_rest(*bad)
+
+
+@pytest.mark.parametrize("speed", [0.2, -0.2, 1e-4, 0.0])
+def test_a_change_of_speed_is_as_fast_as_the_closed_form(speed: float) -> None:
+    """Up to a^2/j in speed the acceleration is a triangle, beyond it a trapezium; halfway there in either case."""
+    change = speed_change(speed, 2.0, 50.0)
+    size = abs(speed)
+    duration = size / 2.0 + 2.0 / 50.0 if size >= 2.0**2 / 50.0 else 2 * math.sqrt(size / 50.0)
+    assert change.duration == pytest.approx(duration, rel=1e-14)
+    assert change.distance == pytest.approx(speed * duration / 2, rel=1e-13)
+    x, v = change.at(np.array([-1.0, 0.0, duration / 2, change.duration, change.duration + 0.3]))
+    assert v == pytest.approx([0.0, 0.0, speed / 2, speed, speed], rel=1e-13)
+    assert x[[0, 1]] == pytest.approx(0, abs=0)
+    assert x[-1] - x[-2] == pytest.approx(0.3 * speed, rel=1e-13)
+    # An object of ruckig that lives on until the interpreter ends is complained of on standard error.
+    parts = [*vars(change).values(), *vars(change.profile).values()]
+    assert not [one for one in parts if type(one).__module__.startswith("ruckig")]
 
 
 def test_spline_is_the_c2_interpolant_at_rest_on_both_sides() -> None:

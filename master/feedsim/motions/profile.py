@@ -113,6 +113,9 @@ class Profile:
         return np.where(s <= 0.0, 0.0, np.where(s >= self.length, self.times[-1], high))
 
 
+_AT_REST = Profile(np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(1))
+
+
 def rest_to_rest(length: float, speed: float, acceleration: float, jerk: float) -> Profile:
     """Fastest profile over ``length`` [m] >= 0 within ``speed`` [m/s], ``acceleration`` [m/s2] and ``jerk`` [m/s3].
 
@@ -126,7 +129,7 @@ def rest_to_rest(length: float, speed: float, acceleration: float, jerk: float) 
             "finite, length 0 or more and finite"
         )
     if length == 0:
-        return Profile(np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(1))
+        return _AT_REST
 
     unit_time = float(np.cbrt(length / jerk))
     trajectory = _calculated(
@@ -138,15 +141,15 @@ def rest_to_rest(length: float, speed: float, acceleration: float, jerk: float) 
         max_acceleration=acceleration * unit_time**2 / length,
         max_jerk=1.0,
     )
-    phases = trajectory.profiles[0][0] if isinstance(trajectory.profiles[0], list) else trajectory.profiles[0]
-    position = np.array(phases.p) * length
+    unit = _phases(trajectory)
+    position = unit.position * length
     position[-1] = length  # its last digit is ruckig's rounding
     return Profile(
-        times=np.concatenate([[0.0], np.cumsum(phases.t)]) * unit_time,
+        times=unit.times * unit_time,
         position=position,
-        velocity=np.array(phases.v) * (length / unit_time),
-        acceleration=np.array(phases.a) * (length / unit_time**2),
-        jerk=np.array(phases.j) * jerk,
+        velocity=unit.velocity * (length / unit_time),
+        acceleration=unit.acceleration * (length / unit_time**2),
+        jerk=unit.jerk * jerk,
     )
 
 
@@ -158,17 +161,20 @@ class SpeedChange:
     """
 
     speed: float
-    duration: float
-    distance: float
-    trajectory: Trajectory | None
+    profile: Profile
+
+    @property
+    def duration(self) -> float:
+        return self.profile.duration
+
+    @property
+    def distance(self) -> float:
+        return self.profile.length
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Distance covered [m] and speed [m/s] at ``time`` (N,) [s]: at rest before 0, at ``speed`` from the end on."""
-        x, v = np.zeros(len(time)), np.zeros(len(time))
-        for i, t in enumerate(time):
-            if t > 0 and self.trajectory is not None:
-                (x[i],), (v[i],), _ = self.trajectory.at_time(float(t))
-        return x, v
+        x, v, _ = self.profile.at(time)
+        return x + self.speed * np.maximum(time - self.duration, 0.0), v
 
 
 def speed_change(speed: float, acceleration: float, jerk: float) -> SpeedChange:
@@ -177,7 +183,7 @@ def speed_change(speed: float, acceleration: float, jerk: float) -> SpeedChange:
     Raises InputError where ruckig finds none.
     """
     if speed == 0:
-        return SpeedChange(0.0, 0.0, 0.0, None)
+        return SpeedChange(0.0, _AT_REST)
     trajectory = _calculated(
         f"from rest to {speed:g} m/s with {acceleration:g} m/s2, {jerk:g} m/s3",
         "Velocity",
@@ -185,8 +191,16 @@ def speed_change(speed: float, acceleration: float, jerk: float) -> SpeedChange:
         max_acceleration=acceleration,
         max_jerk=jerk,
     )
-    (distance,), _, _ = trajectory.at_time(trajectory.duration)
-    return SpeedChange(speed, float(trajectory.duration), float(distance), trajectory)
+    return SpeedChange(speed, _phases(trajectory))
+
+
+def _phases(trajectory: Trajectory) -> Profile:
+    """The phases of a trajectory of one degree of freedom, as numbers: no object of ruckig outlives its calculation."""
+    phases = trajectory.profiles[0][0] if isinstance(trajectory.profiles[0], list) else trajectory.profiles[0]
+    return Profile(
+        np.concatenate([[0.0], np.cumsum(phases.t)]), np.array(phases.p), np.array(phases.v), np.array(phases.a),
+        np.array(phases.j),
+    )  # fmt: skip
 
 
 def _calculated(where: str, controlled: str, **task: float) -> Trajectory:

@@ -66,6 +66,7 @@ class Model(BaseModel):
     IN_FOLDER: ClassVar[str] = ""  # name of the file, where its folder may be named in its place
     TOLD_BY: ClassVar[str | None] = None  # the key that separates it from another model that may stand at its place
     BUT_FOR: ClassVar[tuple[str, ...]] = ()  # values of that key that stand for the other model all the same
+    ELSEWHERE: ClassVar[dict[str, str]] = {}  # keys that are looked for here and belong elsewhere: how to write them
 
 
 def fault(message: str, beside: tuple[str, ...] = ()) -> PydanticCustomError:

@@ -68,6 +68,7 @@ def test_a_file_may_say_its_law(fmus: Path, tmp_path: Path) -> None:
         ),
         ("axes.Z.friction.spread=5", "unknown key 'spread' in axes.Z.friction; allowed: sigma_0"),
         (f"axes.Z.friction={gms(spread='0.5')}", "spread"),
+        (f"axes.Z.friction={gms(warm_time='1 min')}", "warm_time: unknown key; allowed: "),  # a share is LuGre's alone
         (f"axes.Z.friction={gms(F_S='1 N.m')}", "F_S 1 N.m is smaller than F_C 1.6 N.m"),
     ],
 )

@@ -183,6 +183,9 @@ def test_turn_beyond_the_circle(refused: Refused) -> None:
         ("W: 0.040 rad", "W: -1 mrad", "axes.X.friction.W: -1 mrad is outside the allowed range: at least 0 rad"),
         ("gamma: 0.35", "gamma: 135 %", "axes.X.friction.gamma: 135 % is outside the allowed range: from 0 to 1"),
         ("F_C: 2.4 N.m", "F_c: 2.4 N.m", "axes.X.friction.F_c: unknown key; did you mean 'F_C'?"),
+        ("F_C: 2.4 N.m", "place_3: 20 %\n      F_C: 2.4 N.m",
+         "axes.X.friction.place_3: unknown key; it belongs to the guide of the axis, "
+         "guide: {share: 100 %, place_3: ...}"),
         ("position: 1 ms", "position: 1.1 ms",
          "cycles.position: 0.0011 s is no whole multiple of the control cycle, 0.000125 s"),
         ("interpolation: 2 ms", "interpolation: 1.5 ms",

@@ -143,6 +143,11 @@ def test_another_machine_meets_the_scenarios_own_settings(tmp_path: Path) -> Non
         ("motions.0.feed.x=1", "motions.0.feed is '5000 mm/min', which has no 'x' inside"),
         ("machine.axes.Q.friction.W=0 rad", "machine.axes has no 'Q'; allowed: X, Y, Z"),
         ("machine.axes.Z.frction.W=0 rad", "unknown key 'frction' in machine.axes.Z; did you mean 'friction'?"),
+        (
+            "machine.axes.Z.friction.warm_time=20 min",
+            "unknown key 'warm_time' in machine.axes.Z.friction; it belongs to the guide of the axis, "
+            "guide: {share: 100 %, warm_time: ...}",
+        ),
         ("machin.axes=1", "unknown key 'machin' in the scenario; did you mean 'machine'?"),
         ("motions.0.feed=5000 mm", "--set motions.0.feed=5000 mm: motions.0.feed: '5000 mm' is a length; a speed is"),
         ("machine.axes.Z.friction.F_S=1 N.m", "F_S 1 N.m is smaller than F_C 1.6 N.m"),

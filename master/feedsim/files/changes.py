@@ -92,7 +92,7 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
     annotation = shape.expected(model, source.data, place)
     known = shape.keys(annotation)
     if known is not None and part not in (*known, *shape.separating(model, source.data, place)):
-        raise InputError(f"{mark.where}: unknown key {part!r} in {here}{did_you_mean(part, known)}")
+        raise InputError(f"{mark.where}: unknown key {part!r} in {here}{shape.instead(annotation, part, known)}")
     if rest and not isinstance(data.get(part), (dict, list)):
         inner = shape.child(annotation, part)
         if part in data and data[part] is not None:

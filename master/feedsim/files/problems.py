@@ -46,9 +46,10 @@ def explain(source: Source, model: Any, detail: ErrorDetails, unread: str) -> st
     if beside := detail.get("ctx", {}).get("beside"):
         place = (*place[:-1], *beside)
     if detail["type"] == "extra_forbidden":
-        known = shape.keys(shape.expected(model, source.data, place[:-1])) or []
+        group = shape.expected(model, source.data, place[:-1])
+        known = shape.keys(group) or []
         known += [] if place[:-1] or "motions" not in known else ["set"]
-        return describe(source, place, f"unknown key{did_you_mean(str(place[-1]), known)}")
+        return describe(source, place, f"unknown key{shape.instead(group, str(place[-1]), known)}")
     return describe(source, place, _message(source, model, detail, place))
 
 

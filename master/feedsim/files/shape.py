@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from feedsim.fields import ExistingFile
+from feedsim.fields import ExistingFile, did_you_mean
 from feedsim.files.source import Place
 
 
@@ -83,6 +83,12 @@ def separating(model: Any, data: Any, place: Place) -> list[str]:
 def keys(annotation: Any) -> list[str] | None:
     """Keys that a group may hold; None where keys are free (axis names) or it is no group."""
     return [info.alias or name for name, info in annotation.model_fields.items()] if is_model(annotation) else None
+
+
+def instead(annotation: Any, key: str, known: list[str]) -> str:
+    """Tail of a message about a `key` that a group of `annotation` lacks: where it belongs, else what is `known`."""
+    place = getattr(annotation, "ELSEWHERE", {}).get(key)
+    return f"; it belongs to the {place}" if place else did_you_mean(key, known)
 
 
 def field(model: Any, key: str | int) -> FieldInfo | None:

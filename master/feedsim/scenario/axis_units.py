@@ -46,6 +46,11 @@ _PARAMETERS_BY_LAW = {
     **{law: variables.parameters(unit) for law, unit in FRICTION_UNITS.items()},
 }
 _NAMES_OF_LAWS = {name for names in _PARAMETERS_BY_LAW.values() for name in names}
+# Over position and with warmth friction changes at the guide alone, which may take all of the axis's friction.
+_AT_GUIDE_ALONE = [
+    name.removeprefix("guide.") for name in variables.parameters("plant/axis")
+    if name.startswith(("guide.place_", "guide.warm_"))
+]  # fmt: skip
 _IDENTIFIED = (
     "Where the parameters come from, as feedsim identify writes it: kept and shown, never calculated with. Its keys "
     "are free, but names of parameters are refused: they would have no effect here"
@@ -115,6 +120,9 @@ class _Friction(FrictionParameters):
     """Friction of an axis on the motor side: LuGre with the transmission engaging model (Eqs. 1-7)."""
 
     law: ClassVar[str] = LUGRE
+    ELSEWHERE: ClassVar[dict[str, str]] = {
+        name: f"guide of the axis, guide: {{share: 100 %, {name}: ...}}" for name in _AT_GUIDE_ALONE
+    }
 
 
 class _GmsFriction(FrictionParameters):

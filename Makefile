@@ -256,8 +256,8 @@ compensation-study: fmus $(VENV)/.run ## what friction compensations take off on
 band-coverage: fmus $(VENV)/.run ## whether bands from sets identified at 5 % noise hold the truth (some ten minutes; docs/uncertainty.md)
 	$(PY) benchmarks/coverage.py
 
-friction-laws: fmus $(VENV)/.run ## compare Coulomb, Stribeck, LuGre and Maxwell slip in and out of sample (two minutes; docs/friction-laws.md)
-	$(PY) benchmarks/friction_laws.py --write
+friction-laws: fmus $(VENV)/.run ## compare Coulomb, Stribeck, LuGre and Maxwell slip in and out of sample (two minutes; ARGS='--intervals 60': whether intervals of Maxwell slip hold; docs/friction-laws.md)
+	$(PY) benchmarks/friction_laws.py --write $(ARGS)
 
 identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/identification.md)
 	$(PY) benchmarks/identification.py

@@ -8,6 +8,9 @@ speed, fitted by least squares with the inertia and the delay that LuGre's fit h
     FEEDSIM_EMPS=DATA_EMPS.mat FEEDSIM_CAPTURE=capture.json make friction-laws
     python benchmarks/friction_laws.py TRACE.csv --axis Z --machine MACHINE [--columns MAPPING.yaml]
                                                              a record of your own: fitted to its first half
+    make friction-laws ARGS='--intervals 60'                 whether intervals of Maxwell slip hold the truth, on so
+                                                             many drawn axes (gms_intervals.py; ten seconds of one core
+                                                             an axis); what is in build/friction-laws is not drawn again
 
 Prints the table; `make friction-laws` writes it into docs/friction-laws.md.
 """
@@ -24,6 +27,7 @@ from tempfile import TemporaryDirectory
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead of numpy
 
+import gms_intervals
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -43,7 +47,6 @@ from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS, GMS
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "friction-laws.md"
-BEGIN, END = "<!-- laws: begin -->", "<!-- laws: end -->"
 MACHINES = ROOT / "scenarios" / "machines"
 LAWS = {"LuGre": (Friction.law, FRICTION_ROLE.shipped), "GMS": (GMS, FRICTION_UNITS[GMS])}
 MOVES = 0.01  # of the highest speed: above, an axis moves
@@ -239,6 +242,14 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def _page(name: str) -> tuple[str, str, str]:
+    """The page up to its table of that name, the table, and what follows it."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    head, _, rest = PAGE.read_text(encoding="utf-8").partition(begin)
+    before, _, rest = rest.partition(end)
+    return f"{head}{begin}", before, f"{end}{rest}"
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Compare friction laws in and out of sample.")
     parser.add_argument(
@@ -249,7 +260,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--columns", type=Path, help="which columns of the records are what")
     parser.add_argument("--fmus", type=Path, help="folder of the archives")
     parser.add_argument("--write", action="store_true", help=f"write the table into {PAGE.relative_to(ROOT)}")
+    parser.add_argument("--intervals", type=int, metavar="AXES", help="judge intervals of Maxwell slip on drawn axes")
+    parser.add_argument("--seed", type=int, default=1, help="of the drawn axes")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes of the drawn axes")
+    parser.add_argument("--out", type=Path, default=Path("build/friction-laws"), help="folder of the drawn axes")
     options = parser.parse_args(arguments)
+    if options.intervals:
+        counted = gms_intervals.study(options.intervals, options.seed, options.jobs, options.out, options.fmus)
+        shown = gms_intervals.table(counted)
+        print("", shown, sep="\n")
+        if options.write:
+            head, _, rest = _page("intervals")
+            PAGE.write_text(f"{head}\n\n{shown}\n\n{rest}", encoding="utf-8")
+        return 0
     with TemporaryDirectory(prefix="friction-laws-") as folder:
         if options.traces:
             machine = load_machine(options.machine) if options.machine else None
@@ -263,14 +286,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             rows += rows_of(case, options.fmus)
             print(table([row for row in rows if row.case == case.name]), flush=True)
     if options.write:
-        text = PAGE.read_text(encoding="utf-8")
-        head, _, rest = text.partition(BEGIN)
-        before, _, rest = rest.partition(END)
+        head, before, rest = _page("laws")
         own = {row.case for row in rows}
         kept = [line for line in before.strip().splitlines()[2:] if line.split("|")[1].strip() not in own]
         titles, line, *made = table(rows).splitlines()
         whole = "\n".join([titles, line, *kept, *made])
-        PAGE.write_text(f"{head}{BEGIN}\n\n{whole}\n\n{END}{rest}", encoding="utf-8")
+        PAGE.write_text(f"{head}\n\n{whole}\n\n{rest}", encoding="utf-8")
     return 0
 
 

@@ -37,6 +37,8 @@ function ring_step(most) {
   return [1, 2, 5, 10].map(entry => entry * decade).find(entry => Math.max(most, 0.1) <= 1.5 * entry);
 }
 
+const HIGHER = 10e-9; // m; a peak that is higher by less has the same height for a reader
+
 // peaks: heights over the fitted rest of the circle, once they are known; until then the marks carry no number.
 function contour_chart(task, result, kept, peaks) {
   const { turn, back } = task, seen = contour(result.trace, turn), curves = [], unrolled = [];
@@ -51,8 +53,14 @@ function contour_chart(task, result, kept, peaks) {
   draw("linear scales", seen, "blue", { width: 1.6 });
   if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(result.trace, back), "blue", { dash: "dashed", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
-  const heights = peaks && new Map(peaks.filter(entry => entry.sense === turn.sense).map(entry => [entry.name, entry.height]));
-  const marks = seen.glitches.filter(entry => !heights || heights.get(entry.name)).map(entry => mark(entry.angle, entry.deviation * 1e6, heights ? `${entry.name.replace("-", "−")}: ${fixed(heights.get(entry.name) * 1e6, 2)} µm` : ""));
+  // The height is that of the figures, the larger one of both directions; its place is in the first turn, unless that of the other is higher.
+  const glitches = new Map([turn, ...back ? [back] : []].map(entry => [entry.sense, contour(result.trace, entry).glitches]));
+  const marks = seen.glitches.map(({ name, angle, deviation }) => {
+    if (!peaks) return mark(angle, deviation * 1e6, "");
+    const own = peaks.filter(entry => entry.name === name), highest = less => own.reduce((best, entry) => Math.abs(entry.height) - less(entry) > Math.abs(best.height) - less(best) ? entry : best);
+    const { height } = highest(() => 0), place = glitches.get(highest(entry => entry.sense === turn.sense ? 0 : HIGHER).sense).find(entry => entry.name === name);
+    return height && mark(place.angle, place.deviation * 1e6, `${name.replace("-", "−")}: ${fixed(height * 1e6, 2)} µm`);
+  }).filter(Boolean);
   return { widths: [1.2, 1], panels: [
     { kind: "polar", title: `Contour error, ${turn.axes.join("-")}, R ${number(turn.radius * 1e3)} mm`, axes: turn.axes, radius: turn.radius * 1e3, ring, rings: most < 1.1 * ring ? 1 : 2, curves, marks,
       sense: back ? 0 : turn.sense, note: "" },

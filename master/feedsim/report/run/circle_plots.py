@@ -8,7 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from feedsim.analysis import Diagnosis, Turn, contour
+from feedsim.analysis import Contour, Diagnosis, Glitch, Turn, contour
+from feedsim.analysis.circle import Peak
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.formatting import minus
@@ -18,6 +19,7 @@ from feedsim.report.style import AT_TOOL, FRICTION, RESIDUAL_COLOUR, SIMULATED, 
 from feedsim.trace import Trace
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
+HIGHER = 10e-9  # m; a peak that is higher by less has the same height for a reader
 
 
 class OnCircle(Protocol):
@@ -45,9 +47,9 @@ def contour_picture(
         by_tool = contour(trace, turn, tool)
         curves.append(turned(TOOL_TITLE, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
     curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
-    over = ""
+    over, seen = "", {turn.sense: by_scale}
     if back is not None:
-        other = contour(trace, back)
+        seen[back.sense] = other = contour(trace, back)
         curves.append(
             turned(f"linear scales, {SENSE_WORDS[back.sense]}", SIMULATED, other.angle, other.deviation, "dashed", 1.2)
         )
@@ -59,28 +61,39 @@ def contour_picture(
         f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
         f"at ±{on.ring:g} µm about the programmed circle. "
     )
-    heights = _heights(diagnosis, turn.sense)
     caption += (
-        "The markers show the reversal peaks, over the fitted rest of the circle."
-        if heights
+        "The markers show the reversal peaks, over the fitted rest of the circle"
+        f"{', the larger one of both directions' if back is not None else ''}."
+        if diagnosis is not None
         else "The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, less the "
         "median of the turn."
     )
+    shown = [(glitch, glitch.height) for glitch in by_scale.glitches]
+    if diagnosis is not None:
+        shown = _peaks(diagnosis.peaks, seen)
     marks = [
         Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", RESIDUAL_COLOUR)
-        for glitch in by_scale.glitches
-        if (height := heights.get(glitch.name, 0.0 if heights else glitch.height))
+        for glitch, height in shown
+        if height
     ]
     median = Level(by_scale.median * 1e6, "median (scales)", dash="dotted")
     sense = turn.sense if back is None else 0
-    chart = circle_chart(on, curves, marks, (median,), sense, "" if heights else "quadrant glitches\n(less the median)")
+    note = "quadrant glitches\n(less the median)" if diagnosis is None else ""
+    chart = circle_chart(on, curves, marks, (median,), sense, note)
     return Picture(stem, title, caption, chart)
 
 
-def _heights(diagnosis: Diagnosis | None, sense: int) -> dict[str, float]:
-    """Where a turn of a sense reverses, such as "X+" -> height of its peak [m], 0 where none stands out."""
-    peaks = diagnosis.peaks if diagnosis is not None else ()
-    return {peak.name: peak.height for peak in peaks if peak.sense == sense}
+def _peaks(peaks: Sequence[Peak], seen: Mapping[int, Contour]) -> list[tuple[Glitch, float]]:
+    """Where each half axis reverses, the height of its largest peak of the turns ``seen`` (sense -> turn) [m], 0 where
+    none stands out, as figures have it; and the place of it: in the first turn, unless that of the other is higher."""
+    first = next(iter(seen))
+    result = []
+    for name in dict.fromkeys(peak.name for peak in peaks):
+        own = [peak for peak in peaks if peak.name == name]
+        place = max(own, key=lambda peak: abs(peak.height) - (0.0 if peak.sense == first else HIGHER))
+        height = max((peak.height for peak in own), key=abs)
+        result += [(glitch, height) for glitch in seen[place.sense].glitches if glitch.name == name]
+    return result
 
 
 def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:

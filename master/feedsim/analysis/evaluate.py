@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -131,64 +131,85 @@ class CircleTask:
         """Of the plane's axes [m]."""
         return {axis: 2 * math.pi * self.machine.axes[axis].I_P for axis in self.turn.axes}
 
+    @property
+    def _first(self) -> float:
+        """The circle's frequency [Hz]."""
+        return 1 / (self.turn.end - self.turn.begin)
+
+    @cached_property
+    def _system(self) -> LinearSystem | None:
+        """The closed loops; None where a drive is not the shipped one."""
+        try:
+            # Gain, drag and what follows of all axes are asked for one by one at the same few frequencies.
+            system = LinearSystem(self.machine, plant_modes(self.machine)[0], kept_from=1)
+            return system if system.drives else None
+        except InputError:
+            return None
+
+    @cached_property
+    def _orders(self) -> tuple[int, dict[str, int]]:
+        """Up to which multiple of the circle's frequency the loops' response to friction is taken; and of each axis, up
+        to which one errors that repeat with the pitch have harmonics."""
+        sampled = 0.4 / self.machine.cycles.T_c / self._first
+        counts = {}
+        for axis in self.turn.axes:
+            waves = 2 * math.pi * self.turn.radius / self.pitch[axis]
+            counts[axis] = max(int(min(waves + PITCH_HARMONICS * (1 + waves ** (1 / 3)), sampled, 500)), 1)
+        return math.ceil(max(2, min(DRAG_HIGHEST / self._first, sampled, DRAG_MOST))) - 1, counts
+
+    @cached_property
+    def _multiples(self) -> NDArray[np.int64]:
+        """Of the circle's frequency, ascending, all that is asked for: odd ones for friction, all for the pitch."""
+        top, counts = self._orders
+        return np.union1d(np.arange(1, top + 1, 2), np.arange(1, max(counts.values()) + 1))
+
+    def _at_multiples(
+        self, response: Callable[[LinearSystem, str, NDArray[np.float64]], NDArray[np.complex128]]
+    ) -> dict[str, NDArray[np.complex128]]:
+        """A response of the plane's axes at all multiples; empty where a drive is not the shipped one."""
+        if self._system is None:
+            return {}
+        frequency = np.asarray(self._first * self._multiples, dtype=np.float64)
+        return {axis: response(self._system, axis, frequency) for axis in self.turn.axes}
+
     @cached_property
     def gain(self) -> dict[str, complex]:
         """x_a/x_s of the plane's axes at the circle's frequency [1]; empty where a drive is not the shipped one."""
-        frequency = np.array([1 / (self.turn.end - self.turn.begin)])
-        try:
-            system = LinearSystem(self.machine, plant_modes(self.machine)[0])
-            return {
-                axis: complex(position_reference(system, axis, frequency, feedforward=True)[0])
-                for axis in self.turn.axes
-            }
-        except InputError:
-            return {}
+        responses = self._at_multiples(partial(position_reference, feedforward=True))
+        return {axis: complex(response[0]) for axis, response in responses.items()}
 
     @cached_property
     def drag(self) -> dict[str, NDArray[np.complex128]]:
         """x_a over M_add, a torque at the motor but for the current loop, of the plane's axes at the odd multiples of
         the circle's frequency [m/(N.m)]; empty as gain."""
-        first = 1 / (self.turn.end - self.turn.begin)
-        highest = min(DRAG_HIGHEST, 0.4 / self.machine.cycles.T_c)
-        frequency = first * np.arange(1, max(2, min(highest / first, DRAG_MOST)), 2)
-        try:
-            system = LinearSystem(self.machine, plant_modes(self.machine)[0])
-            return {
-                axis: system.closing({axis: "position"}).transfer(frequency, f"{axis}.x_a", f"{axis}.M_add")
-                for axis in self.turn.axes
-            }
-        except InputError:
-            return {}
+        own = (self._multiples % 2 == 1) & (self._multiples <= self._orders[0])
+        return {axis: response[own] for axis, response in self._at_multiples(_dragged).items()}
 
     @cached_property
     def following(self) -> dict[str, NDArray[np.complex128]]:
         """How the plane's axes follow errors of their measured positions, at the multiples of the circle's frequency up
         to where errors that repeat with the pitch have harmonics [1]; empty as gain."""
-        if not self.drag:
-            return {}
-        first, system = 1 / (self.turn.end - self.turn.begin), LinearSystem(self.machine, plant_modes(self.machine)[0])
-        result = {}
-        for axis in self.turn.axes:
-            waves = 2 * math.pi * self.turn.radius / self.pitch[axis]
-            count = int(
-                min(waves + PITCH_HARMONICS * (1 + waves ** (1 / 3)), 0.4 / self.machine.cycles.T_c / first, 500)
-            )
-            result[axis] = measuring_error(
-                system, axis, np.asarray(first * np.arange(1, max(count, 1) + 1), dtype=np.float64)
-            )
-        return result
+        counts = self._orders[1]
+        return {axis: response[: counts[axis]] for axis, response in self._at_multiples(measuring_error).items()}
 
     @property
     def response(self) -> Callable[[str, NDArray[np.float64]], NDArray[np.complex128]] | None:
         """x_a over a torque on the rotor, of an axis at frequencies (F,) [Hz]: (F,) [m/(N.m)]; None as gain."""
-        return self._of_torque if self.drag else None
+        system = self._system
+        if system is None:
+            return None
 
-    def _of_torque(self, axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        system = LinearSystem(self.machine, plant_modes(self.machine)[0])
-        s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-        per_setpoint, _ = system.drives[system.axes.index(axis)].torque(s)
-        added = system.closing({axis: "position"}).transfer(frequency, f"{axis}.x_a", f"{axis}.M_add")
-        return np.asarray(added / per_setpoint)
+        def of_torque(axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+            s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
+            per_setpoint, _ = system.drives[system.axes.index(axis)].torque(s)
+            return np.asarray(_dragged(system, axis, frequency) / per_setpoint)
+
+        return of_torque
+
+
+def _dragged(system: LinearSystem, axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """x_a over M_add of an axis with its position loop closed, at frequencies (F,) [Hz]: (F,) [m/(N.m)]."""
+    return system.closing({axis: "position"}).transfer(frequency, f"{axis}.x_a", f"{axis}.M_add")
 
 
 @dataclass(frozen=True)

@@ -45,15 +45,15 @@ KEPT_FROM = 500
 
 
 class Kept:
-    """The last results at grids, by what they are of."""
+    """The last results at grids of `least` values or more, by what they are of."""
 
-    def __init__(self, most: int) -> None:
-        self._most = most
+    def __init__(self, most: int, least: int) -> None:
+        self._most, self._least = most, least
         self._found: dict[tuple[Hashable, bytes], Complexes] = {}
 
     def __call__(self, of: Hashable, s: Complexes, compute: Callable[[Complexes], Complexes]) -> Complexes:
         """What ``compute`` gives at s (F,), read-only where it is kept."""
-        if len(s) < KEPT_FROM:
+        if len(s) < self._least:
             return compute(s)
         key = (of, s.tobytes())
         values = self._found.pop(key, None)
@@ -77,6 +77,7 @@ class LinearSystem:
         tool_force: how the force on the tool runs: "linear" between control instants (as a unit with an input slope
             has it), "held" over the control cycle, or "continuous".
         operating: steady motion per axis about which the motor equations are linearised; at rest where not named.
+        kept_from: frequencies of a grid from which on its responses are kept for the next one who asks.
 
     Inputs: "A.n_add", "A.M_add" (every T_c), "A.x_s", "A.n_ffw" (every T_pos), "A.M_a" (the motor torque itself, of an
     axis with closed "none"), "tool.F_d". Outputs, all at the control instants t_k: "A.n_a", "A.x_a", "A.M_a",
@@ -89,6 +90,7 @@ class LinearSystem:
     closed: Closed | Mapping[str, Closed] = "position"
     tool_force: Hold = "linear"
     operating: Mapping[str, OperatingPoint] | None = None
+    kept_from: int = KEPT_FROM
 
     def closing(self, closed: Closed | Mapping[str, Closed]) -> Self:
         """The same system with other loops closed; axes that a mapping does not name stay as they are."""
@@ -113,15 +115,15 @@ class LinearSystem:
     # level are the dear ones, and small.
     @cached_property
     def _responses(self) -> Kept:
-        return Kept(8)
+        return Kept(8, self.kept_from)
 
     @cached_property
     def _structure(self) -> Kept:
-        return Kept(12)
+        return Kept(12, self.kept_from)
 
     @cached_property
     def _levels(self) -> Kept:
-        return Kept(12)
+        return Kept(12, self.kept_from)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:

@@ -69,16 +69,13 @@ class Wave:
 
     def displacements(self, circle: CircleUnderTest, angle: Array, sense: int) -> Array:
         """Of the axis for 1 N.m of each part, at angles (N,) [rad] of a turn of ``sense``: (N, 2) [m]."""
-        time = np.linspace(0, 2 * math.pi, WAVE_POINTS, endpoint=False)
         # The first axis goes the same way in both senses; the second one goes back, and so does the sine.
-        back = (1.0, float(sense)) if self.axis == circle.axes[1] else (1.0, 1.0)
-        turned = sense * angle % (2 * math.pi)
-        return np.column_stack(
-            [
-                way * np.interp(turned, time, value, period=2 * math.pi)
-                for way, value in zip(back, self.moved, strict=True)
-            ]
-        )
+        back = float(sense) if self.axis == circle.axes[1] else 1.0
+        at = sense * angle % (2 * math.pi) * (WAVE_POINTS / (2 * math.pi))
+        low = at.astype(np.int64)
+        part = at - low
+        values = self.moved[:, low % WAVE_POINTS] * (1 - part) + self.moved[:, (low + 1) % WAVE_POINTS] * part
+        return np.column_stack([values[0], back * values[1]])
 
     def columns(self, circle: CircleUnderTest, angle: Array, sense: int) -> Array:
         """Radial deviation for 1 N.m of each part (N, 2) [m]."""
@@ -180,17 +177,17 @@ def _waves(circle: CircleUnderTest, axis: str) -> Iterator[Wave]:
     )
     grid = grid[grid >= first]
     response, at = circle.response(axis, grid), first * np.arange(1, highest + 1)
-    T = np.interp(at, grid, response.real) + 1j * np.interp(at, grid, response.imag)
+    T = np.zeros(WAVE_POINTS, dtype=np.complex128)  # what stands still the integrators take
+    T[1 : highest + 1] = np.interp(at, grid, response.real) + 1j * np.interp(at, grid, response.imag)
+    T[-highest:] = T[highest:0:-1].conj()
     time = np.linspace(0, 2 * math.pi, WAVE_POINTS, endpoint=False)
-    x = circle.radius * (np.cos, np.sin)[i](time)
-    for order in range(max(MOTOR_ORDERS[0], math.ceil(MIN_PERIODS * pitch / (2 * circle.radius))), top + 1):
-        moved = []
-        for wave in (np.cos, np.sin):
-            torque = np.fft.rfft(wave(2 * math.pi * order / pitch * x))
-            torque[0], torque[highest + 1 :] = 0, 0  # what stands still the integrators take
-            torque[1 : highest + 1] *= T
-            moved.append(np.fft.irfft(torque, WAVE_POINTS))
-        yield Wave(axis, order, (0.0, 0.0), math.inf, np.array(moved))
+    turn = np.exp(2j * math.pi / pitch * circle.radius * (np.cos, np.sin)[i](time))
+    lowest = max(MOTOR_ORDERS[0], math.ceil(MIN_PERIODS * pitch / (2 * circle.radius)))
+    torque = turn ** (lowest - 1)
+    for order in range(lowest, top + 1):
+        torque *= turn  # cosine and sine of the motor's angle at once, as the response is that of a real system
+        moved = np.fft.ifft(np.fft.fft(torque) * T)
+        yield Wave(axis, order, (0.0, 0.0), math.inf, np.array([moved.real, moved.imag]))
 
 
 class _Rest:
@@ -230,5 +227,6 @@ class _Rest:
         return (self._unexplained(others[0]) if others else 1.0) - self._unexplained(columns)
 
     def _unexplained(self, columns: Array) -> float:
-        off = self.left - columns @ np.linalg.lstsq(columns, self.left, rcond=None)[0]
+        # by the normal equations: a share that a threshold judges needs no more digits
+        off = self.left - columns @ np.linalg.lstsq(columns.T @ columns, columns.T @ self.left, rcond=None)[0]
         return float(off @ off) / max(float(self.left @ self.left), 1e-300)

@@ -63,7 +63,7 @@ def contour_picture(
     )
     caption += (
         "The markers show the reversal peaks, over the fitted rest of the circle"
-        f"{', the larger one of both directions' if back is not None else ''}."
+        f"{', in the direction that has the larger peak' if back is not None else ''}."
         if diagnosis is not None
         else "The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, less the "
         "median of the turn."

@@ -154,3 +154,28 @@ def test_of_a_long_motion_the_middle_is_looked_at() -> None:
     (line,) = found(long, noise(long) + 0.3e-6 * wave(long, 33.3))
     assert line.frequency == pytest.approx(33.3, abs=0.02)
     assert (line.begin, line.end) == (pytest.approx(4.2, abs=0.01), pytest.approx(8.2, abs=0.01))
+
+
+def test_rows_too_far_apart_say_nothing() -> None:
+    """Ten rows a second, and motions of three rows."""
+    time = 0.1 * np.arange(60)
+    setpoint = 0.02 * np.abs(time / 0.3 % 2 - 1)
+    record = Record("made", time=time, torque=0 * time, angle=setpoint / I_P, setpoint=setpoint / I_P)
+    coarse = AxisRecord("X", record, I_P, np.ones(len(time), dtype=bool))
+    assert found(coarse, noise(coarse)) == []
+
+
+def test_an_encoder_whose_steps_take_many_rows() -> None:
+    """Most rows repeat the one before; its turns are those of the setpoint all the same."""
+    slow = axis(((5e-3, 2.0), (0.3, 1.0)), ramp=0.02)
+    steps = np.floor(slow.position / 50e-6) * 50e-6 / I_P
+    stepped = replace(slow, record=replace(slow.record, angle=steps))
+    lines = found(stepped, noise(stepped, 2) + 0.5e-6 * wave(stepped, 30.0))
+    assert [line.frequency for line in lines] == pytest.approx([30.0, 30.0], abs=0.1)
+
+
+def test_an_axis_that_does_not_follow_its_setpoint() -> None:
+    still = replace(FAST, record=replace(FAST.record, angle=np.zeros(len(FAST.record))))
+    assert [line.frequency for line in found(still, wave(still, 30.0) * 1e-6 + noise(still))] == pytest.approx(
+        [30.0, 30.0], abs=0.1
+    )

@@ -74,6 +74,8 @@ def lines_in_motion(
         error: (N,) recorded position less that of the simulation [m]. torque_error: (N,) the same of the torque [N.m].
         axes: all that were recorded over the same time, this one included.
     """
+    if RATE_SHARE / axis_record.record.interval <= MIN_FREQUENCY:  # the rows are too far apart for any line
+        return ()
     longest = sorted(_one_way(axis_record), key=len)[-MAX_MOTIONS:]
     every = [
         _Motion(axis_record, rows, error, torque_error, axes) for rows in sorted(longest, key=lambda rows: rows[0])
@@ -291,7 +293,10 @@ class _Motion:
     def _over_angle(self, f: float, z: Array) -> tuple[float, bool, float]:
         """What a sine over the motor's angle takes of z, whether it may be a whole order, and turns per second."""
         turn = self.axis_record.position[self.rows] / (2 * np.pi * self.axis_record.I_P)
-        turns = float(np.median(np.abs(np.gradient(turn, self.h))))
+        rates = np.abs(np.gradient(turn, self.h))
+        turns = float(np.median(rates)) or float(np.mean(rates))  # a coarse encoder repeats its value in most rows
+        if not turns:  # the setpoint moves, the axis does not: no order
+            return 0.0, False, 0.0
         order, width = f / turns, 1 / (turns * self.duration)
         gains = []
         for own in order + width * np.linspace(-1, 1, 21):

@@ -57,8 +57,7 @@ MIN_GAIN_PER_PARAMETER = 12.0
 # Of Maxwell slip: no value of them is without effect, so that a fit without them is none with less in it. They are free
 # where the records determine them, also where the usual value happens to be the best one.
 WITHOUT_NEUTRAL = frozenset({"spread", "skew", "C"})
-# Also beside a stage 1 sought last: free from the start it follows small sines of an axis of another law, and leaves
-# three times as much of a circle.
+# Free from the start it follows small sines of an axis of another law, and leaves three times as much of a circle.
 LATE = frozenset({"C"})
 # In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
 # Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.

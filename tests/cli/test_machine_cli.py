@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import json
+import re
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -183,6 +186,20 @@ def test_axes_of_other_names_contradict(machine: Path, tmp_path: Path, capsys: C
     error = capsys.readouterr().err
     assert "axes: U; " in error
     assert "axes: X (other axes)" in error
+
+
+def test_the_next_step_of_a_report_can_be_typed(machine: Path, tmp_path: Path, capsys: Capture) -> None:
+    """It names a mode that is not rigid, and where its pictures go."""
+    assert run("show", machine, "--out", tmp_path / "out", "--quiet") == 0
+    page = html.unescape((tmp_path / "out" / "report.html").read_text())
+    line = re.search(r"feedsim machine show [^<]*", page)
+    assert line is not None
+    words = shlex.split(line[0])
+    assert Path(words[words.index("--out") + 1]) == tmp_path / "out"
+    modes, lowest = read_modes(machine / "modes.csv", ["X"]), int(words[words.index("--mode") + 1])
+    assert modes.frequency[lowest] > 0
+    assert modes.frequency[lowest - 1] == 0
+    capsys.readouterr()
 
 
 def test_no_structure_no_build(machine: Path, tmp_path: Path, capsys: Capture) -> None:

@@ -74,3 +74,25 @@ def test_a_block_of_a_capture(tmp_path: Path) -> None:
     rows = (tmp_path / "out" / "replay.csv").read_text().splitlines()
     assert float(rows[1].split(",")[0]) == pytest.approx(0.408)
     assert float(rows[-1].split(",")[0]) == pytest.approx(0.58)
+
+
+def test_a_part_without_motion_for_an_inertia_names_its_axis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Reversals faster than a window of the rigid line: it says which axis, and which options choose others."""
+    record = tmp_path / "record.csv"
+    angle = [0.1 * math.sin(2 * math.pi * 30 * 0.002 * i) for i in range(500)]
+    rows = [f"{0.002 * i:.3f},{q:.6f},{0.99 * q:.6f},{-2 * q:.6f}" for i, q in enumerate(angle)]
+    record.write_text("\n".join(["time [s],X.x_s [rad],X.x_a [rad],X.M_a [N.m]", *rows]) + "\n")
+    columns = tmp_path / "columns.yaml"
+    columns.write_text(
+        "time: {column: time, unit: s}\nsetpoint: {column: X.x_s, unit: rad}\nposition: {column: X.x_a, unit: rad}\n"
+        "torque: {column: X.M_a, unit: N.m}\npitch: 10 mm\n"
+    )
+    words = ["identify-drive", str(record), "--axes", "X", "--columns", str(columns)]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "feedsim: axis X: " in said, said
+    assert "to determine its inertia" in said
+    assert "--axes names the axes that move, --window a part of it" in said
+    assert not (tmp_path / "out").exists()

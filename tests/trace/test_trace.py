@@ -359,7 +359,8 @@ def test_mat_to_csv(mat: Path, tmp_path: Path) -> None:
         ([("t", "time", "s"), ("q", "x", "furlong")], "unknown unit 'furlong'"),
         ([("t", "time", "s"), ("q", "x", "m"), ("n", "x", "m")], "two columns are to be called 'x'"),
         ([("q", "x", "m")], "the first column must be the time"),
-        ([], "which column is the time? --column t=time:s"),
+        ([], "which column is the time? --column t=time:s, and one for each other column; there are "),
+        ([], "q, "),
     ],
 )
 def test_mat_files_that_are_refused(

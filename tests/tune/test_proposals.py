@@ -99,6 +99,17 @@ def test_a_weak_speed_controller(fmus: Path) -> None:
     assert first.proposed == pytest.approx(6.18, rel=0.15)
 
 
+def test_a_speed_controller_above_its_model_is_not_weakened_for_a_peak(fmus: Path) -> None:
+    """Less gain would fit the model of the loop, and would answer friction later: the peak would grow."""
+    off = [DRIVE.format("Z", "K_p=8 N.m.s/rad")]
+    machine = load(CIRCLE, off).machine
+    fitting = model_gain(machine.axes["Z"].drive, checked_modes(machine).J_tot("Z"))
+    assert fitting is not None
+    assert fitting < 0.8 * machine.axes["Z"].drive.K_p
+    of_peak = [one.parameter for one in proposals(off, fmus) if one.cause == "reversal peaks of Z"]
+    assert of_peak == ["drive.T_n"]
+
+
 def test_a_slow_integral_part(fmus: Path) -> None:
     first = proposals([DRIVE.format("Z", "T_n=20 ms")], fmus, searched=True)[0]
     assert (first.axis, first.parameter, first.direction) == ("Z", "drive.T_n", "lower")

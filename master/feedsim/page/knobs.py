@@ -128,7 +128,7 @@ def _of_axes(machine: Machine) -> list[Knob]:
         group = f"axis {axis}"
         given = controller_parameters(machine, axis)
         drive: dict[str, Any] = {**given, **{name: effect for name, effect in _effects().items() if name not in given}}
-        friction = machine.shipped_friction(axis, "machine.fmu").parameters()
+        friction = machine.shipped_friction(axis, "a page").parameters()
         structure = _at_slide(described)
         for part, values, unit in (("drive", drive, "controller"), ("friction", friction, "friction"),
                                    ("", structure, "plant/axis")):  # fmt: skip

@@ -58,12 +58,16 @@ def start_values(each: AxisRecord) -> Begin:
             f"{1e6 * LEAST_TRAVEL * each.I_P:.3g} um at least"
         )
     rows = np.flatnonzero(each.rows)
-    found, J_sigma = _rigid_line(each.record.between(int(rows[0]), int(rows[-1]) + 1))
+    try:
+        found, J_sigma = _rigid_line(each.record.between(int(rows[0]), int(rows[-1]) + 1))
+    except InputError as error:
+        raise InputError(f"axis {each.axis}: {error}; --axes names the axes that move, --window a part of it") from None
     line = {name: one.value for name, one in found.estimates.items()}
     J = line["J"]
     if not J > 0:
         raise InputError(
-            f"{each.record.name}: the inertia comes out as {J:.3g} kg.m2; the torque's sign or unit is wrong"
+            f"{each.record.name}, axis {each.axis}: the inertia comes out as {J:.3g} kg.m2; "
+            "the torque's sign or unit is wrong"
         )
     moving = each.moving
     torque = float(np.sqrt(np.mean(each.record.torque[moving] ** 2)))

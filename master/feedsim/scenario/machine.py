@@ -288,7 +288,7 @@ class Machine(Model):
         """Those of LuGre. InputError: as :meth:`friction_of`, and of another law."""
         friction = self.friction_of(axis, who)
         if not isinstance(friction, Friction):
-            raise InputError(f"axis {axis}: its friction has the law {friction.law}; {who} needs LuGre")
+            raise InputError(f"axis {axis}: its friction has the law {friction.law}; {who} needs LuGre (law: lugre)")
         return friction
 
     @property

@@ -185,7 +185,10 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
     recording = read_recording(path)
     if not columns:
         if recording.units.get("time") != "s":
-            raise InputError(f"{path}: which column is the time? --column t=time:s, and one for each other column")
+            raise InputError(
+                f"{path}: which column is the time? --column t=time:s, and one for each other column; there are "
+                f"{', '.join(sorted(recording.names))}"
+            )
         columns = [("time", "time", "s")]
         columns += [(name, name, recording.units[name]) for name in recording.names if name != "time"]
     read = recording.read(variable for variable, _, _ in columns)

@@ -157,7 +157,10 @@ def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, search
             drive = machine.axes[term.axis].drive
             assert isinstance(drive, Drive)
             cause = f"reversal peaks of {term.axis}"
-            yield from _fitting(machine, modes, term.axis, drive, cause)
+            for proposal in _fitting(machine, modes, term.axis, drive, cause):
+                # A lower gain answers friction later: it makes a peak larger, though the model would fit.
+                if term.value < 0 or proposal.direction == "higher":
+                    yield proposal
             if term.value > 0:
                 yield from _shorter(machine, modes, term.axis, drive, cause, searched)
         case "lost_motion":
@@ -179,7 +182,7 @@ def _by_gain(terms: Sequence[Term], machine: Machine, modes: Modes) -> list[Term
         if not 0 < present < math.inf:
             return 0.0
         fitting = model_gain(drive, J)
-        K_p = drive.K_p if fitting is None or abs(drive.K_p / fitting - 1) <= FITS else fitting
+        K_p = drive.K_p if fitting is None or 1 - drive.K_p / fitting <= FITS else fitting
         T_n = drive.T_n
         if drive.speed_integrator and T_n is not None:
             T_n = min(T_n, max(USUAL_RESET_RATIO * J / K_p, MIN_RESET_TIME))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile, code, typed
+from feedsim.report.content import FOLDER, Animation, Paragraph, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import display_unit, number, typeset
 from feedsim.report.machine.animation import mode_gif
 from feedsim.report.machine.model import model
@@ -69,7 +69,10 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         warnings=info.warnings,
         notes=[info.note],
         tiles=list(_tiles(info)),
-        next_step=("See how a mode moves:\n", code(f"feedsim machine show {typed(files[0][1])} --mode 1 --animate")),
+        next_step=(
+            "See how a mode moves:\n",
+            code(f"feedsim machine show {typed(files[0][1])} --mode {_lowest(info)} --animate --out {FOLDER}"),
+        ),
         main=[*pictures, _axes(info), _modes(info)],
         provenance=provenance_section(rows, hashed(list(files))),
         footer="Values in full precision: summary.json. Pictures: figures/.",
@@ -79,14 +82,18 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
 def answers(info: MachineInfo) -> list[str]:
     """The lowest mode and what moves in it, and whether the exchange with friction is stable."""
     lines = []
-    if elastic := [k for k, f in enumerate(info.modes.frequency.tolist()) if f > 0]:
-        k = elastic[0]
+    if info.modes.frequency[k := _lowest(info)] > 0:
         lines.append(f"The lowest elastic mode is at {info.modes.frequency[k]:.2f} Hz: {moves(info, k)}.")
     shares = [axis.friction_slope / axis.coupling_limit for axis in info.axes if math.isfinite(axis.friction_slope)]
     if shares and max(shares) <= USUAL_EXCHANGE.stable_share:
         lines.append("The exchange of plant and friction is stable by far (table Axes)." if max(shares) < FAR_BELOW
                      else "The exchange of plant and friction is stable (table Axes).")  # fmt: skip
     return lines
+
+
+def _lowest(info: MachineInfo) -> int:
+    """Number of the lowest elastic mode; 0 where all are rigid."""
+    return next((k for k, f in enumerate(info.modes.frequency.tolist()) if f > 0), 0)
 
 
 def _tiles(info: MachineInfo) -> Iterator[Tile]:

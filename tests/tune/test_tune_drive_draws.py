@@ -17,7 +17,7 @@ from feedsim.linear.candidates import Candidates
 from feedsim.scenario import load
 from feedsim.structure import Modes, checked_modes
 from feedsim.tune import compensation, drive
-from feedsim.tune.circles import Circles
+from feedsim.tune.circles import Circles, Contour
 from feedsim.tune.drive_margins import judges_of, margins_of
 from feedsim.tune.drive_program import DriveProgram
 from feedsim.tune.drive_result import Limits
@@ -176,16 +176,18 @@ def test_the_draw_that_fails_is_named_by_tune_drive(
     [
         (1, "pulse", "draw 1 of 4 of the machine, which the values are found on"),
         (3, "pulse", "draw 3 of 4 of the machine, which the values are found on"),
-        (19, "model", "draw 1 of 19 of the machine"),  # 2 tuned on, 3 held out, 7 effects twice
-        (22, "model", "draw 2 of 19 of the machine"),
+        # Circles tuned on, circles of the practical range, those with 7 effects: without friction, before, after.
+        (27, "model", "draw 1 of 19 of the machine"),
+        (30, "model", "draw 2 of 19 of the machine"),
     ],
 )
 def test_the_draw_that_fails_is_named_by_tune_compensation(
     calls: int, kind: str, which: str, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = load(CIRCLE, [f"machine.axes.Z.friction={write_set(tmp_path)}"])
-    fails = Fails(lambda circles, *args, **named: np.ones((len(circles.pairs), 2, 2)), calls)
-    monkeypatch.setattr(Circles, "errors", lambda *args, **named: fails(*args, **named))
+    turn = Contour(np.linspace(-np.pi, np.pi, 361), np.ones(361))
+    fails = Fails(lambda circles, *args, **named: (turn,) * len(circles.pairs), calls)
+    monkeypatch.setattr(Circles, "contours", lambda *args, **named: fails(*args, **named))
     with pytest.raises(SimulationError, match=rf"^{which}: unit X\.friction: no"):
         compensation.tune(
             scenario, kind, ("X", "Z"), ("Z",), "ratio", fmus=fmus, progress=lambda *_: None,

@@ -21,9 +21,11 @@ from feedsim.errors import InputError
 from feedsim.linear.loops import speed_gain
 from feedsim.linear.system import LinearSystem
 from feedsim.nc.excitation import binary_sequence, multisine
+from feedsim.scenario import load_machine
 from feedsim.structure import checked_modes
 from feedsim.trace.response import FrequencyResponse
 from scenario_helpers import default_machine
+from structure_helpers import MACHINES
 
 Complexes = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -249,6 +251,17 @@ def test_unsettled_response_is_warned_of(excited: Measure) -> None:
     hasty = excited("Z", "M_add", seeds=(0,), signal=signal, settle=0)[0]
     assert any("has not settled" in warning for warning in hasty.warnings)
     assert excited("Z", "M_add", seeds=(0,), signal=signal, settle=30)[0].unsettled < 1e-6
+
+
+def test_rounding_of_an_axis_that_is_not_reached_is_no_response(fmus: Path) -> None:
+    """Y of this machine has no mode in common with X: what it does while X is excited is the last bit of its values."""
+    machine = load_machine(MACHINES / "sinumerik_840d")
+    signal = multisine(machine.cycles, 0.3, band=(5, 400), resolution=5.0)
+    measurement = measure(machine, "X", signal, settle=13, periods=2, fmus=fmus)
+    assert 0 < np.std(measurement.trace["Y.n_s"]) < 1e-9 * np.std(measurement.trace["X.n_s"])
+    assert measurement.unsettled < 1e-6
+    assert not measurement.warnings
+    assert measure(machine, "X", signal, settle=0, periods=2, fmus=fmus).unsettled > 1e-3
 
 
 @pytest.mark.parametrize(("speed", "middle"), [(5.0, 0.1), (-5.0, 0.1), (50.0, None)])

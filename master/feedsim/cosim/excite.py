@@ -44,6 +44,7 @@ TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z")
 LIMITS = {"torque_limited": ("M_max", "N.m"), "voltage_limited": ("u_max", "V")}
 # Periods that differ by more than this share of the signal have not settled: 0.01 dB.
 PERIOD_TOLERANCE = 1e-3
+UNREACHED = 1e-9  # of the largest motion in the same unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,14 +330,15 @@ def _refuse_limits(machine: Machine, record: _Record, inject: str, excitation: E
 def _unsettled(trace: Trace, rows: int, periods: int) -> float:
     if periods < 2:
         return 0.0
+    moved = {name: float(np.std(trace[name][-rows:] - _line(trace[name][-rows:]))) for name in trace}
     largest = 0.0
     for name in trace:
         last, before = trace[name][-rows:], trace[name][-2 * rows : -rows]
-        change = last - before
-        scale, spread = float(np.std(last - _line(last))), float(np.std(change))
-        # what is far below the resolution of the values themselves says nothing
-        if scale > 1e-12 * float(np.max(np.abs(last))):
-            largest = max(largest, spread / scale)
+        # What is far below the resolution of the values themselves says nothing, nor does rounding of an axis that the
+        # excitation does not reach.
+        reached = max(moved[other] for other in trace if trace.unit(other) == trace.unit(name))
+        if moved[name] > max(1e-12 * float(np.max(np.abs(last))), UNREACHED * reached):
+            largest = max(largest, float(np.std(last - before)) / moved[name])
     return largest
 
 

@@ -53,7 +53,7 @@ function contour_chart(task, result, kept, peaks) {
   draw("linear scales", seen, "blue", { width: 1.6 });
   if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(result.trace, back), "blue", { dash: "dashed", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
-  // The height is that of the figures, the larger one of both directions; its place is in the first turn, unless that of the other is higher.
+  // The height is that of the figures, the larger of the two directions; its place is in the first turn, unless that of the other is higher.
   const glitches = new Map([turn, ...back ? [back] : []].map(entry => [entry.sense, contour(result.trace, entry).glitches]));
   const marks = seen.glitches.map(({ name, angle, deviation }) => {
     if (!peaks) return mark(angle, deviation * 1e6, "");

@@ -131,7 +131,7 @@ function nearest(x, value) {
   return k > 0 && (k === x.length || value - x[k - 1] <= x[k] - value) ? k - 1 : k;
 }
 
-// A curve as a path: of each column of pixels its extremes, where there are more rows than can be told apart.
+// A curve as a path: of each column of pixels its extremes, where several rows share a column.
 function path_of(x, y, across, up, range, columns) {
   const parts = [];
   let pen = "M", last_a = NaN, last_b = NaN;

@@ -124,7 +124,7 @@ $(BUILD)/fmus-all/machine.fmu: $(MACHINE_SOURCES)
 $(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
 
 # The unit machine for pages: clang with wasi-libc where they are there, else zig from PyPI.
-page-module: fmus/machine.wasm ## build the machine as WebAssembly for feedsim page, with clang or zig
+page-module: fmus/machine.wasm ## build the machine as WebAssembly for feedsim export, with clang or zig
 
 fmus/machine.wasm: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) $(MACHINE_SOURCES) $(wildcard src/page/*.c)
 	@$(PY) -m feedsim_packager web --out $@ || { echo "installing zig from PyPI (requirements-zig.lock)"; \
@@ -208,7 +208,7 @@ test-importers: fmus $(VENV)/.importers ## the units in other simulators, three 
 
 schemas: $(VENV)/.run $(VARIABLES) ## write the JSON Schemas of scenarios/schemas anew, for editors
 	@set -e; for file in scenarios/schemas/*.schema.json; do \
-	    kind=$${file##*/}; $(VENV)/bin/feedsim schema $${kind%%.*} > $(BUILD)/schema.json; mv $(BUILD)/schema.json $$file; done
+	    kind=$${file##*/}; $(VENV)/bin/feedsim tools schema $${kind%%.*} > $(BUILD)/schema.json; mv $(BUILD)/schema.json $$file; done
 
 reference: $(VENV)/.dev $(VARIABLES) ## make the pinned reference CSVs anew, from scipy and the monolithic implementation
 	$(PY) tests/reference/make_reference.py

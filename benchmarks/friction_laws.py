@@ -1,12 +1,12 @@
 """Friction laws compared, in and out of sample: Coulomb, Stribeck, LuGre, generalised Maxwell slip (GMS).
 
 Every law is fitted to one part of what there is of an axis, and judged by the torque of the other part, which no fit
-has seen. LuGre and Maxwell slip are identified as `feedsim identify` does it; Coulomb and Stribeck are functions of the
+has seen. LuGre and Maxwell slip are identified as feedsim does it; Coulomb and Stribeck are functions of the
 speed, fitted by least squares with the inertia and the delay that LuGre's fit has.
 
     make friction-laws                                       simulated axes; measured ones where these are named:
     FEEDSIM_EMPS=DATA_EMPS.mat FEEDSIM_CAPTURE=capture.json make friction-laws
-    python benchmarks/friction_laws.py TRACE.csv --axis Z --machine MACHINE [--columns MAPPING.yaml]
+    python benchmarks/friction_laws.py TRACE.csv --axes Z --machine MACHINE [--columns MAPPING.yaml]
                                                              a record of your own: fitted to its first half
     make friction-laws ARGS='--intervals 60'                 whether intervals of Maxwell slip hold the truth, on so
                                                              many drawn axes (gms_intervals.py; ten seconds of one core
@@ -255,7 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "traces", nargs="*", type=Path, metavar="TRACE", help="records of one axis; default: the page's"
     )
-    parser.add_argument("--axis", help="axis of the records")
+    parser.add_argument("--axes", help="axis of the records")
     parser.add_argument("--machine", type=Path, help="machine that gives pitch, torque constant and inertia")
     parser.add_argument("--columns", type=Path, help="which columns of the records are what")
     parser.add_argument("--fmus", type=Path, help="folder of the archives")

@@ -94,7 +94,7 @@ def write(folder: Path, axes: int, count: int) -> Path:
 
 
 def pack_machine(folder: Path, axes: int) -> None:
-    """Pack the machine of a folder, as ``feedsim machine pack`` does."""
+    """Pack the machine of a folder, as ``feedsim export --plant`` does."""
     pose = dict.fromkeys(NAMES[:axes], POSE)
     pack(fmus_directory() / "plant.fmu", folder / PLANT, modes=folder / "modes.csv", pose=pose)
 

@@ -24,7 +24,7 @@ def tables(text: str) -> list[str]:
 
 
 def filled(page: str, printed: Mapping[str, str]) -> str:
-    """`page` with the tables of `printed`, benchmark -> what it has printed.
+    """`export` with the tables of `printed`, benchmark -> what it has printed.
 
     ValueError: a marker asks for a table that the benchmark has not printed.
     """

@@ -92,7 +92,7 @@ COMMANDS = {
     "import": ("`import feedsim`", ["-c", "import feedsim"]),
     "version": ("`feedsim --version`", [*FEEDSIM, "--version"]),
     "help": ("`feedsim --help`", [*FEEDSIM, "--help"]),
-    "validate": ("`feedsim validate scenarios/xz_circle.yaml`", [*FEEDSIM, "validate", str(CIRCLE)]),
+    "validate": ("`feedsim check scenarios/xz_circle.yaml`", [*FEEDSIM, "validate", str(CIRCLE)]),
     "run": ("`feedsim run scenarios/xz_circle.yaml`", [*FEEDSIM, "run", str(CIRCLE), "--quiet", "--out"]),
     "drawn": (
         "the same with `--figures png,svg`",

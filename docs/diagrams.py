@@ -355,7 +355,7 @@ def report() -> Drawing:
     it.text((392, 366), "Next", "note", "start")
     it.box(392, 380, 248, 34)
     it.shapes.append(
-        '<text x="516" y="402" text-anchor="middle" class="small">feedsim compensate xz_circle.yaml</text>'
+        '<text x="516" y="402" text-anchor="middle" class="small">feedsim tune feedforward xz_circle.yaml</text>'
     )
     for number, title in enumerate(
         ("Torque and friction torque", "All axes over the whole run", "Why the circle is not round")

@@ -88,7 +88,7 @@ def stribeck(place: Path) -> None:
         scenario = SCENARIOS / f"identify_z_{motion}.yaml"
         command("run", scenario, "--set", "logging.noise.i_q=5 %", "--out", place / motion)
         logs.append(place / motion / "log.csv")
-    command("identify", *logs, "--axis", "Z", "--machine", MACHINE, "--figures", "png", "--out", place / "found")
+    command("identify", *logs, "--axes", "Z", "--machine", MACHINE, "--figures", "png", "--out", place / "found")
     taken(place / "found", "stribeck.png", "stribeck-Z.png")
 
 

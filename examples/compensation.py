@@ -7,7 +7,7 @@ and machine have the same friction here.
 import feedsim as fs
 
 fs.example("xz_circle")
-result = fs.compensate("xz_circle.yaml", table=False)
+result = fs.tune_feedforward("xz_circle.yaml", table=False)
 for name in ("before.G", "after.G"):
     print(f"{name} {result.figures[name].value:.3g} um")
 result.plot().save("compensation.png")

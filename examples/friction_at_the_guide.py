@@ -11,4 +11,4 @@ motor = fs.run("xz_circle.yaml")
 guide = fs.run("xz_circle.yaml", set={"machine.axes.X.guide.share": "60 %"})
 for name, result in (("motor", motor), ("guide", guide)):
     print(f"{name}: peak of X {result.figures['XZ.peak_X'].value:.2f} um")
-fs.show(motor=motor, guide=guide).pictures[0].save("friction_at_the_guide.png")
+fs.diff(motor=motor, guide=guide).pictures[0].save("friction_at_the_guide.png")

@@ -11,6 +11,6 @@ for motion in ("constant", "sine"):
     fs.example(f"identify_z_{motion}")
     fs.run(f"identify_z_{motion}.yaml", set={"logging.noise.i_q": "2 %"}, out=motion, force=True)
     logs.append(f"{motion}/log.csv")
-result = fs.identify(logs, "Z", "machines/test_centre")
+result = fs.identify_friction(logs, "Z", "machines/test_centre")
 print(result.answers[0])
 result.plot().save("identify_friction.png")

@@ -13,4 +13,4 @@ results = {
 }
 for name, result in results.items():
     print(f"{name}: glitch of Z {result.figures['XZ.glitch_Z'].value:.2f} um")
-fs.show(**results).pictures[0].save("position_gain.png")
+fs.diff(**results).pictures[0].save("position_gain.png")

@@ -12,4 +12,4 @@ soft = fs.run("z_positioning.yaml", set={"machine.path.jerk": "60 m/s^3"})
 for name, result in (("150 m/s^3", hard), ("60 m/s^3", soft)):
     figures = result.figures
     print(f"{name}: {figures['Z.overshoot'].value:.2f} um, {figures['Z.settling_time'].value:.0f} ms")
-fs.show(hard=hard, soft=soft).pictures[0].save("soft_stop.png")
+fs.diff(hard=hard, soft=soft).pictures[0].save("soft_stop.png")

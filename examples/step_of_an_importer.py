@@ -11,7 +11,7 @@ from fmpy import simulate_fmu
 import feedsim as fs
 
 fs.example("z_positioning")
-fs.pack("z_positioning.yaml", "machine.fmu", force=True)
+fs.export("z_positioning.yaml", "machine.fmu", force=True)
 figure, axes = plt.subplots(figsize=(6, 4))
 found = {}
 for step, style in ((125e-6, "-"), (10e-3, "o")):

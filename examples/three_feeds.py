@@ -13,4 +13,4 @@ results = {
 }
 for name, result in results.items():
     print(f"{feeds[name]}: peak of Z {result.figures['XZ.peak_Z'].value:.2f} um")
-fs.show(**results).pictures[0].save("three_feeds.png")
+fs.diff(**results).pictures[0].save("three_feeds.png")

@@ -11,4 +11,4 @@ engaging = fs.run("xz_circle.yaml")
 pure = fs.run("xz_circle.yaml", set={"machine.axes.*.friction.W": "0 rad"})
 for name, result in (("engaging zone", engaging), ("pure LuGre", pure)):
     print(f"{name}: glitch of Z {result.figures['XZ.glitch_Z'].value:.2f} um")
-fs.show(engaging_zone=engaging, pure_LuGre=pure).pictures[0].save("without_engaging_zone.png")
+fs.diff(engaging_zone=engaging, pure_LuGre=pure).pictures[0].save("without_engaging_zone.png")

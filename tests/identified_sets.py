@@ -1,4 +1,4 @@
-"""Friction files with intervals, written as feedsim identify writes them."""
+"""Friction files with intervals, written as feedsim identify friction writes them."""
 
 from __future__ import annotations
 

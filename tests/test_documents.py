@@ -60,7 +60,7 @@ def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenarios").symlink_to(ROOT / "scenarios", target_is_directory=True)
     written = tmp_path / "z_positioning.ssp"
-    assert cli.main(["ssp", "scenarios/z_positioning.yaml", "--out", str(written)]) == 0
+    assert cli.main(["export", "scenarios/z_positioning.yaml", "--out", str(written)]) == 0
     for command in commands:
         options = cli.parser().parse_args(command)
         if command[0] == "ssp":

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
 
 from feedsim import cli, examples, scenario
-from feedsim.cli.options import Command
+from feedsim.cli.commands import commands
 from feedsim.errors import InputError, OutputError
 from feedsim.scenario.study import load_study
 
@@ -106,16 +105,10 @@ def test_the_list_has_one_column_of_texts(capsys: pytest.CaptureFixture[str]) ->
     assert len({row.index(each.about) for row, each in zip(rows, examples.examples(), strict=True)}) == 1
 
 
-def _told(commands: Iterable[Command]) -> Iterator[str]:
-    for command in commands:
-        yield command.epilog or ""
-        yield from _told(command.commands)
-
-
 def test_what_a_help_names_can_be_copied_as_it_says(tmp_path: Path) -> None:
     """Who has installed a wheel has no folder scenarios/: the examples of a help begin with what brings their files."""
     seen = set()
-    for number, told in enumerate([cli.EPILOG, *_told(cli.COMMANDS)]):
+    for number, told in enumerate([command.declared.examples for command in commands()]):
         folder = tmp_path / str(number)
         for names in re.findall(r"feedsim example ((?:\w+ ?)+)", told):
             examples.copy(names.split(), folder)

@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 from feedsim import extras
-from feedsim.cli import COMMANDS
-from feedsim.cli.options import Command
+from feedsim.cli.commands import commands
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -33,17 +32,16 @@ WITHOUT = f"{BLOCK}import feedsim.cli, feedsim.extras\nsys.exit(feedsim.cli.main
 EXAMPLES = {
     "example": ["xz_circle", "--to", "copied"],
     "run": ["{scenarios}/z_positioning.yaml", "--set=motions=[{{kind: dwell, duration: 20 ms}}]", "--set=evaluate=[]"],
-    "validate": ["{scenarios}/xz_circle.yaml"],
+    "check": ["{scenarios}/xz_circle.yaml"],
     "machine build": ["{scenarios}/machines/test_centre", "--out", "built"],
     "machine info": ["{scenarios}/machines/test_centre"],
-    "machine show": ["{scenarios}/machines/test_centre", "--out", "shown"],
-    "machine pack": ["{scenarios}/machines/test_centre", "--out", "plant.fmu"],
-    "ssp": ["{scenarios}/z_positioning.yaml", "--out", "z.ssp"],
-    "compare": ["a.csv", "a.csv", "--report", "a.html", "--junit", "a.xml", "--json", "a.json"],
-    "convert": ["a.csv", "--column", "time=time:s", "--column", "x=Z.x_a:m", "--out", "b.csv"],
-    "schema": ["scenario"],
-    "completion": ["bash"],
-    "sweep": ["{scenarios}/studies/z_stop.yaml", "--dry-run"],
+    "machine view": ["{scenarios}/machines/test_centre", "--out", "shown"],
+    "export": ["{scenarios}/z_positioning.yaml", "--out", "z.ssp"],
+    "compare": ["a.csv", "a.csv", "--report", "a.html", "--junit", "a.xml"],
+    "tools convert": ["a.csv", "--column", "time=time:s", "--column", "x=Z.x_a:m", "--out", "b.csv"],
+    "tools schema": ["scenario"],
+    "tools completion": ["bash"],
+    "sweep": ["{scenarios}/studies/z_stop.yaml", "--runs", "2", "--workers", "0"],
 }
 
 
@@ -67,15 +65,7 @@ def without(packages: list[str], *command: str, cwd: Path) -> subprocess.Complet
     return python(WITHOUT, packages, *command, cwd=cwd)
 
 
-def leaves(commands: tuple[Command, ...] = COMMANDS, ahead: str = "") -> Iterator[tuple[str, Command]]:
-    for command in commands:
-        if command.commands:
-            yield from leaves(tuple(command.commands), f"{ahead}{command.name} ")
-        else:
-            yield ahead + command.name, command
-
-
-LEAVES = dict(leaves())
+LEAVES = {command.name: command.declared for command in commands()}
 
 
 @pytest.fixture
@@ -102,17 +92,17 @@ def test_all_brings_what_commands_need() -> None:
 def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: str, folder: Path) -> None:
     """What is said is before the command looks at its arguments, or they are the example's."""
     needs = LEAVES[name].needs
-    arguments = {"identify": ["a.csv"], "circle": ["a.csv"], "frf": ["a"], "show": ["a"], "compensate": ["a"]}
+    arguments = {"identify friction": ["a.csv"], "circle": ["a.csv"], "frf": ["a"], "diff": ["a"]}
     record = {
         "tune compensation": ["a"],
-        "tune drive": ["a", "--axis", "Z"],
+        "tune feedforward": ["a"],
+        "tune proposals": ["a"],
+        "tune drive": ["a", "--axes", "Z"],
         "machine import": ["a"],
         "machine export": ["a", "--like", "b"],
         "replay": ["a", "--machine", "a"],
-        "identify-drive": ["a"],
-        "identify-modes": ["a", "--machine", "a"],
-        "pack": ["a", "--out", "b.fmu"],
-        "page": ["a", "--out", "b.html"],
+        "identify drive": ["a"],
+        "identify modes": ["a", "--machine", "a"],
         "docs": ["--path"],
     }
     given = example(name) if name in EXAMPLES else [*name.split(), *(arguments | record)[name]]
@@ -141,7 +131,7 @@ def test_a_check_does_with_nothing_less(module: str, folder: Path) -> None:
     done = python(
         WITHOUT.replace("sys.exit", "feedsim.extras.EXTRAS['run'] = ()\nsys.exit"),
         [module],
-        *example("validate"),
+        *example("check"),
         cwd=folder,
     )
     assert done.returncode == 2

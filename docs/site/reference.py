@@ -124,7 +124,7 @@ def _own_members(thing: type) -> list[str]:
 def files() -> str:
     """Keys of every kind of file, from its JSON Schema."""
     lines = ["# Keys of files", "", "Every key that a file may have. An editor checks files by the same schemas: "
-             "`feedsim schema KIND` prints them.", ""]  # fmt: skip
+             "`feedsim tools schema KIND` prints them.", ""]  # fmt: skip
     for kind, meaning in FILES.items():
         schema = json_schema(kind)
         lines += [f"## {kind} file", "", f"{meaning[0].upper()}{meaning[1:]}.", "", *_keys(schema)]

@@ -22,6 +22,18 @@ _STUB = _Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {name: home for *home, name in _re.findall(r"^from (\S+) import (\w+) as (\w+)$", _STUB, _re.MULTILINE)}
 
 __all__ = sorted(_HOMES)
+# Names of version 0.2 -> functions of today. They work for one version more.
+_OLD_NAMES = {
+    "compensate": "feedsim.jobs.tune_feedforward:tune_feedforward",
+    "identify": "feedsim.jobs.identify:identify_friction",
+    "machine_pack": "feedsim.jobs.machine_pack:machine_pack",
+    "machine_show": "feedsim.jobs.machine:machine_view",
+    "pack": "feedsim.jobs.pack:pack",
+    "show": "feedsim.jobs.diff:diff",
+    "validate": "feedsim.jobs.check:check",
+    "write_page": "feedsim.jobs.write_page:write_page",
+    "write_ssp": "feedsim.jobs.write_ssp:write_ssp",
+}
 
 
 def __getattr__(public: str) -> _Any:
@@ -29,6 +41,8 @@ def __getattr__(public: str) -> _Any:
         from feedsim.installation import version
 
         return version("feedsim") or "unknown"
+    if public in _OLD_NAMES:
+        return _renamed(public)
     if public not in _HOMES:
         raise AttributeError(f"module 'feedsim' has no attribute '{public}'")
     room, name = _HOMES[public]
@@ -38,6 +52,27 @@ def __getattr__(public: str) -> _Any:
         from feedsim.extras import missing
 
         raise missing(error, f"feedsim.{public}") or error from None
+
+
+def _renamed(old: str) -> _Any:
+    """The function that had this name; calling it says how it is called today."""
+    import functools
+    import warnings
+
+    room, _, name = _OLD_NAMES[old].partition(":")
+    function = getattr(_import_module(room), name)
+    today = f"feedsim.{name if name in _HOMES else 'export'}"
+
+    @functools.wraps(function)
+    def called(*given: _Any, **named: _Any) -> _Any:
+        warnings.warn(
+            f"feedsim.{old} is called {today} now; the old name goes with the next version", DeprecationWarning, 2
+        )
+        if "axis" in named:
+            named["axes"] = named.pop("axis")
+        return function(*given, **named)
+
+    return called
 
 
 def __dir__() -> list[str]:

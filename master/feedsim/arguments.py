@@ -125,10 +125,40 @@ def _text(value: Any) -> str:
     return str(value) if isinstance(value, str | Path) else json.dumps(value, ensure_ascii=False)
 
 
+Pairs = Mapping[str, V] | Sequence[str] | str | None  # name -> value, or texts NAME=VALUE
+
+
+def pairs(
+    name: str, given: Pairs[Any], needed: str = "NAME=VALUE is needed", *, common: bool = False
+) -> dict[str, Any]:
+    """Name -> value of an argument: of a mapping, or of texts NAME=VALUE, several with commas between them.
+
+    needed: the form, for the message. common: a value without a name is allowed, and stands under "". Raises
+    InputError: no such form, a name twice.
+
+    >>> pairs("at", {"X": 0.8}), pairs("at", ["X=800mm", "Z=100mm"])
+    ({'X': 0.8}, {'X': '800mm', 'Z': '100mm'})
+    """
+    if isinstance(given, Mapping):
+        return {str(key): value for key, value in given.items()}
+    result: dict[str, Any] = {}
+    for text in [part for entry in ([given] if isinstance(given, str) else given or ()) for part in listed(entry)]:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if common and not equals:
+            key, value = "", text
+        elif not (key and equals and value):
+            raise InputError(f"{spelt(name)} {text}: {needed}")
+        if key in result:
+            raise InputError(f"{spelt(name)} {text}: {key or 'that of all axes'} is given twice")
+        result[key] = value
+    return result
+
+
 def listed(names: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of a list, or of a text with commas.
+    """Names of a list, of a text with commas, or of several such texts.
 
     >>> listed("X, Z")
     ('X', 'Z')
     """
-    return tuple(part.strip() for part in names.split(",") if part.strip()) if isinstance(names, str) else tuple(names)
+    texts = [names] if isinstance(names, str) else names
+    return tuple(part.strip() for text in texts for part in text.split(",") if part.strip())

@@ -63,6 +63,11 @@ def examples() -> list[Example]:
     return result
 
 
+def names() -> list[str]:
+    """Names of all examples."""
+    return sorted({example.name for example in examples()})
+
+
 def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
     """Copy examples into a folder, with all files that they name, in the same layout; returns the files written.
 

@@ -64,7 +64,7 @@ def test_a_record_of_ones_own(fmus: Path, tmp_path: Path, capsys: pytest.Capture
         "pitch: 20 mm\ninertia: 0.0164 kg.m^2\ndelay: {torque: 0 ms}\ntime: {column: time}\n"
         "position: {column: position}\nspeed: {column: speed}\ntorque: {column: torque}\n"
     )
-    words = [str(file), "--axis", "Z", "--columns", str(tmp_path / "columns.yaml"), "--fmus", str(fmus)]
+    words = [str(file), "--axes", "Z", "--columns", str(tmp_path / "columns.yaml"), "--fmus", str(fmus)]
     assert main(words) == 0
     rows = re.findall(r"^\| sine.csv \| (\w+) \| \d+ \| ([\d.]+) % \| \**([\d.]+) %", capsys.readouterr().out, re.M)
     assert [name for name, *_ in rows] == ["Coulomb", "Stribeck", "LuGre", "GMS"]

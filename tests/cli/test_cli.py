@@ -124,11 +124,11 @@ def test_inputs_in_the_output_folder_are_not_lost(
 
 
 def test_validate_and_schema(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
-    done = feedsim("validate", scenario_file, fmus=fmus, cwd=tmp_path)
+    done = feedsim("check", scenario_file, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "valid" in done.stdout
     for kind in ("scenario", "machine", "columns"):
-        done = feedsim("schema", kind, fmus=fmus, cwd=tmp_path)
+        done = feedsim("tools", "schema", kind, fmus=fmus, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout)["$schema"].startswith("https://json-schema.org/")
 
@@ -156,7 +156,7 @@ def test_recorded_setpoints_from_a_mat_file(scenario_file: Path, fmus: Path, tmp
     t = np.arange(0.0, 0.4, 1e-3)
     savemat(tmp_path / "record.mat", {"t": t, "qg": 0.25 - 1e-3 * np.cos(2 * np.pi * 2.5 * t + 0.3)})
     columns = ["--column", "t=time:s", "--column", "qg=Z.x_s:m"]
-    done = feedsim("convert", "record.mat", *columns, "--out", "reference.csv", fmus=fmus, cwd=tmp_path)
+    done = feedsim("tools", "convert", "record.mat", *columns, "--out", "reference.csv", fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     measured = ROOT / "scenarios" / "z_measured.yaml"
     done = feedsim("run", measured, "--set", "motions.0.file=reference.csv", "--out", "out", fmus=fmus, cwd=tmp_path)
@@ -208,6 +208,6 @@ def test_usage_and_help(fmus: Path, tmp_path: Path) -> None:
 
 
 def test_convert_wants_a_name_and_a_unit(fmus: Path, tmp_path: Path) -> None:
-    done = feedsim("convert", "x.mat", "--column", "qg", "--out", "x.csv", fmus=fmus, cwd=tmp_path)
+    done = feedsim("tools", "convert", "x.mat", "--column", "qg", "--out", "x.csv", fmus=fmus, cwd=tmp_path)
     assert done.returncode == 2
     assert "VARIABLE=NAME:UNIT" in done.stderr

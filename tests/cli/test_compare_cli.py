@@ -69,7 +69,7 @@ def test_exit_codes(reference: Path, off: Path, tmp_path: Path, capsys: pytest.C
         (["--from", "1"], "has no unit"),
         (["--from", "5 s"], "the reference's 0 to 2 s (asked for from 5 s)"),
         (["--tol", "0,1 mm"], "two tolerances in value; write a decimal point, not a comma"),
-        (["--axis", "Z"], "--axis Z: is for the record of a drive"),
+        (["--axes", "Z"], "--axes Z: is for the record of a drive"),
         (["--machine", "scenarios/machines/test_centre"], "--columns or --reference-columns"),
         (["--shift", "3 mm"], "is a length"),
         (["--time", "clock"], "no column 'clock'"),
@@ -235,7 +235,7 @@ def test_a_run_against_a_measured_record(tmp_path: Path, capsys: pytest.CaptureF
     record = tmp_path / "record.mat"
     savemat(record, {"t": 1e3 * time, "enc": 1e3 * x, "iq": -i_q})
     result = written(tmp_path / "result.csv", wave(4001))
-    words = [result, record, "--reference-columns", mapping, "--axis", "Z", "--tol", "1e-4"]
+    words = [result, record, "--reference-columns", mapping, "--axes", "Z", "--tol", "1e-4"]
     assert run(*words) == 1
     capsys.readouterr()
     assert run(*words, "--shift", "estimate") == 0

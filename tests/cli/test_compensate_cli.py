@@ -1,4 +1,4 @@
-"""feedsim compensate as a user meets it: what it writes, that it agrees with itself, messages and exit codes."""
+"""feedsim tune feedforward as a user meets it: what it writes, that it agrees with itself, messages and exit codes."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Pa
     words = ["--friction", "Z=friction_z.yaml", "--delay", "X=3.9417 ms", "--no-table"]
     # what is needed is recorded whatever the scenario leaves out
     words += ["--set", 'recording.variables=["X.x_a"]']
-    return feedsim("compensate", CIRCLE, "--out", "out", "--figures", "png", *words, fmus=fmus, cwd=folder), folder
+    return feedsim(
+        "tune", "feedforward", CIRCLE, "--out", "out", "--figures", "png", *words, fmus=fmus, cwd=folder
+    ), folder
 
 
 def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
@@ -111,7 +113,7 @@ def test_worse_than_without_is_the_first_thing_said(fmus: Path, tmp_path: Path) 
     strong = re.sub(r"(F_C|F_S|F_log|sigma_[012]): (\S+)", lambda m: f"{m[1]}: {2.5 * float(m[2]):g}", FRICTION_Z)
     (tmp_path / "friction_z.yaml").write_text(strong, encoding="utf-8")
     words = ["--friction", "Z=friction_z.yaml", "--no-table", "--out", "out"]
-    process = feedsim("compensate", CIRCLE, *words, fmus=fmus, cwd=tmp_path)
+    process = feedsim("tune", "feedforward", CIRCLE, *words, fmus=fmus, cwd=tmp_path)
     assert process.returncode == 0
     found = "worse with compensation than without: G 8.19 -> 10"
     assert process.stdout.startswith(f"WRONG: {found}")
@@ -225,7 +227,7 @@ def test_nothing_of_an_earlier_run_is_left(done: tuple[Done, Path], fmus: Path, 
 def test_refusals(words: list[str | Path], code: int, message: str, fmus: Path, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     (tmp_path / "bad.yaml").write_text("F_C: 1.6\n" + FRICTION_Z.replace("F_C: 1.44 N.m", ""), encoding="utf-8")
-    process = feedsim("compensate", *words, "--no-table", fmus=fmus, cwd=tmp_path)
+    process = feedsim("tune", "feedforward", *words, "--no-table", fmus=fmus, cwd=tmp_path)
     assert process.returncode == code
     assert message in process.stderr
     assert process.stderr.startswith("feedsim: ")
@@ -265,7 +267,7 @@ def test_inputs_are_not_lost(words: list[str], lost: str, tmp_path: Path, monkey
     monkeypatch.setattr(compensation, "compensate", no_run)
     told: list[str] = []
     monkeypatch.setattr("builtins.print", lambda text, **more: told.append(str(text)))
-    code = main(["compensate", str(CIRCLE), "--out", "out", "--quiet", *words])
+    code = main(["tune", "feedforward", str(CIRCLE), "--out", "out", "--quiet", *words])
     assert (code, started) == ((4, []) if lost else (3, ["run"]))
     fate = "removed" if lost == "residuals.csv" else "replaced"
     assert not lost or f"{Path('out') / lost}: is an input and would be {fate}; take another directory" in told[0]

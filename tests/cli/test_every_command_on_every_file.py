@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ import pytest
 
 from capture_helpers import CYCLE, ROWS, axis_signals, content
 from command_helpers import feedsim
-from feedsim import cli
-from feedsim.cli.options import Command, Group, Option
+from feedsim.cli.commands import commands
+from feedsim.jobs.parameters import Argument
 from ssp_helpers import short_scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,15 +62,15 @@ set: {{machine.structure: null}}
 BALLBAR = "X [mm],Y [mm]\n{}"
 # What a command cannot do without, besides what is handed to it and --out.
 NEEDED = {
-    "identify": ["--axis", "Z"],
-    "identify-drive": ["--axes", "Z", "--window", "0s..0.5s"],
+    "identify friction": ["--axes", "Z"],
+    "identify drive": ["--axes", "Z", "--window", "0s..0.5s"],
     "replay": ["--machine", "machines/test_centre"],
-    "identify-modes": ["--machine", "machines/test_centre"],
+    "identify modes": ["--machine", "machines/test_centre"],
     "frf": ["--no-measure", "--no-full-model"],
     "circle": ["--feed", "1000 mm/min"],
     "sweep": ["--workers", "1"],
     "machine import": ["--axes", "Z"],
-    "tune drive": ["--axis", "Z", "--evaluations", "10"],
+    "tune drive": ["--axes", "Z", "--evaluations", "10"],
     "machine export": ["--like", "mill.tea", "--axes", "Z"],
 }
 # One file serves for both sides of what takes two.
@@ -80,31 +79,19 @@ CODES = (0, 2, 3, 4)  # 1 is an error of feedsim itself, but of compare, where i
 AXES = {"capture.json": "X1"}  # of the records that are of another axis than Z
 
 
-def leaves(commands: tuple[Command, ...] | list[Command], above: str = "") -> Iterator[tuple[str, Command]]:
-    for command in commands:
-        if command.commands:
-            yield from leaves([*command.commands], f"{above}{command.name} ")
-        else:
-            yield f"{above}{command.name}", command
-
-
-def flat(options: object) -> Iterator[Option]:
-    for option in options:  # type: ignore[attr-defined]
-        yield from flat(option.options) if isinstance(option, Group) else (option,)
-
-
 COMMANDS = {
-    name: command
-    for name, command in leaves([*cli.COMMANDS])
-    if any(not option.typed.startswith("-") for option in flat(command.options)) and name not in ("example", "schema")
+    command.name: command
+    for command in commands()
+    if any(isinstance(parameter.option, Argument) for parameter in command.options)
+    and command.name not in ("example", "tools schema", "tools completion")
 }
 
 
 def words(name: str, subject: str, out: Path) -> list[str]:
     """The command on the subject, with its results beside everything else."""
-    places = [option for option in flat(COMMANDS[name].options) if option.typed == "--out"]
-    ending = str(places[0].words.get("metavar", "")).rpartition(".") if places else ("", "", "")
-    target = out / f"{name.replace(' ', '_')}{ending[1]}{ending[2]}" if ending[1] else out / name.replace(" ", "_")
+    places = [parameter.option for parameter in COMMANDS[name].options if parameter.name == "out"]
+    ending = {"export": ".ssp", "tools convert": ".csv"}.get(name, "")
+    target = out / f"{name.replace(' ', '_')}{ending}"
     given = [subject, subject] if name in TWICE else [subject]
     needed = [AXES.get(subject, "Z") if word == "Z" else word for word in NEEDED.get(name, [])]
     return [*name.split(), *given, *needed, *(["--out", str(target)] if places else [])]
@@ -144,17 +131,18 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     capture = content({"X1|1": signals})
     (folder / "capture.json").write_text(json.dumps(capture), encoding="utf-8")
     for line in (
-        "identify capture.json --axis X1 --out identified",
-        "identify-drive capture.json --axes X1 --window 0s..0.5s --out driven",
-        "replay capture.json --machine driven --out replayed", "convert capture.json --out capture.csv",
+        "identify friction capture.json --axes X1 --out identified",
+        "identify drive capture.json --axes X1 --window 0s..0.5s --out driven",
+        "replay capture.json --machine driven --out replayed", "tools convert capture.json --out capture.csv",
         "run short.yaml --out run", "run logged.yaml --out logged", "run circle.yaml --out circle",
-        "ssp short.yaml --out wired.ssp", "ssp short.yaml --one --out one.ssp", "pack short.yaml --out machine.fmu",
-        "machine pack machines/test_centre --out plant.fmu", "machine build machines/one_axis --out built",
-        "identify logged/log.csv --axis Z --machine machines/test_centre --law gms --out maxwell",
+        "export short.yaml --out wired.ssp", "export short.yaml --one --out one.ssp",
+        "export short.yaml --out machine.fmu",
+        "export --plant machines/test_centre --out plant.fmu", "machine build machines/one_axis --out built",
+        "identify friction logged/log.csv --axes Z --machine machines/test_centre --law gms --out maxwell",
         "run gms.yaml --out slip",
-        "frf machines/one_axis --no-measure --out frf", "compensate circle.yaml --out compensated",
-        "sweep study.yaml --workers 1 --out swept", "show run circle --out shown",
-        "compare run/result.csv run/result.csv --report compared.html --json compared.json --junit compared.xml",
+        "frf machines/one_axis --no-measure --out frf", "tune feedforward circle.yaml --out compensated",
+        "sweep study.yaml --workers 1 --out swept", "diff run circle --out shown",
+        "compare run/result.csv run/result.csv --report compared.html --junit compared.xml",
     ):  # fmt: skip
         done = feedsim(*line.split(), fmus=fmus, cwd=folder)
         assert done.returncode == 0, f"{line}: {done.stderr}"
@@ -179,7 +167,7 @@ SUBJECTS = (
     "run/summary.json", "run/report.html", "logged", "logged/log.csv", "circle", "circle/result.csv", "wired.ssp",
     "one.ssp", "machine.fmu", "plant.fmu", "built", "built/modes.csv", "frf", "frf/frf.csv", "compensated",
     "compensated/feedforward.csv", "swept", "swept/table.csv", "swept/study.json", "shown", "compared.html",
-    "compared.json", "compared.xml", "partial", "partial/result.partial.csv", "cut", "cut/result.csv", "line.csv",
+    "compared.xml", "partial", "partial/result.partial.csv", "cut", "cut/result.csv", "line.csv",
     "empty.csv", "text.csv", "header.csv", "noise.bin", "mill.tea", "nothing",
     "missing.yaml", "missing/folder",
 )  # fmt: skip
@@ -214,6 +202,6 @@ def test_every_command(subject: str, place: Path, fmus: Path, tmp_path: Path) ->
 
 
 def test_the_list_is_that_of_the_command_line() -> None:
-    assert {"run", "frf", "identify", "identify-drive", "replay", "compensate", "circle", "show", "sweep", "compare",
-            "convert", "machine pack"} <= set(COMMANDS)  # fmt: skip
+    assert {"run", "frf", "identify friction", "identify drive", "replay", "tune feedforward", "circle", "diff",
+            "sweep", "compare", "tools convert", "export"} <= set(COMMANDS)  # fmt: skip
     assert set(NEEDED) <= set(COMMANDS)

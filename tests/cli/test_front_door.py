@@ -56,9 +56,9 @@ def test_only_the_program_itself_tunes_the_garbage_collector() -> None:
 import gc, sys
 from feedsim import cli
 usual = gc.get_threshold()
-assert cli.main(["schema"]) == 0
+assert cli.main(["tools", "schema"]) == 0
 assert gc.get_threshold() == usual
-sys.argv = ["feedsim", "schema"]
+sys.argv = ["feedsim", "tools", "schema"]
 try:
     cli.entry()
 except SystemExit as end:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import io
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from command_helpers import feedsim, feedsim_process
-from feedsim.cli import COMMANDS
-from feedsim.cli.completion import SHELLS, places
+from feedsim.cli.commands import COMMANDS
 from feedsim.cli.kinds import INPUT_KINDS, kind
 from feedsim.cli.terminal import painted
 
@@ -41,7 +41,7 @@ def test_alone_it_shows_what_a_person_may_want(fmus: Path, tmp_path: Path) -> No
     done = feedsim_process(fmus=fmus, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     typed = [line.split() for line in done.stdout.splitlines() if line.startswith("  feedsim ")]
-    names = {command.name for command in COMMANDS}
+    names = {name.split()[0] for name in COMMANDS}
     assert {words[1] for words in typed} <= names
     wants = [line for line in done.stdout.splitlines()[1:] if line and not line.startswith((" ", "feedsim"))]
     assert len(wants) == 4
@@ -52,11 +52,11 @@ def test_alone_it_shows_what_a_person_may_want(fmus: Path, tmp_path: Path) -> No
     [
         ("rnu xz_circle.yaml", "no command 'rnu'; did you mean run?"),
         ("machine infoo machines/test_centre", "no command 'infoo'; did you mean info?"),
-        ("schema scenaro", "no kind 'scenaro'; did you mean scenario?"),
+        ("tools schema scenaro", "no kind 'scenaro'; did you mean scenario?"),
         ("run xz_circle.yaml --ou x", "no option --ou; did you mean --out?"),
         ("run xz_circle.yaml --o=x", "no option --o; did you mean --out? feedsim run --help"),
         ("run xz_circle.yaml --quite", "no option --quite; did you mean --quiet?"),
-        ("ssp xz_circle.yaml --ouut c.ssp", "no option --ouut; did you mean --out?"),
+        ("export xz_circle.yaml --ouut c.ssp", "no option --ouut; did you mean --out?"),
         ("run xz_circle.yaml z_positioning.yaml", "not understood: z_positioning.yaml"),
         ("run xz_circel.yaml", "no such file: xz_circel.yaml; did you mean xz_circle.yaml?"),
         ("frf machines/test_center", "no such file: machines/test_center; did you mean machines/test_centre?"),
@@ -77,23 +77,29 @@ def test_nearest_names(typed: str, said: str, fmus: Path, folder: Path) -> None:
         ("sweep xz_circle.yaml", "xz_circle.yaml is a scenario, which feedsim run takes; feedsim sweep takes a study"),
         ("run studies/z_stop.yaml", "studies/z_stop.yaml is a study, which feedsim sweep takes"),
         ("circle xz_circle.yaml", "xz_circle.yaml is a scenario, which feedsim run takes; feedsim circle takes a"),
-        ("identify machines/test_centre", "machines/test_centre is the folder of a machine, which feedsim machine"),
+        (
+            "identify friction machines/test_centre",
+            "machines/test_centre is the folder of a machine, which feedsim machine",
+        ),
         ("run machines/test_centre/machine.yaml", "machine.yaml is a machine file, which feedsim machine info takes"),
         ("frf machines/test_centre/structure.yaml", "structure.yaml is a structure file, which"),
         ("run machines/test_centre/modes.csv", "modes.csv is a table of modes, which a machine file names; feedsim"),
-        ("show tuned", "tuned is a folder of results without a record (result.csv); feedsim show takes results of"),
+        ("diff tuned", "tuned is a folder of results without a record (result.csv); feedsim diff takes results of"),
         ("frf tuned", "tuned is a folder of results without a record (result.csv); feedsim frf takes a scenario"),
         (
             "show drive",
             "drive has results of feedsim tune drive, without a record (result.csv), its page is drive/report"
-            ".html; feedsim show takes results of a study",
+            ".html; feedsim diff takes results of a study",
         ),
-        ("show modes", "modes has results of feedsim identify-modes, without a record (result.csv); feedsim show"),
-        ("show odd", "odd is a folder of results without a record (result.csv); feedsim show takes results of"),
+        ("diff modes", "modes has results of feedsim identify modes, without a record (result.csv); feedsim diff"),
+        ("diff odd", "odd is a folder of results without a record (result.csv); feedsim diff takes results of"),
         ("run values.yaml", "values.yaml is a file of values for the option --set; feedsim run takes a scenario"),
-        ("compensate results", "results is a folder of results, which feedsim show takes; feedsim compensate takes"),
+        (
+            "compensate results",
+            "results is a folder of results, which feedsim diff takes; feedsim tune feedforward takes",
+        ),
         ("run model.fmu", "model.fmu is a unit for simulators (FMU); feedsim run takes a scenario or an SSP file"),
-        ("run recordings/z_setpoint.csv", "z_setpoint.csv is a record, which feedsim identify takes"),
+        ("run recordings/z_setpoint.csv", "z_setpoint.csv is a record, which feedsim identify friction takes"),
     ],
 )
 def test_files_of_another_kind(typed: str, said: str, fmus: Path, folder: Path) -> None:
@@ -117,9 +123,8 @@ def test_every_shipped_file_is_of_the_kind_that_it_is() -> None:
 
 
 def test_kinds_name_commands_that_there_are() -> None:
-    names = {place.command for place in places(COMMANDS)}
     for each in INPUT_KINDS:
-        assert {command.partition(" --")[0] for command in each.commands} <= names  # of an option: its command
+        assert {command.partition(" --")[0] for command in each.commands} <= set(COMMANDS)  # of an option: its command
 
 
 def test_a_circle_of_axes_that_rest_names_those_that_move(fmus: Path, tmp_path: Path) -> None:
@@ -151,47 +156,33 @@ def test_colours_are_for_terminals_that_show_them(monkeypatch: pytest.MonkeyPatc
 
 # What stands on the command line, the last word of it unfinished -> what is offered, and something that is not.
 COMPLETED = [
-    (["ru"], "run", "frf"),
-    (["machine", ""], "pack", "run"),
-    (["machine", "pack", "--po"], "--poses", "--inputs"),
-    (["pack", "--in"], "--inputs", "--poses"),
-    (["run", "a.yaml", "--fo"], "--force", "--runs"),
-    (["schema", "st"], "structure", "scenario"),
-    (["example", "xz"], "xz_circle", "one_axis"),
+    ("ru", "run", "frf"),
+    ("machine ", "build", "run"),
+    ("export a.yaml --po", "--poses", "--inputs"),
+    ("run a.yaml --fo", "--force", "--runs"),
+    ("tools schema st", "structure", "scenario"),
+    ("example xz", "xz_circle", "one_axis"),
 ]
-ASKED = {
-    "bash": "source {script}\nCOMP_WORDS=(feedsim {words}); COMP_CWORD={last}; _feedsim\n"
-    "printf '%s\\n' \"${{COMPREPLY[@]}}\"",
-    "fish": "source {script}; complete --do-complete 'feedsim {line}'",
-}
 
 
-@pytest.mark.parametrize("shell", SHELLS)
-@pytest.mark.parametrize(("words", "there", "absent"), COMPLETED)
-def test_completion(shell: str, words: list[str], there: str, absent: str, fmus: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("line", "there", "absent"), COMPLETED)
+def test_completion(line: str, there: str, absent: str, tmp_path: Path) -> None:
+    """What a shell is answered that asks as argcomplete's script does."""
+    offered = tmp_path / "offered"
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": f"feedsim {line}", "COMP_TYPE": "9",
+             "COMP_POINT": str(len(f"feedsim {line}")), "_ARGCOMPLETE_STDOUT_FILENAME": str(offered)}  # fmt: skip
+    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()"]
+    subprocess.run(command, env={**os.environ, **asked}, cwd=tmp_path, check=True)
+    words = {word.strip() for word in offered.read_text().splitlines()}
+    assert there in words
+    assert absent not in words
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_of_a_shell_is_one(shell: str, fmus: Path, tmp_path: Path) -> None:
     if shutil.which(shell) is None:
         pytest.skip(f"no {shell} on this machine")
-    done = feedsim("completion", shell, fmus=fmus, cwd=tmp_path)
+    done = feedsim("tools", "completion", shell, fmus=fmus, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    script = tmp_path / "completion"
-    script.write_text(done.stdout)
-    subprocess.run([shell, "-n", script], check=True)
-    offered = {line.split("\t")[0] for line in _offered(shell, script, words, tmp_path).splitlines()}
-    assert there in offered
-    assert absent not in offered
-
-
-def _offered(shell: str, script: Path, words: list[str], folder: Path) -> str:
-    """What a shell offers. zsh's own functions only work in its editor: what they are handed is looked at instead."""
-    last = words[-1] or "''"
-    values: dict[str, Any] = {"script": script, "words": " ".join([*words[:-1], last]), "last": len(words)}
-    if shell == "zsh":
-        code = (
-            "compdef() {{ }}\n_describe() {{ local list=${{@[-1]}}; print -rl -- ${{(@)${{(P@)list}}%%:*}} }}\n"
-            "_files() {{ }}\ncompadd() {{ shift; print -rl -- $@ }}\nsource {script}\n"
-            "words=(feedsim {words}); CURRENT=$(( {last} + 1 )); PREFIX={prefix}; _feedsim"
-        ).format(**values, prefix=last)
-        done = subprocess.run(["zsh", "-f", "-c", code], capture_output=True, text=True, cwd=folder, check=True)
-        return "\n".join(line for line in done.stdout.splitlines() if line.startswith(words[-1]))
-    code = ASKED[shell].format(**values, line=" ".join(words))
-    return subprocess.run([shell, "-c", code], capture_output=True, text=True, cwd=folder, check=True).stdout
+    (tmp_path / "completion").write_text(done.stdout)
+    subprocess.run([shell, "-n", tmp_path / "completion"], check=True)

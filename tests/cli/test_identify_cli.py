@@ -1,4 +1,4 @@
-"""feedsim identify as a user meets it: from traces to a friction that runs, messages and exit codes."""
+"""feedsim identify friction as a user meets it: from traces to a friction that runs, messages and exit codes."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def traces(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def done(fmus: Path, traces: Path) -> Done:
-    known = ["--axis", "Z", "--machine", MACHINE, "--inertia", f"{J} kg.m^2"]
-    return feedsim("identify", "constant/log.csv", "sine/log.csv", *known, fmus=fmus, cwd=traces)
+    known = ["--axes", "Z", "--machine", MACHINE, "--inertia", f"{J} kg.m^2"]
+    return feedsim("identify", "friction", "constant/log.csv", "sine/log.csv", *known, fmus=fmus, cwd=traces)
 
 
 def test_everything_is_written_and_told(done: Done, traces: Path) -> None:
@@ -86,8 +86,8 @@ def test_a_path_with_blanks_can_be_pasted(
     traces: Path, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = [str(traces / "constant" / "log.csv"), "--axis", "Z", "--machine", str(MACHINE), "--stages", "1"]
-    assert main(["identify", *words, "--out", "my results", "--fmus", str(fmus)]) == 0
+    words = [str(traces / "constant" / "log.csv"), "--axes", "Z", "--machine", str(MACHINE), "--stages", "1"]
+    assert main(["identify", "friction", *words, "--out", "my results", "--fmus", str(fmus)]) == 0
     line = capsys.readouterr().out.splitlines()[-1]
     given = f"machine.axes.Z.friction={Path('my results') / 'friction.yaml'}"
     assert line == f"  use: feedsim run SCENARIO.yaml --set '{given}'"
@@ -115,15 +115,15 @@ def test_logs_of_one_name_are_told_apart(done: Done, traces: Path) -> None:
 
 def test_the_file_runs_as_it_is(done: Done, traces: Path, fmus: Path) -> None:
     given = "machine.axes.Z.friction=results/identify_z/friction.yaml"
-    process = feedsim("validate", CIRCLE, "--set", given, fmus=fmus, cwd=traces)
+    process = feedsim("check", CIRCLE, "--set", given, fmus=fmus, cwd=traces)
     assert process.returncode == 0, process.stderr
     friction = read_friction(traces / "results" / "identify_z" / "friction.yaml")
     assert friction.identified["constant_load"]["value"].endswith(" N.m")
 
 
 def test_stage_1_alone_holds_the_rest(traces: Path, fmus: Path) -> None:
-    words = ["constant/log.csv", "--axis", "Z", "--machine", MACHINE, "--stages", "1", "--out", "one", "--quiet"]
-    process = feedsim("identify", *words, fmus=fmus, cwd=traces)
+    words = ["constant/log.csv", "--axes", "Z", "--machine", MACHINE, "--stages", "1", "--out", "one", "--quiet"]
+    process = feedsim("identify", "friction", *words, fmus=fmus, cwd=traces)
     assert (process.returncode, process.stdout) == (0, ""), process.stderr
     parameters = summary_of(traces / "one")["parameters"]
     assert parameters["sigma_0"]["status"] == "held"
@@ -136,8 +136,8 @@ def test_stage_1_alone_holds_the_rest(traces: Path, fmus: Path) -> None:
     ("words", "message"),
     [
         (["none.csv"], "no such file"),
-        (["sine/log.csv", "--machine", MACHINE, "--axis", "Q"], "no axis 'Q'"),
-        (["sine/log.csv", "--axis", "Z"], "its pitch is needed"),
+        (["sine/log.csv", "--machine", MACHINE, "--axes", "Q"], "no axis 'Q'"),
+        (["sine/log.csv", "--axes", "Z"], "its pitch is needed"),
         (["sine/log.csv", "--machine", MACHINE, "--hold", "beta"], "NAME=VALUE is needed"),
         (["sine/log.csv", "--machine", MACHINE, "--hold", "F_C=1"], "--hold F_C=1: .*torque"),
         (["sine/log.csv", "--machine", MACHINE, "--hold", "beta=1", "--hold", "beta=2"], "beta=2: beta is given twice"),
@@ -154,7 +154,7 @@ def test_bad_input_is_told(traces: Path, fmus: Path, words: list[Any], message: 
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(traces)
         patch.setenv("FEEDSIM_FMUS", str(fmus))
-        code = main(["identify", *map(str, words), "--out", "bad"])
+        code = main(["identify", "friction", *map(str, words), "--out", "bad"])
     captured = capfd.readouterr()
     assert code == 2
     assert re.search(message, captured.err), captured.err
@@ -164,7 +164,7 @@ def test_bad_input_is_told(traces: Path, fmus: Path, words: list[Any], message: 
 def test_place_is_looked_at_first(traces: Path, fmus: Path) -> None:
     (traces / "taken").write_text("")
     words = ["sine/log.csv", "--machine", MACHINE, "--out", "taken"]
-    process = feedsim("identify", *words, fmus=fmus, cwd=traces)
+    process = feedsim("identify", "friction", *words, fmus=fmus, cwd=traces)
     assert process.returncode == 4
     assert "is a file" in process.stderr
 
@@ -213,7 +213,7 @@ def test_inputs_are_not_lost(
     monkeypatch.setenv("FEEDSIM_FMUS", str(fmus))
     monkeypatch.setattr("feedsim.jobs.identify.identified_from", far_enough)
     machine = [] if "--machine" in words else ["--machine", str(MACHINE)]
-    code = main(["identify", *words, *machine, "--axis", "Z", "--out", "out", "--quiet"])
+    code = main(["identify", "friction", *words, *machine, "--axes", "Z", "--out", "out", "--quiet"])
     captured = capfd.readouterr()
     assert re.search(message, captured.err), captured.err
     assert code == (2 if message == "far enough" else 4)

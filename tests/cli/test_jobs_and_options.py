@@ -1,52 +1,79 @@
-"""A command and the function of Python that it calls take the same words."""
+"""Every command follows from the signature of its job: its options, its help, its words in Python."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+import re
+import shlex
+from pathlib import Path
 
 import pytest
 
 import feedsim as fs
-from feedsim.cli import COMMANDS
-from feedsim.cli.options import WRITES, Command, flat
+from feedsim.cli import parser
+from feedsim.cli.commands import COMMANDS, COMMON, GROUPS, OLD_COMMANDS, Command, commands, renamed
+from feedsim.jobs.parameters import read_annotation
 
-# What only a terminal needs: no progress bar and no summary, a text in place of the runs, a second run beside it.
-OF_THE_TERMINAL = {"quiet", "dry_run", "row", "try", "all"}
-IN_PYTHON = {"--from": "start", "--to": "end"}  # of a time: "from" is a keyword
-OF_PYTHON = {"watch", "named"}  # who is told, and results under names of their own
+OF_THE_TERMINAL = ("docs", "tools completion")  # what Python has no function for
 
 
-def commands_with_jobs(commands: tuple[Command, ...] = COMMANDS) -> Iterator[Command]:
-    for command in commands:
-        if command.job:
-            yield command
-        yield from commands_with_jobs(tuple(command.commands))
+@pytest.mark.parametrize("command", commands(), ids=lambda command: command.name)
+def test_python_and_the_command_line_have_the_same_words(command: Command) -> None:
+    """The signature as Python reads it is the declaration that the command line read from the source."""
+    if command.name not in OF_THE_TERMINAL:
+        assert command.job().__name__ in fs.__all__
+    signature = inspect.signature(command.job()).parameters.values()
+    options = {entry.name: read_annotation(str(entry.annotation))[1] for entry in signature}
+    assert {p.name: p.option for p in command.options} == {k: v for k, v in options.items() if v is not None}
+    assert not {p.name for p in command.options} & set(COMMON)
+    documented = inspect.getdoc(command.job()) or ""
+    assert all(f"\n    {parameter.name}: " in documented for parameter in command.options)
 
 
-def leaves(commands: tuple[Command, ...] = COMMANDS) -> Iterator[Command]:
-    for command in commands:
-        yield from leaves(tuple(command.commands)) if command.commands else [command]
+def test_there_are_few_commands_and_options() -> None:
+    assert len({name.split()[0] for name in COMMANDS}) <= 16
+    typed = {p.typed for command in commands() for p in command.options if p.typed}
+    assert len(typed) + len(COMMON) <= 120
+    assert set(GROUPS) == {name.split()[0] for name in COMMANDS if " " in name}
 
 
-def test_every_command_has_a_function() -> None:
-    """But for what belongs to a terminal alone: the documentation on its screen, completion of its words."""
-    assert {command.name for command in leaves() if not command.job} == {"docs", "completion"}
+@pytest.mark.parametrize("command", commands(), ids=lambda command: command.name)
+def test_help_says_in_a_few_words_what_a_command_does(command: Command) -> None:
+    assert len(command.declared.help) <= 60
+    examples = command.declared.examples.replace("\\\n", "").replace(" && ", "\n").splitlines()
+    for line in examples:
+        if line.startswith("feedsim "):
+            words, notes = renamed(shlex.split(line)[1:])
+            assert notes == [], "an example has an old name"
+            parser(words[0]).parse_args(words)
 
 
-@pytest.mark.parametrize("command", list(commands_with_jobs()), ids=lambda command: command.job)
-def test_options_and_parameters_are_the_same(command: Command) -> None:
-    job = fs
-    for name in command.job.split("."):
-        job = getattr(job, name)
-    in_python = IN_PYTHON if any(option.typed == "--from" for option in flat(command.options)) else {}
-    typed = {
-        in_python.get(option.typed, option.typed).removeprefix("--").replace("-", "_")
-        for option in flat(command.options)
-        if not (option.typed == "--json" and "metavar" not in option.words)  # prints what Python has at hand
-    }
-    if any(option.typed in WRITES for option in flat(command.options)):
-        typed.add("force")
-    parameters = inspect.signature(job).parameters
-    assert typed - OF_THE_TERMINAL == set(parameters) - OF_PYTHON
-    assert all(each.kind is not each.VAR_KEYWORD for name, each in parameters.items() if name not in OF_PYTHON)
+@pytest.mark.parametrize("old", OLD_COMMANDS)
+def test_old_names_are_commands_of_today(old: str) -> None:
+    words, (note,) = renamed([*old.split(), "a.yaml"])
+    assert words == [*OLD_COMMANDS[old].split(), "a.yaml"]
+    assert note == f"feedsim {old} is called feedsim {OLD_COMMANDS[old]} now; the old name goes with the next version"
+    assert any(" ".join(words).startswith(name) for name in COMMANDS)
+
+
+def test_identify_alone_is_of_friction() -> None:
+    words, notes = renamed(["identify", "log.csv", "--axis=Z"])
+    assert words == ["identify", "friction", "log.csv", "--axes=Z"]
+    assert len(notes) == 2
+    assert renamed(["identify", "drive", "x.csv"]) == (["identify", "drive", "x.csv"], [])
+    assert renamed(["identify", "--help"]) == (["identify", "--help"], [])
+
+
+@pytest.mark.parametrize("old", ["identify", "validate", "show", "compensate", "pack", "machine_show"])
+def test_old_functions_say_how_they_are_called(old: str, tmp_path: Path) -> None:
+    with pytest.warns(DeprecationWarning, match=rf"feedsim\.{old} is called feedsim\.\w+ now"), pytest.raises(
+        (fs.InputError, TypeError), match=r"no such file|missing"
+    ):  # fmt: skip
+        getattr(fs, old)(str(tmp_path / "nothing.yaml"))
+
+
+def test_a_missing_file_is_named_before_a_library_is_loaded(capsys: pytest.CaptureFixture[str]) -> None:
+    from feedsim.cli import main
+
+    assert main(["circle", "scenarios/xz_circel.yaml"]) == 2
+    assert re.match(r"feedsim: no such file: scenarios/xz_circel\.yaml", capsys.readouterr().err)

@@ -1,4 +1,4 @@
-"""``feedsim machine build``, ``info`` and ``show`` as a user meets them: files, messages, and nothing half-written."""
+"""``feedsim machine build``, ``info`` and ``diff`` as a user meets them: files, messages, and nothing half-written."""
 
 from __future__ import annotations
 
@@ -190,9 +190,9 @@ def test_axes_of_other_names_contradict(machine: Path, tmp_path: Path, capsys: C
 
 def test_the_next_step_of_a_report_can_be_typed(machine: Path, tmp_path: Path, capsys: Capture) -> None:
     """It names a mode that is not rigid, and where its pictures go."""
-    assert run("show", machine, "--out", tmp_path / "out", "--quiet") == 0
+    assert run("diff", machine, "--out", tmp_path / "out", "--quiet") == 0
     page = html.unescape((tmp_path / "out" / "report.html").read_text())
-    line = re.search(r"feedsim machine show [^<]*", page)
+    line = re.search(r"feedsim machine view [^<]*", page)
     assert line is not None
     words = shlex.split(line[0])
     assert Path(words[words.index("--out") + 1]) == tmp_path / "out"
@@ -206,7 +206,7 @@ def test_no_structure_no_build(machine: Path, tmp_path: Path, capsys: Capture) -
     change(machine / "machine.yaml", "structure: structure.yaml", "# none")
     assert run("build", machine, "--out", tmp_path / "out") == 2
     assert "has no key structure" in capsys.readouterr().err
-    assert run("show", machine, "--out", tmp_path / "out") == 2
+    assert run("diff", machine, "--out", tmp_path / "out") == 2
     assert "a picture needs a structure file" in capsys.readouterr().err
     assert run("info", machine, "--at", "X=100mm") == 2
     assert "--at: " in capsys.readouterr().err
@@ -311,14 +311,14 @@ def test_one_axis_machine_runs(fmus: Path) -> None:
     ],
 )
 def test_grids_that_would_not_follow_are_refused(tmp_path: Path, capsys: Capture, poses: str, words: str) -> None:
-    assert run("pack", TEST_CENTRE, "--poses", poses, "--out", tmp_path / "a.fmu") == 2
+    assert run("export", TEST_CENTRE, "--poses", poses, "--out", tmp_path / "a.fmu") == 2
     assert words in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
 def test_an_archive_needs_a_name(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run("pack", TEST_CENTRE, "--out", ".") == 4
+    assert run("export", TEST_CENTRE, "--out", ".") == 4
     assert "the name of a file is needed" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
@@ -327,7 +327,7 @@ def test_a_table_of_another_pose_is_not_packed_and_warned_of(tmp_path: Path, cap
     folder = tmp_path / "moved"
     shutil.copytree(TEST_CENTRE, folder)
     change(folder / "machine.yaml", "Z: 100 mm}", "Z: 400 mm}")
-    assert run("pack", folder, "--out", tmp_path / "a.fmu") == 2
+    assert run("export", folder, "--out", tmp_path / "a.fmu") == 2
     said = capsys.readouterr().err
     assert "is not that of the pose X 0.8 m, Y 0.327 m, Z 0.4 m" in said
     assert "--at X=800mm Y=327mm Z=400mm" in said

@@ -1,4 +1,4 @@
-"""``feedsim pack`` as a user meets it: what it writes, what it refuses, and nothing half-written."""
+"""``feedsim export`` as a user meets it: what it writes, what it refuses, and nothing half-written."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _archives(fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(*words: str | Path) -> int:
-    return cli.main(["pack", *map(str, words)])
+    return cli.main(["export", *map(str, words)])
 
 
 def starts(archive: Path) -> dict[str, str | None]:

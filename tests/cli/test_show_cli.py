@@ -1,4 +1,4 @@
-"""feedsim show: results and records over each other."""
+"""feedsim diff: results and records over each other."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def show(out: Path, *sources: Path) -> int:
-    return cli.main(["show", *map(str, sources), "--out", str(out)])
+    return cli.main(["diff", *map(str, sources), "--out", str(out)])
 
 
 def test_what_differs_is_told(results: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

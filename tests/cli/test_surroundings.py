@@ -200,7 +200,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) 
     for signal in data["Header"]["SignalListHFData"][1:]:
         signal["Axis"] = "X1\x1b[31m\x07"
     (tmp_path / "capture.json").write_text(json.dumps(data))
-    done = feedsim("identify", "capture.json", "--axis", "Q", fmus=tmp_path, cwd=tmp_path)
+    done = feedsim("identify", "friction", "capture.json", "--axes", "Q", fmus=tmp_path, cwd=tmp_path)
     assert done.returncode == 2
     assert "there is X1\\x1b[31m\\x07" in done.stderr
     assert "\x1b" not in done.stderr

@@ -32,7 +32,7 @@ sampling: {method: sobol, runs: 16, seed: 7}
 parameters:
   F_C: {key: machine.axes.Z.friction.F_C, distribution: uniform, from: 1.2 N.m, to: 2 N.m}
 """
-IDENTIFY = ["identify", "log.csv", "--axis", "Z", "--machine", str(MACHINE), "--stages", "1"]
+IDENTIFY = ["identify", "log.csv", "--axes", "Z", "--machine", str(MACHINE), "--stages", "1"]
 COMMANDS = {
     "run": ["run", "short.yaml"],
     "frf": ["frf", str(MACHINE), "--axes", "Z", "--no-measure"],

@@ -101,7 +101,7 @@ def test_a_record_with_gaps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     record = tmp_path / "record.csv"
     np.savetxt(record, rows, delimiter=",", fmt="%.17g", header="t [s],x [m],M [N.m]", comments="")
     result = written(tmp_path / "result.csv", wave(4001))
-    words = [str(result), str(record), "--reference-columns", str(mapping), "--axis", "Z", "--tol", "1e-4"]
+    words = [str(result), str(record), "--reference-columns", str(mapping), "--axes", "Z", "--tol", "1e-4"]
     assert main(["compare", *words, "--shift", "estimate"]) == 0
     out = capsys.readouterr().out
     assert "shifted by 12.3" in out

@@ -112,7 +112,7 @@ def test_what_needs_lugre_says_so(fmus: Path) -> None:
     with pytest.raises(InputError, match="axis Z: its friction has the law gms; one unit holds LuGre alone"):
         fs.run(scenario, set=[change, "coupling.units=one"], fmus=fmus)
     with pytest.raises(InputError, match=r"axis Z: its friction has the law gms; a page needs LuGre \(law: lugre\)"):
-        fs.write_page(scenario, set=[change], fmus=fmus)
+        fs.export(scenario, set=[change], fmus=fmus, kind="html")
 
 
 def test_a_compensation_takes_the_law_of_its_axis(fmus: Path, tmp_path: Path) -> None:
@@ -120,9 +120,9 @@ def test_a_compensation_takes_the_law_of_its_axis(fmus: Path, tmp_path: Path) ->
     circle, change = SCENARIOS / "xz_circle.yaml", f"machine.axes.Z.friction={gms()}"
     file = tmp_path / "friction.yaml"
     file.write_text(f"# a remark\n{gms()}\n")
-    own = fs.compensate(circle, set=[change], table=False, fmus=fmus)
-    by_file = fs.compensate(circle, friction={"Z": file}, set=[change], table=False, fmus=fmus)
-    other = fs.compensate(circle, friction={"Z": file}, table=False, fmus=fmus)
+    own = fs.tune_feedforward(circle, set=[change], table=False, fmus=fmus)
+    by_file = fs.tune_feedforward(circle, friction={"Z": file}, set=[change], table=False, fmus=fmus)
+    other = fs.tune_feedforward(circle, friction={"Z": file}, table=False, fmus=fmus)
     before, after = (float(own.figures[f"{when}.glitch_Z"]) for when in ("before", "after"))
     assert after < 0.01 * before
     assert float(by_file.figures["after.glitch_Z"]) == after
@@ -131,7 +131,7 @@ def test_a_compensation_takes_the_law_of_its_axis(fmus: Path, tmp_path: Path) ->
 
 def test_errors_of_a_compensation_are_tried_of_what_its_law_has(fmus: Path) -> None:
     change = [f"machine.axes.{axis}.friction={gms()}" for axis in "XZ"]
-    table = fs.compensate(SCENARIOS / "xz_circle.yaml", set=change, fmus=fmus).compensation.table
+    table = fs.tune_feedforward(SCENARIOS / "xz_circle.yaml", set=change, fmus=fmus).compensation.table
     assert {"spread", "C", "sigma_0", "delay"} <= {row.what for row in table}
     assert not {"W", "gamma"} & {row.what for row in table}
 
@@ -140,7 +140,7 @@ def test_a_compensation_says_whose_law_is_missing(tmp_path: Path) -> None:
     file = tmp_path / "friction.yaml"
     file.write_text(f"# a remark\n{gms(W='2 deg')}\n")
     with pytest.raises(InputError, match=r"friction\.yaml:2: .*the law gms has no W, but spread, skew, C"):
-        fs.compensate(SCENARIOS / "xz_circle.yaml", friction={"Z": file}, out=tmp_path / "out")
+        fs.tune_feedforward(SCENARIOS / "xz_circle.yaml", friction={"Z": file}, out=tmp_path / "out")
 
 
 @pytest.mark.parametrize(("law", "shared"), [("gms", True), ("lugre", False)])
@@ -161,7 +161,7 @@ def test_at_rest_all_elements_are_springs() -> None:
 
 def test_an_ssp_keeps_the_law(fmus: Path, tmp_path: Path) -> None:
     scenario, change = SCENARIOS / "z_positioning.yaml", f"machine.axes.Z.friction={gms()}"
-    fs.write_ssp(scenario, tmp_path / "machine.ssp", set=[change], fmus=fmus)
+    fs.export(scenario, tmp_path / "machine.ssp", set=[change], fmus=fmus, kind="ssp")
     again = fs.run(tmp_path / "machine.ssp")
     assert again.scenario.machine.axes["Z"].friction.law == "gms"
     assert again.scenario.machine.axes["X"].friction.law == "lugre"

@@ -431,7 +431,7 @@ def test_an_ssp_file_is_not_written_without_the_loads(
     table = "{time: [0.1 s, 0.2 s], values: [7 N, 7 N]}"
     file.write_text(f"{file.read_text()}loads: [{{kind: tool, direction: X, table: {table}}}]\n", encoding="utf-8")
     out = tmp_path / "s.ssp"
-    assert main(["ssp", str(file), "--fmus", str(fmus), "--out", str(out)]) == 2
+    assert main(["export", str(file), "--fmus", str(fmus), "--out", str(out)]) == 2
     assert f"{file}:4: loads: an SSP file holds no loads" in capsys.readouterr().err
     assert not out.exists()
-    assert main(["ssp", str(file), "--fmus", str(fmus), "--out", str(out), "--set", "loads=[]"]) == 0
+    assert main(["export", str(file), "--fmus", str(fmus), "--out", str(out), "--set", "loads=[]"]) == 0

@@ -115,13 +115,23 @@ def test_every_way_of_use(installed: Installation) -> None:
     """The other commands that need units, machine or packager, on copies of what comes along."""
     run, folder = installed.run, installed.folder
     run("example", "z_positioning", "z_stop", "identify_z_constant", "test_centre")
-    run("ssp", "z_positioning.yaml", "--out", "z.ssp")
+    run("export", "z_positioning.yaml", "--out", "z.ssp")
     run("run", "z.ssp", "--out", "from_ssp")
-    run("machine", "pack", "machines/test_centre", "--out", "my_plant.fmu")
-    run("validate", "z_positioning.yaml")
+    run("export", "--plant", "machines/test_centre", "--out", "my_plant.fmu")
+    run("check", "z_positioning.yaml")
     fewer = ("--set=motions.2.speeds.count=5", "--set=motions.1.duration=1 s", "--set=motions.2.duration=1 s")
     run("run", "identify_z_constant.yaml", *fewer, "--out", "constant")
-    run("identify", "constant/log.csv", "--axis", "Z", "--machine", "machines/test_centre", "--out", "friction")
+    run(
+        "identify",
+        "friction",
+        "constant/log.csv",
+        "--axes",
+        "Z",
+        "--machine",
+        "machines/test_centre",
+        "--out",
+        "friction",
+    )
     run("sweep", "studies/z_stop.yaml", "--runs", "2", "--workers", "1", "--out", "study")
     run("frf", "machines/test_centre", "--axes", "Z", "--no-tool", "--out", "response")
     run("compare", "from_ssp/result.csv", "from_ssp/result.csv")

@@ -125,7 +125,7 @@ def test_a_run_says_who_and_when(fault: str, native: bool, place: Callable[[str]
 def test_commands_end_with_3(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
     """A scenario, and the same as an SSP file."""
     folder, (_, how, rows) = place(fault), FAULTS[fault]
-    assert feedsim("ssp", "s.yaml", "--out", "s.ssp", fmus=fmus, cwd=folder).returncode == 0
+    assert feedsim("export", "s.yaml", "--out", "s.ssp", fmus=fmus, cwd=folder).returncode == 0
     before = {*(folder / "temporary").iterdir()}  # of this process, which keeps archives unpacked
     for subject in ("s.yaml", "s.ssp"):
         done = feedsim_process("run", subject, "--out", "out", fmus=fmus, cwd=folder)

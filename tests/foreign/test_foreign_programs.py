@@ -99,10 +99,10 @@ def test_what_the_archives_say_is_judged_all_the_same(
         ("machine.axes.X.drive.inputs.x_a=PosAktual", "did you mean 'PosActual'?"),
         ("machine.axes.X.drive.parameters.Kv=3 kg", "the archive declares it in 1/s"),
     ):
-        assert cli.main(["validate", str(scenario_file), "--set", setting]) == 2
+        assert cli.main(["check", str(scenario_file), "--set", setting]) == 2
         assert words in capsys.readouterr().err
     platform = acme.archive(scenario_file.with_name("acme_drive.fmu"), "drive", b"", acme.DRIVE, platform="other")
-    assert cli.main(["validate", str(scenario_file)]) == 2
+    assert cli.main(["check", str(scenario_file)]) == 2
     assert f"{platform}: has no binary for this platform" in capsys.readouterr().err
     assert not mark.exists()
 
@@ -110,7 +110,7 @@ def test_what_the_archives_say_is_judged_all_the_same(
 def test_an_ssp_with_other_programs_in_the_place_of_ours(
     marked_ssp: Path, mark: Path, marking: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["validate", str(marked_ssp)]) == 0
+    assert cli.main(["check", str(marked_ssp)]) == 0
     said = capsys.readouterr().err
     assert not mark.exists()
     for name in ("plant", "controller", "friction"):
@@ -187,7 +187,7 @@ def test_archives_that_are_named_apart(
     own = {name: marking if name.startswith("binaries/") else content for name, content in shipped.items()}
     base = write(tmp_path / "plant.fmu", own)
     machine = str(ROOT / "scenarios" / "machines" / "test_centre")
-    cli.main(["machine", "pack", machine, "--base", str(base), "--out", str(tmp_path / "packed.fmu")])
+    cli.main(["export", "--plant", machine, "--base", str(base), "--out", str(tmp_path / "packed.fmu")])
     digest = hashlib.sha256(base.read_bytes()).hexdigest()
     said = capsys.readouterr().err
     assert f"executes {base} as the packed plant's trial: binaries/{folders()[0]}/plant.so; SHA-256 {digest}" in said

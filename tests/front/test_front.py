@@ -60,7 +60,7 @@ def test_results_over_each_other(folder: Path, circle: fs.Result, tmp_path: Path
     """Of a prompt and of a folder: figures and parameters side by side, a page in a notebook, the same as a report."""
     stiff = fs.run(folder / "xz_circle.yaml", set={"machine.axes.Z.drive.K_v": "5 (m/min)/mm"})
     stiff.save(tmp_path / "stiff")
-    over = fs.show(circle, stiff=tmp_path / "stiff")
+    over = fs.diff(circle, stiff=tmp_path / "stiff")
     assert over.names == (circle.scenario.name, "stiff")
     first, second = over.side_by_side["XZ.G"]
     assert first is not None
@@ -77,21 +77,21 @@ def test_results_over_each_other(folder: Path, circle: fs.Result, tmp_path: Path
     assert "&lt;html" in html
     assert {path.name for path in over.save(tmp_path / "over")} >= {"report.html", "summary.json"}
     with pytest.raises(InputError, match="two results are called 'stiff'"):
-        fs.show(tmp_path / "stiff", stiff=stiff)
+        fs.diff(tmp_path / "stiff", stiff=stiff)
     with pytest.raises(InputError, match="no result is given"):
-        fs.show()
+        fs.diff()
 
 
 def test_the_front_door_offers_public_names_and_has_them_all() -> None:
     names = dir(fs)
     assert not [name for name in names if name.startswith("_")]
-    assert {"load", "run", "identify", "compare", "sweep", "frf", "example"} <= set(names) == set(fs.__all__)
+    assert {"load", "run", "identify_friction", "compare", "sweep", "frf", "example"} <= set(names) == set(fs.__all__)
     assert all(getattr(fs, name) is not None for name in names)
     with pytest.raises(AttributeError, match="no attribute 'plot_all'"):
         fs.plot_all  # noqa: B018
 
 
-@pytest.mark.parametrize("room", ["compare", "identify", "sweep"])
+@pytest.mark.parametrize("room", ["compare", "sweep"])
 def test_rooms_that_are_called_are_rooms_as_well(room: str) -> None:
     """In a process of its own: whichever is first, the import or the call."""
     file = f"jobs.{room}"

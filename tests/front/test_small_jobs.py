@@ -20,27 +20,27 @@ RECORD = SCENARIOS / "recordings" / "z_setpoint.csv"
 def test_a_valid_scenario_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:
     """The same words as the command prints, of a file and of what is loaded."""
     file = SCENARIOS / "z_positioning.yaml"
-    done = fs.validate(file)
+    done = fs.check(file)
     assert done.findings == ()
     assert done.answers == [f"{file}: valid; 2 motions, 2.448 s on Test centre"]
-    assert main(["validate", str(file)]) == 0
+    assert main(["check", str(file)]) == 0
     assert capsys.readouterr().out == f"{done.answers[0]}\n"
-    assert fs.validate(fs.load(file)).answers == ["Z positioning: valid; 2 motions, 2.448 s on Test centre"]
+    assert fs.check(fs.load(file)).answers == ["Z positioning: valid; 2 motions, 2.448 s on Test centre"]
 
 
 def test_what_a_run_warns_of_is_told_ahead() -> None:
-    done = fs.validate(SCENARIOS / "z_positioning.yaml", set=UNSTABLE)
+    done = fs.check(SCENARIOS / "z_positioning.yaml", set=UNSTABLE)
     assert "axis Z: the position loop is unstable" in done.findings[0]
     assert repr(done).endswith("see .findings")
 
 
 def test_what_is_faulty_is_refused() -> None:
     with pytest.raises(fs.InputError, match=r"machine\.axes\.Z\.drive\.K_v"):
-        fs.validate(SCENARIOS / "z_positioning.yaml", set={"machine.axes.Z.drive.K_v": "5 mm"})
+        fs.check(SCENARIOS / "z_positioning.yaml", set={"machine.axes.Z.drive.K_v": "5 mm"})
 
 
 def test_a_study_is_checked() -> None:
-    done = fs.validate(SCENARIOS / "studies" / "friction_wear.yaml")
+    done = fs.check(SCENARIOS / "studies" / "friction_wear.yaml")
     assert "valid; 5632 runs of" in done.answers[0]
 
 

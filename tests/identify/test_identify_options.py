@@ -68,8 +68,8 @@ def test_the_command_refuses(
     capsys: Any,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    known = ["--axis", "Z", "--machine", str(MACHINE), "--out", "out", "--fmus", str(fmus)]
-    assert main(["identify", str(trace), *known, *words]) == 2
+    known = ["--axes", "Z", "--machine", str(MACHINE), "--out", "out", "--fmus", str(fmus)]
+    assert main(["identify", "friction", str(trace), *known, *words]) == 2
     said = capsys.readouterr()
     assert not said.out
     assert "Traceback" not in said.err

@@ -95,7 +95,7 @@ def _importer(name: str) -> Importer:
 
 @pytest.fixture(scope="session")
 def ssp(move: z_move.Move, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The move as `feedsim ssp` writes it."""
+    """The move as `feedsim export` writes it."""
     from feedsim import ssp as room
 
     path = tmp_path_factory.mktemp("ssp") / "z_move.ssp"
@@ -116,7 +116,7 @@ def test_the_exported_ssp_file(name: str, ssp: Path, move: z_move.Move, imitatio
     _same(result, imitation(importer.master), move)
     line = document.row(
         f"{importer.name} {importer.version()}",
-        "`feedsim ssp` file",
+        "`feedsim export` file",
         z_move.differences(result, parallel, move),
         z_move.overshoot(result, move),
         importer.does,

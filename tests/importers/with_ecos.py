@@ -14,7 +14,7 @@ from importers.system import Experiment, Result, System, boolean
 if TYPE_CHECKING:
     from ecospy import EcosSimulation
 
-SSP_PARAMETERS = "parameters"  # name of the sets in `feedsim ssp` files; ecos applies none that it is not told of
+SSP_PARAMETERS = "parameters"  # name of the sets in `feedsim export` files; ecos applies none that it is not told of
 
 
 def load() -> None:

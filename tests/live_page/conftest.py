@@ -34,5 +34,5 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder, found = tmp_path_factory.mktemp("pages"), {}
     for name in ("xz_circle", "z_positioning"):
         found[name] = folder / f"{name}.html"
-        assert cli.main(["page", str(SCENARIOS / f"{name}.yaml"), "--out", str(found[name])]) == 0
+        assert cli.main(["export", str(SCENARIOS / f"{name}.yaml"), "--out", str(found[name])]) == 0
     return found

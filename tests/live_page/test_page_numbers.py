@@ -152,7 +152,7 @@ def test_random_states_in_a_browser(browser: Any, name: str, tmp_path: Path) -> 
     data, wanted = expected(name)
     file = tmp_path / "page.html"
     changes = [part for change in SHORT[name] for part in ("--set", change)]
-    assert cli.main(["page", str(SCENARIOS / f"{name}.yaml"), *changes, "--out", str(file)]) == 0
+    assert cli.main(["export", str(SCENARIOS / f"{name}.yaml"), *changes, "--out", str(file)]) == 0
     assert file.stat().st_size < LARGEST
     with Opened(browser, file) as opened:
         opened.settled()

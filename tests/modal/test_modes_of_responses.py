@@ -153,13 +153,13 @@ def test_what_is_no_axis_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
     loop = 1 / (1 + s / 300 + s**2 / 400**2)
     write_response(tmp_path / "loop.csv", FrequencyResponse(frequency, {"n/M": loop}, {"n/M": "(rad/s)/(N.m)"}))
     words = ["--machine", str(MACHINE), "--quiet", "--out", str(tmp_path / "out")]
-    assert main(["identify-modes", str(tmp_path / "loop.csv"), *words]) == 2
+    assert main(["identify", "modes", str(tmp_path / "loop.csv"), *words]) == 2
     assert "not the setpoint of a closed loop" in capsys.readouterr().err
     u, y = bench(4000, True, 1)
     write_csv(tmp_path / "log.csv", Trace(np.arange(len(u)) / RATE, {"M": u, "n": y}, {"M": "N.m"}))
-    assert main(["identify-modes", str(tmp_path / "log.csv"), "--input", "M", "--motor", "n", *words]) == 2
+    assert main(["identify", "modes", str(tmp_path / "log.csv"), "--input", "M", "--motor", "n", *words]) == 2
     assert "'n' has no unit in the file; a unit of rad, m, rad/s" in capsys.readouterr().err
-    assert main(["identify-modes", str(tmp_path / "log.csv"), "--input", "M", "--motor", "v:rad/s", *words]) == 2
+    assert main(["identify", "modes", str(tmp_path / "log.csv"), "--input", "M", "--motor", "v:rad/s", *words]) == 2
     assert "v" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
@@ -171,7 +171,7 @@ def test_a_measured_bench_of_two_inertias(tmp_path: Path) -> None:
     well as neighbouring lines agree, which is 16 degrees: above 205 Hz the load hardly moves."""
     words = ["--machine", str(MACHINE), "--input", "iq_adx:A", "--motor", "theta_mx:rad", "--scale", "theta_my:rad"]
     words += ["--interval", "0.4ms", "--quiet", "--out", str(tmp_path)]
-    assert main(["identify-modes", os.environ["FEEDSIM_TWO_INERTIA"], *words]) == 0
+    assert main(["identify", "modes", os.environ["FEEDSIM_TWO_INERTIA"], *words]) == 0
     figures = {k: v["value"] for k, v in json.loads((tmp_path / "summary.json").read_text())["figures"].items()}
     for name in ("antiresonance_1", "resonance_1"):
         assert figures[f"X.{name}"] == pytest.approx(figures[f"X.{name}_measured"], rel=0.01)

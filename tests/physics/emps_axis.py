@@ -100,7 +100,7 @@ class Parameters:
 
     @classmethod
     def identified(cls, file: Path) -> Parameters:
-        """What `feedsim identify` left in its friction file."""
+        """What `feedsim identify friction` left in its friction file."""
         found = yaml.safe_load(file.read_text(encoding="utf-8"))["identified"]
         J, M_0 = (found[name]["value"].split(maxsplit=1) for name in ("inertia", "constant_load"))
         rates = [each["value"].split(maxsplit=1) for each in found["constant_load"].get("drift", ())]

@@ -41,8 +41,8 @@ def measured(file: Path) -> Measured:
 def identified(file: Path, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Parameters:
     """The set that identification finds in the record, by the command as documented."""
     out = tmp_path_factory.mktemp("emps")
-    words = ["--columns", MAPPING, "--machine", MAPPING.parent, "--axis", "X", "--fmus", fmus, "--out", out, "--quiet"]
-    assert main(["identify", str(file), *map(str, words)]) == 0
+    words = ["--columns", MAPPING, "--machine", MAPPING.parent, "--axes", "X", "--fmus", fmus, "--out", out, "--quiet"]
+    assert main(["identify", "friction", str(file), *map(str, words)]) == 0
     return Parameters.identified(out / "friction.yaml")
 
 

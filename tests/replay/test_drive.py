@@ -137,7 +137,7 @@ def test_the_cycle_of_the_position_loop_is_told(tmp_path: Path, capsys: pytest.C
         COLUMNS + "speed_setpoint: {column: X.n_s}\nfeedforward: {column: X.n_ffw}\n"
     )
     words = [str(tmp_path / "log.csv"), "--axes", "X", "--columns", str(tmp_path / "columns.yaml"), "--quiet", "--out"]
-    assert main(["identify-drive", *words, str(tmp_path / "own")]) == 0
+    assert main(["identify", "drive", *words, str(tmp_path / "own")]) == 0
     assert "position cycles of 2 ms (taken) and 0.125 ms (--position-cycle) the record speaks for the former" in (
         capsys.readouterr().err
     )
@@ -160,7 +160,7 @@ def test_a_setpoint_that_is_the_position_itself(tmp_path: Path, capsys: pytest.C
     (tmp_path / "columns.yaml").write_text(COLUMNS.replace("setpoint: {column: X.x_s}", "setpoint: {column: X.x_a}"))
     words = [str(path), "--axes", "X", "--columns", str(tmp_path / "columns.yaml"), "--out", str(tmp_path / "out")]
     for more in ([], ["--machine", str(MACHINES / "one_axis")]):
-        assert main(["identify-drive", *words, *more]) == 2
+        assert main(["identify", "drive", *words, *more]) == 2
         said = capsys.readouterr().err
         assert "axis X: the position setpoint is the recorded position (largest difference 0 nm of a way" in said
         assert not (tmp_path / "out").exists()
@@ -191,7 +191,7 @@ def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert figures["X.position_rms"]["value"] < 1e-3
     assert not [name for name in figures if "torque" in name]
     off = [f"--set=axes.X.drive.{each}" for each in ("K_v=3.5 (m/min)/mm", "T_sym=3 ms", "k_ffw=98 %", "T_n=16 ms")]
-    assert main(["identify-drive", *words, str(tmp_path / "drive"), *machine, *off]) == 0
+    assert main(["identify", "drive", *words, str(tmp_path / "drive"), *machine, *off]) == 0
     said = json.loads((tmp_path / "drive" / "summary.json").read_text())["answer"]
     assert re.match(
         r"X: the position of the record is met to .* um rms .*The record determines K_v, k_ffw, ", said[0]
@@ -202,7 +202,22 @@ def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     found = json.loads((tmp_path / "drive" / "summary.json").read_text())["axes"]["X"]["parameters"]
     for name in ("K_v", "k_ffw", "T_sym", "K_p"):
         assert found[name]["value"] == pytest.approx(getattr(true, name), rel=0.01), name
-    assert main(["identify-drive", *words, str(tmp_path / "none")]) == 2
+    assert main(["identify", "drive", *words, str(tmp_path / "none")]) == 2
     assert "no torque, current or force is recorded" in capsys.readouterr().err
-    assert main(["identify", str(path), "--axis", "X", "--columns", str(mapping), "--out", str(tmp_path / "none")]) == 2
+    assert (
+        main(
+            [
+                "identify",
+                "friction",
+                str(path),
+                "--axes",
+                "X",
+                "--columns",
+                str(mapping),
+                "--out",
+                str(tmp_path / "none"),
+            ]
+        )
+        == 2
+    )
     assert "columns.yaml:1: missing: one of torque, current, force" in capsys.readouterr().err

@@ -84,7 +84,7 @@ def test_a_real_machine_on_motion_that_it_was_not_identified_from(
     follows the other, from the gentle ones to some thousandths of the lag of 1.2 mm."""
     record = os.environ["FEEDSIM_CAPTURE"]
     words = ["--axes", "X", "--quiet"]
-    assert main(["identify-drive", record, *words, "--window", seen, "--out", str(tmp_path / "machine")]) == 0
+    assert main(["identify", "drive", record, *words, "--window", seen, "--out", str(tmp_path / "machine")]) == 0
     assert load_machine(tmp_path / "machine").control == "sinumerik"
     found = json.loads((tmp_path / "machine" / "summary.json").read_text())["axes"]["X"]["parameters"]
     for name, value in (("T_sym", 0.716e-3), ("k_ffw", 1.0001), ("J", 0.0189), ("K_p", 6.5)):
@@ -118,7 +118,7 @@ def test_the_published_controller_of_a_measured_axis() -> None:
 def test_a_real_axis_under_its_weight_that_moves_one_way(window: str, tmp_path: Path) -> None:
     """Its weight is some 20 N.m (all of the record, both directions: 20.5 N.m): within 18 to 22, or refused."""
     words = [os.environ["FEEDSIM_CAPTURE"], "--axes", "Y", "--window", window, "--quiet", "--out", str(tmp_path)]
-    status = main(["identify-drive", *words])
+    status = main(["identify", "drive", *words])
     if status == 0:
         M_0 = json.loads((tmp_path / "summary.json").read_text())["axes"]["Y"]["parameters"]["M_0"]
         assert 18.0 < M_0["value"] < 22.0

@@ -102,7 +102,7 @@ def test_a_record_of_the_position_alone_on_a_known_machine(torque: bool, tmp_pat
     columns = COLUMNS.replace("deviation: {column: X.x_e}\n", "")
     (tmp_path / "columns.yaml").write_text(columns if torque else columns.replace("torque: {column: X.M_a}\n", ""))
     words = [str(path), "--axes", "X", "--columns", str(tmp_path / "columns.yaml"), "--machine", str(known)]
-    assert main(["identify-drive", *words, "--quiet", "--out", str(tmp_path / "own")]) == 0
+    assert main(["identify", "drive", *words, "--quiet", "--out", str(tmp_path / "own")]) == 0
     found = json.loads((tmp_path / "own" / "summary.json").read_text())["axes"]["X"]["parameters"]
     true = load_machine(known).axes["X"].drive
     for name in ("k_ffw", "T_sym", "T_dyn"):
@@ -140,7 +140,7 @@ def test_motion_of_a_loaded_axis_in_one_direction(
     write_csv(tmp_path / "log.csv", log)
     (tmp_path / "columns.yaml").write_text(COLUMNS.replace("X", "Y") + "speed_setpoint: {column: Y.n_s}\n")
     words = [str(tmp_path / "log.csv"), "--axes", "Y", "--columns", str(tmp_path / "columns.yaml"), "--quiet", "--out"]
-    status = main(["identify-drive", *words, str(tmp_path / "own")])
+    status = main(["identify", "drive", *words, str(tmp_path / "own")])
     true = load_machine(machine).axes["Y"].M_0
     if status == 0:
         found = json.loads((tmp_path / "own" / "summary.json").read_text())["axes"]["Y"]["parameters"]["M_0"]
@@ -170,6 +170,6 @@ def test_a_fit_that_leaves_most_of_the_torque_is_refused(tmp_path: Path, capsys:
     write_csv(tmp_path / "log.csv", replace(log, columns={**log.columns, "X.M_a": torque + beside}))
     (tmp_path / "columns.yaml").write_text(COLUMNS)
     words = [str(tmp_path / "log.csv"), "--axes", "X", "--columns", str(tmp_path / "columns.yaml"), "--quiet", "--out"]
-    assert main(["identify-drive", *words, str(tmp_path / "own")]) == 2
+    assert main(["identify", "drive", *words, str(tmp_path / "own")]) == 2
     assert re.search(r"axis X: the best fit leaves [\d.]+ N.m rms of a torque of [\d.]+ N.m", capsys.readouterr().err)
     assert not (tmp_path / "own").exists()

@@ -56,7 +56,7 @@ def hue(image: NDArray[np.float64], channel: int) -> float:
 
 
 def test_structure_and_sheet_of_the_default_machine(tmp_path: Path, capsys: Capture) -> None:
-    assert cli.main(["machine", "show", str(TEST_CENTRE), "--out", str(tmp_path)]) == 0
+    assert cli.main(["machine", "view", str(TEST_CENTRE), "--out", str(tmp_path)]) == 0
     assert str(tmp_path / "report.html") in capsys.readouterr().out
     names = {"structure.png", "structure.svg", "modes.png", "modes.svg"}
     assert {path.name for path in (tmp_path / "figures").iterdir()} == names
@@ -99,7 +99,7 @@ def test_a_mode_by_its_frequency_still_and_in_motion(tmp_path: Path, capsys: Cap
     for one, other in ((0, 1), (1, 2), (0, 2)):
         assert np.mean(np.abs(frames[one] - frames[other]).max(axis=2) > 40) > 0.01
     # Another look at the machine leaves nothing of this one behind.
-    assert cli.main(["machine", "show", str(ONE_AXIS), "--mode", "9", "--quiet", "--out", str(tmp_path)]) == 0
+    assert cli.main(["machine", "view", str(ONE_AXIS), "--mode", "9", "--quiet", "--out", str(tmp_path)]) == 0
     assert {path.name for path in figures.iterdir()} == {
         *("structure.png", "structure.svg", "mode_9.png", "mode_9.svg")
     }
@@ -161,14 +161,14 @@ def test_y_is_up_in_every_view_but_from_above() -> None:
 
 
 def test_matrices_with_a_mesh_are_drawn_as_lines(tmp_path: Path, capsys: Capture) -> None:
-    assert cli.main(["machine", "show", str(CALCULIX), "--mode", "420 Hz", "--out", str(tmp_path)]) == 0
+    assert cli.main(["machine", "view", str(CALCULIX), "--mode", "420 Hz", "--out", str(tmp_path)]) == 0
     assert painted(pixels(tmp_path / "figures" / "mode_2.png")) > 0.01
     assert "moving along Y" in capsys.readouterr().out
 
 
 def test_matrices_without_nodes_say_what_is_missing(tmp_path: Path, capsys: Capture) -> None:
     out = tmp_path / "out"
-    assert cli.main(["machine", "show", str(MATRICES), "--out", str(out)]) == 2
+    assert cli.main(["machine", "view", str(MATRICES), "--out", str(out)]) == 2
     error = capsys.readouterr().err
     for words in ("where the nodes are", "key nodes", "key lines"):
         assert words in error
@@ -189,7 +189,7 @@ def test_matrices_without_nodes_say_what_is_missing(tmp_path: Path, capsys: Capt
 )
 def test_show_refuses(arguments: list[str], words: str, tmp_path: Path, capsys: Capture) -> None:
     out = tmp_path / "out"
-    assert cli.main(["machine", "show", str(ONE_AXIS), *arguments, "--out", str(out)]) == 2
+    assert cli.main(["machine", "view", str(ONE_AXIS), *arguments, "--out", str(out)]) == 2
     assert words in capsys.readouterr().err
     assert not out.exists()
 
@@ -197,7 +197,7 @@ def test_show_refuses(arguments: list[str], words: str, tmp_path: Path, capsys: 
 def test_same_picture_twice(tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert (
-            cli.main(["machine", "show", str(ONE_AXIS), "--mode", "9", "--quiet", "--out", str(tmp_path / name)]) == 0
+            cli.main(["machine", "view", str(ONE_AXIS), "--mode", "9", "--quiet", "--out", str(tmp_path / name)]) == 0
         )
     for file in ("structure.png", "mode_9.png", "mode_9.svg"):
         assert (tmp_path / "a" / "figures" / file).read_bytes() == (tmp_path / "b" / "figures" / file).read_bytes()

@@ -208,8 +208,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     ],
 )
 def test_cells_that_are_refused(texts: list[str], message: str) -> None:
-    from feedsim.arguments import as_options
-    from feedsim.cli.options import pairs
+    from feedsim.arguments import as_options, pairs
     from feedsim.jobs.machine_pack import POSITIONS_EXAMPLE, grid_axes
 
     with pytest.raises(InputError) as caught, as_options():
@@ -228,7 +227,7 @@ def test_packing_poses_needs_a_structure_that_moves(
     )
     (folder / "modes.csv").write_bytes((MACHINE / "modes.csv").read_bytes())
     out = tmp_path / "plant.fmu"
-    assert main(["machine", "pack", str(folder), "--poses", "Z=20mm", "--out", str(out)]) == 2
+    assert main(["export", "--plant", str(folder), "--poses", "Z=20mm", "--out", str(out)]) == 2
     assert "has no structure to compute the modes of other poses from" in capsys.readouterr().err
     assert not out.exists()
     assert load_structure(MACHINE / "structure.yaml").kind == "geometry"

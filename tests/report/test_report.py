@@ -10,6 +10,7 @@ import re
 import stat
 import subprocess
 import sys
+from argparse import Namespace
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -22,6 +23,7 @@ import pytest
 from feedsim.analysis import Figure, evaluate
 from feedsim.cli.terminal import finish, warn
 from feedsim.findings import Note, Wrong
+from feedsim.jobs.check import Checked
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
@@ -177,7 +179,9 @@ def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.C
     assert capsys.readouterr().err.splitlines() == [
         "feedsim: WRONG: worse than < before", "feedsim: warning: doubtful", "feedsim: note: as built",
     ]  # fmt: skip
-    finish(False, found, "done")
+    options = Namespace(quiet=False, json=False, verbose=False, strict=False)
+    assert finish(Checked(["done"], found), None, options) == 0
+    assert finish(Checked([], found), None, Namespace(quiet=True, json=False, verbose=False, strict=True)) == 1
     assert capsys.readouterr().out.splitlines() == ["WRONG: worse than < before", "done"]
 
 

@@ -62,7 +62,7 @@ def unstable(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("which axis is it", "circle", (r"where [XZ] reverses|[XZ] answers|[XZ] stays behind|X reverses",)),
         ("can I trust it", "identify", (r"known to ±[\d.]+ %",)),
         ("what has changed", "circles", (r"G [\d.]+ → [\d.]+ µm|unchanged: ",)),
-        ("what do I type", "stop", (r"feedsim tune drive \S+ --axis Z",)),
+        ("what do I type", "stop", (r"feedsim tune drive \S+ --axes Z",)),
         ("how near is the model", "replay", (r"position off by", r"rms")),
         ("what are my margins", "frf", (r"least gain margin [\d.]+ dB", r"least phase margin \d+°")),
         ("which parameter moves it", "study", (r"(feed|K_v) \([\d.]+\) moves it most",)),
@@ -95,9 +95,9 @@ def test_where_the_data_are_and_how_one_prints(browser: Any, kinds: Kinds) -> No
 
 
 def test_commands_of_the_next_step_can_be_typed(kinds: Kinds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = Report("t", "", [], "", next_step=("Then:\n", code(f"feedsim show {FOLDER} OTHER_FOLDER")))
+    found = Report("t", "", [], "", next_step=("Then:\n", code(f"feedsim diff {FOLDER} OTHER_FOLDER")))
     assert found.in_folder(Path("my results")).next_step == (
-        "Then:\n", Span("feedsim show 'my results' OTHER_FOLDER", "code"),
+        "Then:\n", Span("feedsim diff 'my results' OTHER_FOLDER", "code"),
     )  # fmt: skip
     monkeypatch.chdir(tmp_path)
     assert typed(tmp_path / "a" / "b c.yaml") == "'a/b c.yaml'"

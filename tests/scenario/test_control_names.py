@@ -140,7 +140,7 @@ def test_reports_show_it_and_results_keep_their_bytes(fmus: Path, tmp_path: Path
 def test_differences_in_the_controls_unit(fmus: Path, tmp_path: Path) -> None:
     feedsim("run", CIRCLE, "--out", "a", fmus=fmus, cwd=tmp_path)
     feedsim("run", CIRCLE, "--set", "Z.MD32200=5", "--out", "b", fmus=fmus, cwd=tmp_path)
-    done = feedsim("show", "a", "b", "--out", "over", "--control", "sinumerik", fmus=fmus, cwd=tmp_path)
+    done = feedsim("diff", "a", "b", "--out", "over", "--control", "sinumerik", fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "over/report.html").read_text()
     assert "4 | 5" in page

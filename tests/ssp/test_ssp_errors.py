@@ -207,7 +207,7 @@ def test_an_axis_that_does_not_stand_where_its_setpoints_begin(
 ) -> None:
     """A start position can be edited; whoever does it hears what follows. No message names a temporary folder."""
     file = edited(exported, tmp_path / "x_0.ssp", "resources/plant.ssv", ('"0.1"', '"0.2"'))
-    assert cli.main(["validate", str(file)]) == 0
+    assert cli.main(["check", str(file)]) == 0
     told = capsys.readouterr().err
     assert "axis Z stands at 0.2 m, its setpoints begin at 0.1 m: it jumps there at once" in told
     old, new = '"0.003183098861837907"', '"0.0015"'
@@ -313,7 +313,7 @@ def test_the_command_line(exported: Path, fmus: Path, tmp_path: Path, capsys: py
     assert not out.exists()
     assert cli.main(["run", str(exported), "--out", str(out), "--quiet"]) == 0
     assert {"result.csv", "summary.json", "report.html"} <= {path.name for path in out.iterdir()}
-    assert cli.main(["validate", str(exported)]) == 0
+    assert cli.main(["check", str(exported)]) == 0
     assert "valid; 2 motions" in capsys.readouterr().out
 
 
@@ -325,7 +325,7 @@ def test_writing_is_whole_or_not_at_all(fmus: Path, tmp_path: Path, capsys: pyte
     (tmp_path / "folder.ssp").mkdir()
     assert cli.main([*fine, str(tmp_path / "folder.ssp")]) == 4
     assert cli.main([*fine, str(tmp_path / "x.ssp"), "--set", "motions.0.by.Z=900 mm"]) == 2  # too far
-    assert cli.main(["ssp", str(file), "--fmus", str(tmp_path), "--out", str(tmp_path / "x.ssp")]) == 2
+    assert cli.main(["export", str(file), "--fmus", str(tmp_path), "--out", str(tmp_path / "x.ssp")]) == 2
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder.ssp", "short.yaml"]
     capsys.readouterr()
     assert cli.main([*fine, str(tmp_path / "x.ssp")]) == 0

@@ -21,7 +21,7 @@ MACHINE = "resources/machine.fmu"
 @pytest.fixture(scope="module")
 def one(short: Path, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("one") / "one.ssp"
-    assert main(["ssp", str(short), "--one", "--out", str(path), "--fmus", str(fmus)]) == 0
+    assert main(["export", str(short), "--one", "--out", str(path), "--fmus", str(fmus)]) == 0
     return path
 
 

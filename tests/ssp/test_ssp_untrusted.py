@@ -23,7 +23,7 @@ FRICTION = "resources/friction_Z.ssv"
 
 
 def refusal(file: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    assert cli.main(["validate", str(file)]) == 2
+    assert cli.main(["check", str(file)]) == 2
     said = capsys.readouterr().err
     assert str(file) in said
     assert UNPACKED not in said

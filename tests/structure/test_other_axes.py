@@ -134,7 +134,7 @@ def test_pack_command_makes_what_plant_names(
     monkeypatch.setenv("FEEDSIM_FMUS", str(fmus))
     out = tmp_path / "my plant.fmu"
     path = write_machine(tmp_path / "machine", {"Q": 0.1, "b2": 0.25})
-    assert cli.main(["machine", "pack", str(path.parent), "--out", str(out), "--name", "Saw 3"]) == 0
+    assert cli.main(["export", "--plant", str(path.parent), "--out", str(out), "--name", "Saw 3"]) == 0
     with Archive(out) as archive:
         said = capsys.readouterr().out
         assert f"{out}: Q at 100 mm, b2 at 250 mm" in said
@@ -147,7 +147,7 @@ def test_pack_command_makes_what_plant_names(
 
     base = tmp_path / "base.fmu"
     shutil.copy(fmus / "plant.fmu", base)
-    assert cli.main(["machine", "pack", str(path), "--base", str(base), "--out", str(base)]) == 0  # in place
+    assert cli.main(["export", "--plant", str(path), "--base", str(base), "--out", str(base)]) == 0  # in place
     assert base.read_bytes() != (fmus / "plant.fmu").read_bytes()
 
 
@@ -163,7 +163,7 @@ def test_pack_command_computes_the_modes_of_another_pose(tmp_path: Path, fmus: P
     pose = {**machine.pose, "X": 1.2, "Z": 0.4}
     out = tmp_path / "there.fmu"
     arguments = ["--at", "X=1200mm", "Z=0.4 m", "--base", str(fmus / "plant.fmu"), "--out", str(out)]
-    assert cli.main(["machine", "pack", str(folder), *arguments]) == 0
+    assert cli.main(["export", "--plant", str(folder), *arguments]) == 0
     built = build(load_structure(machine.structure), pose).solution.modes
     with Archive(out) as archive:
         starts = {axis: float(archive.variables[f"{axis}.x_0"].start) for axis in axes_of(archive)}
@@ -195,7 +195,7 @@ def test_pack_command_refuses(
     path = write_machine(tmp_path, {"Q": 0.1})
     out = tmp_path / "out.fmu"
     base = [] if "--base" in arguments else ["--base", str(fmus / "plant.fmu")]
-    assert cli.main(["machine", "pack", str(path), "--out", str(out), *base, *arguments]) == code
+    assert cli.main(["export", "--plant", str(path), "--out", str(out), *base, *arguments]) == code
     assert text in capsys.readouterr().err
     assert not out.exists()
 

@@ -69,7 +69,7 @@ def test_cases_lie_over_each_other(
 ) -> None:
     folder, table = done
     names = [f"{folder}:min=Z.overshoot", f"{folder}:max=Z.overshoot"]
-    assert main(["show", *names, "--out", str(tmp_path / "over"), "--quiet"]) == 0
+    assert main(["diff", *names, "--out", str(tmp_path / "over"), "--quiet"]) == 0
     summary = json.loads((tmp_path / "over" / "summary.json").read_text())
     values = [each["figures"]["Z.overshoot"]["value"] for each in summary["sources"]]
     assert values == pytest.approx([1e6 * table["Z.overshoot"].min(), 1e6 * table["Z.overshoot"].max()], rel=1e-12)

@@ -53,7 +53,7 @@ def test_the_answer_is_the_run_of_the_table(way: str, choose: Callable[..., Any]
     assert float(found[1]) == pytest.approx(float(best["Z.peak_torque [N.m]"]), rel=5e-3)
     assert answer.split(";")[0] in said
     words = " ".join(page.words)
-    assert f"feedsim sweep study.yaml --row {best['run']}" in words
+    assert f"feedsim check study.yaml --row {best['run']}" in words
     assert "It lies at the end of what was tried of feed" in answer
     assert_numbers_agree(folder / "out")
     shown = feedsim("sweep", "study.yaml", "--row", best["run"], fmus=fmus, cwd=folder).stdout

@@ -188,7 +188,7 @@ def test_a_middle_that_contradicts_the_scenario_is_warned_of(study: Write) -> No
 
 
 def test_schema(study: Write, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", "study"]) == 0
+    assert main(["tools", "schema", "study"]) == 0
     schema = json.loads(capsys.readouterr().out)
     assert schema == json_schema("study")
     check = jsonschema.Draft202012Validator(schema)
@@ -203,7 +203,7 @@ def test_schema(study: Write, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_validate_and_run_know_a_study(study: Write, capsys: pytest.CaptureFixture[str], fmus: Path) -> None:
-    assert main(["validate", str(study()), "--fmus", str(fmus)]) == 0
+    assert main(["check", str(study()), "--fmus", str(fmus)]) == 0
     assert "16 runs" in capsys.readouterr().out
     assert main(["run", str(study())]) == 2
     assert "feedsim sweep" in capsys.readouterr().err

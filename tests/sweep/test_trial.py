@@ -69,7 +69,7 @@ def test_a_run_that_fails_is_named_and_others_are_tried(
     told = capsys.readouterr()
     assert "run 1 fails: " in told.err
     assert "1 of the 3 runs tried fail" in told.out
-    assert main(["validate", str(file), "--fmus", str(fmus)]) == 0
+    assert main(["check", str(file), "--fmus", str(fmus)]) == 0
     told = capsys.readouterr()
     assert "run 1 is refused, run 0 is not: " in told.err
     assert "valid; 3 runs" in told.out
@@ -79,5 +79,5 @@ def test_where_none_works_one_is_named(study: Write, fmus: Path, capsys: pytest.
     file = study(study().read_text().replace("from: 1.2 N.m, to: 2 N.m", "from: 20 N.m, to: 30 N.m"))
     assert main(["sweep", str(file), "--dry-run", "--fmus", str(fmus)]) == 3
     assert "none of the 16 runs tried is possible; run 8: " in capsys.readouterr().err
-    assert main(["validate", str(file), "--fmus", str(fmus)]) == 2
+    assert main(["check", str(file), "--fmus", str(fmus)]) == 2
     assert "run 8: " in capsys.readouterr().err

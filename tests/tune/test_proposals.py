@@ -181,7 +181,9 @@ def test_nothing_is_proposed_for_what_another_maker_drives(fmus: Path) -> None:
 def test_try_runs_and_overlays(fmus: Path, tmp_path: Path) -> None:
     settings = ["--set", DRIVE.format("Z", "T_sym=4.158 ms")]
     plain = feedsim("run", CIRCLE, *settings, "--out", "plain", fmus=fmus, cwd=tmp_path)
-    done = feedsim("run", CIRCLE, *settings, "--try", "--out", "r", "--control", "sinumerik", fmus=fmus, cwd=tmp_path)
+    done = feedsim(
+        "tune", "proposals", CIRCLE, *settings, "--out", "r", "--control", "sinumerik", fmus=fmus, cwd=tmp_path
+    )
     assert plain.returncode == done.returncode == 0, done.stderr
     assert (tmp_path / "plain/result.csv").read_bytes() == (tmp_path / "r/result.csv").read_bytes()
     assert "change: Z.T_sym 4.158 ms -> 3.528 ms" in done.stdout
@@ -203,7 +205,7 @@ def test_the_section_names_the_commands_that_go_on() -> None:
     """All values of a drive, and those of a compensation, are found by commands that take the scenario."""
     proposals = [Proposal("reversal peaks of Z", "Z", "drive.T_n", 0.02, 0.005, "s", "", "lower")]
     page = str(changes_section(proposals, None, Path.cwd() / "parts" / "my circle.yaml"))
-    assert "feedsim tune drive 'parts/my circle.yaml' --axis Z" in page
+    assert "feedsim tune drive 'parts/my circle.yaml' --axes Z" in page
     assert "feedsim tune compensation 'parts/my circle.yaml'" in page
     assert "feedsim tune" not in str(changes_section(proposals, None, Path("my circle.ssp")))
 
@@ -222,7 +224,7 @@ def test_a_margin_without_limit_is_no_number_in_the_summary() -> None:
 def test_a_drive_that_does_not_hold_its_axis_is_not_tuned(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for command, scenario, own in (("drive", "z_positioning", ["--axis", "Z"]), ("compensation", "xz_circle", [])):
+    for command, scenario, own in (("drive", "z_positioning", ["--axes", "Z"]), ("compensation", "xz_circle", [])):
         words = [str(CIRCLE.with_name(f"{scenario}.yaml")), *own, "--set", f"machine.axes.Z.drive.{name}"]
         assert main(["tune", command, *words, "--out", str(tmp_path / "out")]) == 2
         assert f"axis Z: {name[:3]} is 0; tuning needs a drive that holds its axis" in capsys.readouterr().err

@@ -318,7 +318,7 @@ def test_circles_are_slower_where_the_path_asks_too_much_of_an_axis(axis: str) -
 def tuned(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The command on the default machine with a short search."""
     folder = tmp_path_factory.mktemp("tuned")
-    command = ("tune", "drive", Z, "--axis", "Z", "--evaluations", "20", "--control", "sinumerik", "--out", "r")
+    command = ("tune", "drive", Z, "--axes", "Z", "--evaluations", "20", "--control", "sinumerik", "--out", "r")
     done = feedsim(*command, fmus=fmus, cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "MD32200 POSCTRL_GAIN (K_v) 4 -> " in done.stdout
@@ -373,7 +373,7 @@ def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
 
 def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> None:
     """The drive changes, stays, stays: each time the files are of the present result, and what goes is named."""
-    command = ("tune", "drive", ONE, "--axis", "X", "--evaluations", "10", "--out", "r")
+    command = ("tune", "drive", ONE, "--axes", "X", "--evaluations", "10", "--out", "r")
     assert feedsim(*command, fmus=fmus, cwd=tmp_path).returncode == 0
     folder = tmp_path / "r"
     assert yaml.safe_load((folder / "settings.yaml").read_text())["set"]
@@ -409,15 +409,15 @@ def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--axis", "A"), "--axis A: no axis 'A'; there is X, Y, Z"),
-        (("--axis", "Z", "--gain-margin", "-1"), "--gain-margin -1: more than zero is needed"),
-        (("--axis", "Z", "--gain-margin", "much"), "--gain-margin much: a number of dB is needed"),
-        (("--axis", "Z", "--phase-margin", "3 mm"), "--phase-margin"),
-        (("--axis", "Z", "--evaluations", "3"), "--evaluations 3: at least 10 are needed"),
-        (("--axis", "Z", "--at", "Z=9m"), "--at Z=9m: Z is outside of its travel"),
-        (("--axis", "Z", "--at", "Q=1mm"), "--at Q=1mm: AXIS=POSITION is needed"),
-        (("--axis", "Z", "--at", "Z=5deg"), "--at Z=5deg: '5deg' is an angle"),
-        (("--axis", "Z", "--at", "X=1mm,Z=200mm,Z=300mm"), "--at X=1mm,Z=200mm,Z=300mm: Z is given twice"),
+        (("--axes", "A"), "--axes A: no axis 'A'; there is X, Y, Z"),
+        (("--axes", "Z", "--gain-margin", "-1"), "--gain-margin -1: more than zero is needed"),
+        (("--axes", "Z", "--gain-margin", "much"), "--gain-margin much: a number of dB is needed"),
+        (("--axes", "Z", "--phase-margin", "3 mm"), "--phase-margin"),
+        (("--axes", "Z", "--evaluations", "3"), "--evaluations 3: at least 10 are needed"),
+        (("--axes", "Z", "--at", "Z=9m"), "--at Z=9m: Z is outside of its travel"),
+        (("--axes", "Z", "--at", "Q=1mm"), "--at Q=1mm: AXIS=POSITION is needed"),
+        (("--axes", "Z", "--at", "Z=5deg"), "--at Z=5deg: '5deg' is an angle"),
+        (("--axes", "Z", "--at", "X=1mm,Z=200mm,Z=300mm"), "--at X=1mm,Z=200mm,Z=300mm: Z is given twice"),
     ],
 )
 def test_bad_input(words: tuple[str, ...], message: str, fmus: Path, tmp_path: Path) -> None:

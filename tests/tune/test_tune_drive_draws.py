@@ -90,7 +90,7 @@ def test_typed_values_do_not_vary(tmp_path: Path) -> None:
 
 def test_the_command_with_doubt(fmus: Path, tmp_path: Path) -> None:
     changed = ("--set", f"machine.axes.X.friction={identified(tmp_path, inertia=0.02)}")
-    command = ("tune", "drive", ONE, "--axis", "X", "--evaluations", "10", *changed, "--out", "r")
+    command = ("tune", "drive", ONE, "--axes", "X", "--evaluations", "10", *changed, "--out", "r")
     done = feedsim(*command, "--uncertain", "19", fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "With what identification leaves open: peaks fall by " in done.stdout
@@ -136,7 +136,7 @@ def test_margins_hold_on_draws_that_values_are_found_on(fmus: Path, tmp_path: Pa
     ],
 )
 def test_what_is_refused(words: tuple[str, ...], message: str, fmus: Path, tmp_path: Path) -> None:
-    done = feedsim("tune", "drive", ONE, "--axis", "X", *words, "--out", "r", fmus=fmus, cwd=tmp_path)
+    done = feedsim("tune", "drive", ONE, "--axes", "X", *words, "--out", "r", fmus=fmus, cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr
     assert not (tmp_path / "r").exists()

@@ -70,7 +70,7 @@ def test_run_with_intervals(tmp_path: Path, fmus: Path) -> None:
 def test_compensation_with_an_uncertain_set(tmp_path: Path, fmus: Path) -> None:
     file = write_set(tmp_path, 0.05)
     done = feedsim(
-        "compensate", CIRCLE, "--friction", f"Z={file}", "--no-table", "--uncertain", "19", "--out", "out",
+        "tune", "feedforward", CIRCLE, "--friction", f"Z={file}", "--no-table", "--uncertain", "19", "--out", "out",
         fmus=fmus, cwd=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from feedsim.jobs.compensate import _open_of as open_values
 
 from feedsim import cosim, nc
 from feedsim.errors import InputError, SimulationError
-from feedsim.jobs.compensate import _open_of as open_values
 from feedsim.scenario import Friction, GmsFriction, load
 from feedsim.scenario.load import read_friction
 from feedsim.uncertainty import cloud_of, interval, of_run, share_of, torque_scale
@@ -74,7 +74,9 @@ def test_what_is_refused(tmp_path: Path) -> None:
     content = yaml.safe_load(file.read_text())
     content["identified"]["correlation"]["matrix"] = [[1.0]]
     file.write_text(yaml.safe_dump(content))
-    with pytest.raises(InputError, match="axis Z: the group identified of its friction is not as feedsim identify"):
+    with pytest.raises(
+        InputError, match="axis Z: the group identified of its friction is not as feedsim identify friction"
+    ):
         cloud_of(load(CIRCLE, [f"machine.axes.Z.friction={file}"]).machine)
 
 
@@ -99,7 +101,9 @@ def test_a_set_that_compensates_varies_where_the_machine_does_not(tmp_path: Path
     broken = tmp_path / "broken.yaml"
     content["identified"]["correlation"]["matrix"] = [[1.0]]
     broken.write_text(yaml.safe_dump(content))
-    with pytest.raises(InputError, match="axis Z: the group identified of its friction is not as feedsim identify"):
+    with pytest.raises(
+        InputError, match="axis Z: the group identified of its friction is not as feedsim identify friction"
+    ):
         open_values(load(CIRCLE, [f"machine.axes.Z.friction={broken}"]), sets, 19)
 
 

@@ -13,10 +13,16 @@ from pathlib import Path
 from typing import Any
 
 NO_RECORD = "a folder of results without a record (result.csv)"
+# Kind of a summary -> the command that makes it, where they differ.
 COMMAND_NAMES = {
+    "compensate": "tune feedforward",
+    "identify": "identify friction",
+    "identify-drive": "identify drive",
+    "identify-modes": "identify modes",
+    "machine": "machine view",
+    "show": "diff",
     "tune": "tune compensation",
-    "machine": "machine info",
-}  # kind of a summary -> command, where they differ
+}
 KIND_BYTES = 4096  # bytes of a file that are read to see what it is
 
 
@@ -91,17 +97,18 @@ def _summary(path: Path) -> bool:
     return isinstance(content, dict) and bool({"scenario", "files", "feedsim"} & {*content})
 
 
-_RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine info", "machine show", "machine build",
-        "machine pack", "tune compensation", "tune drive")  # fmt: skip
-_MACHINES = ("machine info", "machine show", "machine build", "machine pack", "frf", "pack", "machine export",
+_RUN = ("run", "check", "frf", "tune feedforward", "export", "machine info", "machine view", "machine build",
+        "tune compensation", "tune drive")  # fmt: skip
+_MACHINES = ("machine info", "machine view", "machine build", "frf", "export", "machine export",
              "machine import --machine")  # fmt: skip
-_RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay", "identify-modes")
+_RECORDS = ("identify friction", "circle", "diff", "compare", "tools convert", "identify drive", "replay",
+            "identify modes")  # fmt: skip
 INPUT_KINDS = (
-    Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
+    Kind("a study", ("sweep", "check"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
     Kind("a scenario", _RUN, _keyed({"motions"}, none={"sampling", "parameters"})),
     Kind(
         "a structure file",
-        ("machine info", "machine build", "machine show"),
+        ("machine info", "machine build", "machine view"),
         _keyed({"damping", "bodies", "matrices"}, none={"cycles", "motions"}),
     ),
     Kind(
@@ -114,16 +121,18 @@ INPUT_KINDS = (
         _MACHINES,
         _holds("machine.yaml", "structure.yaml"),
     ),
-    Kind("results of a study", ("show",), _holds("study.json")),
-    Kind("a folder of results", ("show", "compare"), _holds("result.csv")),
+    Kind("results of a study", ("diff",), _holds("study.json")),
+    Kind("a folder of results", ("diff", "compare"), _holds("result.csv")),
     Kind(NO_RECORD, (), _holds("summary.json")),
     Kind("a file of values for the option --set", (), lambda path: _keys(path) == {"set"}),
-    Kind("an SSP file", ("run", "validate"), _ends(".ssp")),
+    Kind("an SSP file", ("run", "check"), _ends(".ssp")),
     Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
     Kind("a table of modes, which a machine file names", (), _modes),
     Kind("a record", _RECORDS, _table),
-    Kind("a record", ("identify", "convert", "identify-drive", "replay", "identify-modes"), _ends(".mat")),
-    Kind("a capture of a control", ("identify-drive", "replay", "identify", "convert"), _capture),
+    Kind(
+        "a record", ("identify friction", "tools convert", "identify drive", "replay", "identify modes"), _ends(".mat")
+    ),
+    Kind("a capture of a control", ("identify drive", "replay", "identify friction", "tools convert"), _capture),
 )
 
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import io
+import json
+import math
 import os
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
-from feedsim.cli.options import arguments
 from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.jobs.watch import Watch
-
-if TYPE_CHECKING:
-    from feedsim.scenario import Coupling, Machine
-
-T = TypeVar("T")
 
 
 class TerminalWatch(Watch):
@@ -105,30 +101,24 @@ def prepare_streams() -> None:
 
 
 @contextmanager
-def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[TerminalWatch]:
-    """Who watches a job for the person at the terminal: with a progress bar, unless `quiet` or where nobody looks.
-
-    unit: what the bar counts; shortened: in large numbers (12.3k).
-    """
+def watching(quiet: bool) -> Iterator[TerminalWatch]:
+    """Who watches a job for the person at the terminal: with a progress bar, unless `quiet` or where nobody looks."""
     if quiet or not sys.stderr.isatty():
         yield TerminalWatch(None, quiet)
         return
     from tqdm import tqdm
 
-    with tqdm(unit=unit, unit_scale=shortened, leave=False) as bar:
+    with tqdm(unit_scale=True, leave=False) as bar:
         yield TerminalWatch(bar, quiet)
 
 
-def call(job: Callable[..., T], options: Namespace, unit: str = "", *, shortened: bool = False, **read: Any) -> T:
-    """What a job makes of the options of its command, with its progress shown.
-
-    read: arguments that the command has read from its options itself. unit, shortened: as of :func:`watching`.
-    """
-    with watching(getattr(options, "quiet", False), unit, shortened=shortened) as watch:
-        return job(**arguments(job, options) | read, watch=watch)
-
-
 COLOURS = {"red": 31, "yellow": 33}
+_WHEN = {"colour": "auto"}
+
+
+def choose_colour(when: str) -> None:
+    """Colour what is printed from now on: "always", "never", or "" and "auto" where a terminal shows it."""
+    _WHEN["colour"] = when or "auto"
 
 
 def visible(line: str) -> str:
@@ -139,8 +129,10 @@ def visible(line: str) -> str:
 def painted(text: str, colour: str, stream: Any) -> str:
     """The text in a colour where a stream is a terminal that shows some, and NO_COLOR (no-color.org) is not set."""
     text = "\n".join(visible(line) for line in text.split("\n"))
-    plain = not colour or bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
-    return text if plain or not stream.isatty() else f"\x1b[{COLOURS[colour]}m{text}\x1b[0m"
+    plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb" or not stream.isatty()
+    if not colour or _WHEN["colour"] == "never" or (plain and _WHEN["colour"] == "auto"):
+        return text
+    return f"\x1b[{COLOURS[colour]}m{text}\x1b[0m"
 
 
 def warn(warnings: Iterable[str]) -> None:
@@ -152,26 +144,64 @@ def warn(warnings: Iterable[str]) -> None:
         print(painted(f"feedsim: {kind}{name}", colour, sys.stderr), file=sys.stderr)
 
 
-def announce(
-    machine: Machine, fmus: Path | None, named: Callable[[str], str] = str, coupling: Coupling | None = None
-) -> None:
-    """Say on standard error, ahead of a run, whose programs are executed besides the shipped ones; `named`: what is to
-    be said for a sentence; `coupling`: of the run, where a scenario has it."""
-    from feedsim import cosim
+def finish(result: Any, out: Any, options: Namespace) -> int:
+    """Print what a job returned, and return the exit code.
 
-    for sentence in cosim.executed(machine, fmus, coupling):
-        print(f"feedsim: {named(sentence)}", file=sys.stderr)
-
-
-def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:
-    """How a command ends: with its warnings, and with what it has made unless it is to be quiet.
-
-    What is wrong is the first line of the output besides, which may be all that is kept.
+    Findings go to standard error. What is wrong is the first line of the output besides, which may be all that is read.
     """
-    warnings = ranked(warnings)
-    warn(warnings)
-    if not quiet:
-        wrong = [
-            painted(WRONG + warning, "red", sys.stdout) for warning in warnings[:1] if severity(warning) == "wrong"
-        ]
-        print(*wrong, *lines, sep="\n")
+    from feedsim.jobs.result import Result
+
+    if not hasattr(result, "findings"):  # a schema, names of files, a script: what the command is for
+        print(*_plain_lines(result), sep="\n")
+        return 0
+    quiet = bool(options.quiet or options.json is True)
+    findings = ranked(result.findings_shown(quiet) if isinstance(result, Result) else result.findings)
+    warn(findings)
+    code = getattr(result, "exit_code", 0)
+    try:
+        if options.json is True:
+            print(json_of(result, out))
+        elif not options.quiet:
+            wrong = [WRONG + finding for finding in findings[:1] if severity(finding) == "wrong"]
+            for line in (*(painted(text, "red", sys.stdout) for text in wrong), *_lines(result, options.verbose, out)):
+                print(line)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        if not hasattr(result, "exit_code"):
+            raise
+        sys.stdout = None  # who read has gone, or the disk is full; the verdict still counts
+    return code or int(bool(options.strict) and any(severity(text) == "wrong" for text in result.findings))
+
+
+def _lines(result: Any, verbose: bool, out: Any) -> Iterator[str]:
+    """What a result says, and where it was written."""
+    from feedsim.jobs.result import Result
+
+    own = isinstance(result, Result)
+    yield from map(visible, result.lines_shown(verbose) if own else result.answers)
+    if (place := getattr(result, "place", None) or out) is not None:
+        yield visible(f"-> {Path(place) / result.main_file if own else place}")
+
+
+def _plain_lines(result: Any) -> list[str]:
+    if isinstance(result, Mapping):
+        return [json.dumps(result, indent=2)]
+    if isinstance(result, str):
+        return [result]
+    return [visible(str(entry)) for entry in result]
+
+
+def json_of(result: Any, out: Any) -> str:
+    """A result as JSON: its summary.json where that was written, else kind, answer, findings and figures."""
+    if (place := getattr(result, "place", None) or out) is not None and (Path(place) / "summary.json").is_file():
+        return (Path(place) / "summary.json").read_text(encoding="utf-8").rstrip("\n")
+    if (own := getattr(result, "json", None)) is not None:
+        return str(own).rstrip("\n")
+    figures = {
+        name: {"value": figure.value if math.isfinite(figure.value) else None, "unit": figure.unit}
+        for name, figure in getattr(result, "figures", {}).items()
+    }
+    entries = [{"severity": severity(text), "text": str(text)} for text in ranked(result.findings)]
+    content = {"kind": result.kind, "answer": [*result.answers], "findings": entries, "figures": figures}
+    return json.dumps(content | ({"files": [str(out)]} if out is not None else {}), indent=2, ensure_ascii=False)

@@ -97,7 +97,7 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
         raise InputError.of(
             "the machine cannot be one unit",
             [
-                f"axis {axis}: {other}: coupling.units: separate runs it, feedsim ssp without --one wires it"
+                f"axis {axis}: {other}: coupling.units: separate runs it, feedsim export without --one wires it"
                 for axis, other in others
             ],
         )

@@ -104,7 +104,7 @@ def _packed_pose(archive: Archive) -> dict[str, float]:
 
 def _check_own(archive: Archive, machine: Machine) -> None:
     folder = machine.directory if (machine.directory / "machine.yaml").is_file() else "MACHINE"
-    pack_anew = f"pack it anew: feedsim machine pack {folder} --out {archive.path}"
+    pack_anew = f"pack it anew: feedsim export --plant {folder} --out {archive.path}"
     axes = axes_of(archive)
     if set(axes) != set(machine.axes):
         raise InputError(

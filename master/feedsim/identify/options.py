@@ -132,12 +132,12 @@ class Asked:
     def _axis(self, sources: Sequence[Provenance]) -> str:
         named = {source.axis: source.file for source in sources if source.axis}
         if self.axis:
-            named.setdefault(self.axis, Path("--axis"))
+            named.setdefault(self.axis, Path("--axes"))
         if len(named) > 1:
             which = ", ".join(f"{axis} ({file})" for axis, file in named.items())
-            raise InputError(f"the traces are of several axes: {which}; --axis names one, and its traces are needed")
+            raise InputError(f"the traces are of several axes: {which}; --axes names one, and its traces are needed")
         if not named:
-            raise InputError("the traces do not say which axis they are of; give --axis, for example --axis Z")
+            raise InputError("the traces do not say which axis they are of; give --axes, for example --axes Z")
         return next(iter(named))
 
     def _given_inertia(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:

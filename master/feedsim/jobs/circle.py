@@ -6,18 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim.analysis import Diagnosis, Figure, Named
 from feedsim.analysis.circle import diagnose, further
 from feedsim.analysis.circle.records import RecordedCircle, read_circle
-from feedsim.arguments import Value, lengths, listed, quantity, spelt
+from feedsim.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import circle as page
 from feedsim.report.content import Report
+
+LENGTH_NEEDED = "AXIS=LENGTH is needed, e.g. X=10mm"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,32 +71,36 @@ class CircleResult(Result):
         return page.summary(self.recorded, self.diagnosis, self.figures, self.records, names)
 
 
+@job("why a recorded circle is not round")
 def circle(
-    records: File | Sequence[File],
-    axes: str | Sequence[str] = ("X", "Y"),
+    records: Annotated[File | Sequence[File], Argument("RECORD", "CSV file with one direction or both", many=True)],
+    axes: Annotated[str | Sequence[str], Option("A,B", "first and second axis of the plane (default: X,Y)")] = (
+        "X",
+        "Y",
+    ),
     *,
-    radius: Value | None = None,
-    feed: Value | None = None,
-    centre: Mapping[str, Value] | None = None,
-    pitch: Mapping[str, Value] | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
-    control: str = "",
+    radius: Annotated[
+        Value | None, Option("LENGTH", "programmed radius; needed where the file has deviations alone")
+    ] = None,
+    feed: Annotated[Value | None, Option("SPEED", "path speed; needed where the file has no time")] = None,
+    centre: Annotated[Pairs[Value], Option("AXIS=POSITION", "programmed centre (default: fitted)", many=True)] = None,
+    pitch: Annotated[Pairs[Value], Option("AXIS=LENGTH", "look for an error that repeats with it", many=True)] = None,
+    out: Annotated[File | None, out("circle_{records}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    control: ControlName = "",
     watch: Watch = NO_WATCH,
 ) -> CircleResult:
     """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch errors.
 
-    Args:
-        records: CSV files with one direction or both: positions of both axes, or angle and deviation of a ballbar.
-        axes: first and second axis of the plane.
-        radius: programmed [m]; needed where the files have deviations alone. Values may be texts, "150 mm".
-        feed: path speed [m/s]; needed where the files have no time.
-        centre: axis -> programmed position of the centre [m]; fitted where it is not given.
-        pitch: axis -> length [m] with which an error repeats.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force, control: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Each cause has an interval and its share of G. Files are CSV with units in the header, with positions of both axes
+    (linear scales, a control's log) or with angle and deviation (or radius) of a ballbar; both directions may be in one
+    file or in two. A result.csv of feedsim run is such a file.
+
+    Command line:
+        feedsim circle ballbar_ccw.csv ballbar_cw.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
+        feedsim circle scales.csv --axes X,Z --pitch X="10 mm" --pitch Z="10 mm"
+        feedsim circle results/xz_circle/result.csv --axes X,Z --radius "15 mm" --centre X="785 mm" --centre Z="100 mm"
 
     Raises:
         InputError: wrong arguments, or files that hold no circle.
@@ -112,8 +119,8 @@ def circle(
             f"{option} {','.join(plane)}: two different axes of the plane are needed, for example {option} X,Z"
         )
     files = [Path(file) for file in ([records] if isinstance(records, str | Path) else records)]
-    about = lengths("centre", centre or {}, "10mm")
-    pitches = lengths("pitch", pitch or {}, "10mm", positive=True)
+    about = lengths("centre", pairs("centre", centre, LENGTH_NEEDED), "10mm")
+    pitches = lengths("pitch", pairs("pitch", pitch, LENGTH_NEEDED), "10mm", positive=True)
     for name, values in (("centre", about), ("pitch", pitches)):
         if other := [axis for axis in values if axis not in plane]:
             raise InputError(

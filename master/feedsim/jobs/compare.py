@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from feedsim.compare.shift import estimated_shift
 from feedsim.compare.tolerance import Tolerances
 from feedsim.compare.verdict import Comparison, Variable, Verdict
 from feedsim.errors import InputError
+from feedsim.jobs.parameters import Argument, Force, Option, job
 from feedsim.jobs.result import Result
 from feedsim.outputs import forced, replacing
 from feedsim.report.compare import report as page
@@ -99,6 +100,19 @@ class CompareResult(Result):
         """What cannot be compared, and rows that were not compared."""
         return self.report().warnings
 
+    def findings_shown(self, quiet: bool) -> Sequence[str]:
+        """Pairs that cannot be compared, where the lines do not say so."""
+        return [f"{pair.result}: {pair.line}" for pair in self.comparisons if pair.verdict == "unusable" and quiet]
+
+    def lines_shown(self, verbose: bool) -> Sequence[str]:
+        """What differs; verbose: every variable."""
+        return self.listed(everything=verbose)
+
+    @property
+    def json(self) -> str:
+        """All figures, for programs."""
+        return page.to_json(self.comparisons)
+
     @property
     def answers(self) -> Sequence[str]:
         """The verdict of every pair."""
@@ -134,56 +148,123 @@ class CompareResult(Result):
         return f"Comparison: {self.comparisons[0].line}" if len(self.comparisons) == 1 else "; ".join(self.lines[-1:])
 
 
+@job("compare results with references, for CI: 0 same, 1 different", needs=())
 def compare(
-    *files: File | Trace | Run | RunResult,
-    tol: str | Sequence[str] = (),
-    tolerances: File | None = None,
-    column: Pairs = (),
-    only: str | Sequence[str] = (),
-    ignore: str | Sequence[str] = (),
-    common: bool = False,
-    hold: str | Sequence[str] = (),
-    unit: Pairs = (),
-    time: str | None = None,
-    columns: File | None = None,
-    reference_unit: Pairs = (),
-    reference_time: str | None = None,
-    reference_columns: File | None = None,
-    axis: str | None = None,
-    machine: File | None = None,
-    start: Value | None = None,
-    end: Value | None = None,
-    shift: Value = 0.0,
-    max_shift: Value = "50 ms",
-    cover: Value = 0.0,
-    max_gap: Value | None = None,
-    at: Literal["auto", "result", "reference"] = "auto",
-    report: File | None = None,
-    junit: File | None = None,
-    json: File | None = None,
-    force: bool = False,
+    *files: Annotated[
+        File | Trace | Run | RunResult, Argument("RESULT REFERENCE", "CSV files in turn, or two folders", many=True)
+    ],
+    tol: Annotated[
+        str | Sequence[str],
+        Option(
+            "[PATTERN=]VALUE[,TIME]",
+            "1e-6 (of the range of the reference), '2 nm', '1 ms' (in time) or both, for all "
+            "variables or those of a pattern: '*.M_a=1e-3 N.m,1 ms'; several times, later ones "
+            "count more (default: 1e-3)",
+            many=True,
+            group="tolerances",
+        ),
+    ] = (),
+    tolerances: Annotated[
+        File | None,
+        Option(
+            "FILE.yaml",
+            "tolerance file (default: the reference's own beside it, docs/comparing.md)",
+            group="tolerances",
+        ),
+    ] = None,
+    column: Annotated[
+        Pairs,
+        Option(
+            "RESULT=REFERENCE",
+            "column of the result that is called otherwise; with * on both sides all such: 'plant.*=*'",
+            many=True,
+            group="columns",
+        ),
+    ] = (),
+    only: Annotated[
+        str | Sequence[str], Option("PATTERN", "compare these variables only", many=True, group="columns")
+    ] = (),
+    ignore: Annotated[str | Sequence[str], Option("PATTERN", "do not compare these", many=True, group="columns")] = (),
+    common: Annotated[
+        bool, Option("", "columns that the result lacks are left out, not missing", group="columns")
+    ] = False,
+    hold: Annotated[
+        str | Sequence[str],
+        Option(
+            "PATTERN", "hold their values between rows, without ramps (flags of 0 and 1 do)", many=True, group="columns"
+        ),
+    ] = (),
+    unit: Annotated[
+        Pairs,
+        Option("PATTERN=UNIT", "unit of the result's columns whose header gives none", many=True, group="columns"),
+    ] = (),
+    time: Annotated[str | None, Option("NAME[:UNIT]", "time column of the result", group="columns")] = None,
+    columns: Annotated[
+        File | None, Option("MAPPING.yaml", "mapping, where the result is a drive's record", group="columns")
+    ] = None,
+    reference_unit: Annotated[
+        Pairs,
+        Option("PATTERN=UNIT", "unit of the reference's columns whose header gives none", many=True, group="columns"),
+    ] = (),
+    reference_time: Annotated[
+        str | None, Option("NAME[:UNIT]", "time column of the reference", group="columns")
+    ] = None,
+    reference_columns: Annotated[
+        File | None, Option("MAPPING.yaml", "mapping, where the reference is a drive's record", group="columns")
+    ] = None,
+    axes: Annotated[str | None, Option("NAME", "axis of a drive's record", group="columns")] = None,
+    machine: Annotated[
+        File | None, Option("MACHINE-or-SCENARIO", "gives pitch and torque constant", group="columns")
+    ] = None,
+    start: Annotated[
+        Value | None, Option("TIME", "compare from this instant on, such as '0.1 s'", group="time", typed="--from")
+    ] = None,
+    end: Annotated[Value | None, Option("TIME", "compare up to this instant", group="time", typed="--to")] = None,
+    shift: Annotated[
+        Value, Option("TIME", "added to the result's time, such as '0.5 ms', or 'estimate'", group="time")
+    ] = 0.0,
+    max_shift: Annotated[Value, Option("TIME", "largest estimated shift (default: 50 ms)", group="time")] = "50 ms",
+    cover: Annotated[
+        Value,
+        Option(
+            "SHARE",
+            "least share of the result's rows that must be compared, such as '90 %' (default: any; reported)",
+            group="time",
+        ),
+    ] = 0.0,
+    max_gap: Annotated[
+        Value | None, Option("TIME", "longest step between rows of the result (default: any)", group="time")
+    ] = None,
+    at: Annotated[
+        Literal["auto", "result", "reference"],
+        Option(
+            "",
+            "whose instants are looked at (auto: the result's, unless the reference has clearly "
+            "fewer rows and no bounds between them)",
+            choices=("auto", "result", "reference"),
+            group="time",
+        ),
+    ] = "auto",
+    report: Annotated[
+        File | None, Option("FILE.html", "report with the violated bands", group="output", writes=True)
+    ] = None,
+    junit: Annotated[File | None, Option("FILE.xml", "JUnit XML for CI servers", group="output", writes=True)] = None,
+    force: Force = False,
 ) -> CompareResult:
-    """Compare results with references: every row must lie in a tube of value and time around the reference.
+    r"""Compare results with references: every row must lie in a tube of value and time around the reference.
 
-    Args:
-        files: result and reference in turn: CSV files, folders, traces, runs.
-        tol: tolerances such as ``["1e-6", "*.x_a=2 nm"]``; later ones count more; none: 1e-3 of the range.
-        tolerances: tolerance file; None: the reference's own beside it.
-        column: result's name -> reference's name, where they differ; with * on both sides all such.
-        only, ignore: patterns of variables that are compared, and that are not.
-        common: columns that the result lacks are left out, not missing.
-        hold: patterns of variables that hold their values between rows.
-        unit, reference_unit: pattern -> unit of columns whose header has none.
-        time, reference_time: time column, "NAME" or "NAME:UNIT".
-        columns, reference_columns: mapping file, where the file of that side is a drive's record.
-        axis: of a drive's record. machine: gives its pitch and torque constant.
-        start, end: what is compared [s]; None: all.
-        shift: added to the result's time [s], or "estimate". max_shift: the largest estimated one [s].
-        cover: least share of the result's rows that must be compared.
-        max_gap: longest step between rows of the result [s]; None: any.
-        at: whose instants are looked at.
-        report, junit, json: files to write: report as HTML, JUnit XML, all figures as JSON.
-        force: they may be files that no comparison wrote.
+    Columns of the reference that the result lacks count as different; further columns of the result do not matter. Exit
+    codes: 0 same, 1 different, 2 unusable: a file, a column, a unit or an option is wrong, or nothing can be compared.
+
+    Command line:
+        feedsim compare result.csv reference.csv --tol 1e-6
+        feedsim compare result.csv reference.csv --tol 1e-6 --tol "*.x_a=2 nm" --tol "*.M_a=1e-3 N.m,1 ms"
+        feedsim compare result.csv reference.csv --report out.html
+        feedsim compare results/ references/ --junit compare.xml
+        feedsim compare ecos.csv reference.csv --column "plant::*=*" --column "controller_*::M_a=*.M_a" --common
+        feedsim example emps
+        feedsim compare results/emps/result.csv DATA_EMPS.mat --reference-columns machines/emps/columns.yaml --axes X \
+            --shift estimate --max-shift "2 s" --tol "X.x_a=20 um" --tol "X.M_a=ignore"
 
     Raises:
         InputError: wrong arguments. What cannot be compared is "unusable" in what is returned.
@@ -195,7 +276,7 @@ def compare(
     'same'
     """
     texts = _texts(tol)
-    for option, given in (("axis", axis), ("machine", machine)):
+    for option, given in (("axes", axes), ("machine", machine)):
         if given is not None and columns is None and reference_columns is None:
             raise InputError(
                 f"{spelt(option)} {given}: is for the record of a drive; {spelt('columns')} or "
@@ -222,14 +303,14 @@ def compare(
         choice,
         _Side(time, None if columns is None else Path(columns)),
         _Side(reference_time, None if reference_columns is None else Path(reference_columns)),
-        axis,
+        axes,
         None if machine is None else Path(machine),
         amount(max_shift, "s") if shift == "estimate" else None,
     )
     Tolerances.parse(texts)  # a typing error is reported before anything is read
     paths = [Path(file) for file in files if isinstance(file, str | Path)]
     outputs = {name: None if file is None else Path(file) for name, file in
-               (("html", report), ("xml", junit), ("json", json))}  # fmt: skip
+               (("html", report), ("xml", junit))}  # fmt: skip
     with replacing(force or forced()):
         if len(paths) < len(files):
             comparisons, durations = asked.in_memory(files)
@@ -395,7 +476,7 @@ def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | No
     named = source.axis or axis
     if not named:
         raise InputError(
-            f"{path}: the record does not say which axis it is of; give {spelt('axis')}, for example {spelt('axis')} Z"
+            f"{path}: the record does not say which axis it is of; give {spelt('axes')}, for example {spelt('axes')} Z"
         )
     lead = None if source.pitch is None else source.pitch / (2 * np.pi)
     pieces: dict[str, list[Array]] = {"time": []}

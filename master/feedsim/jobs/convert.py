@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 from feedsim import trace
 from feedsim.arguments import listed, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
+from feedsim.jobs.parameters import Argument, File, Force, Option, job, out_file
 from feedsim.outputs import check_file, unchanged
 from feedsim.owned import TemporaryFolder
 
 
-def convert(file: File, out: File | None = None, *, column: str | Sequence[str] = (), force: bool = False) -> Made:
+@job("turn a record of any kind into a CSV trace", needs=())
+def convert(
+    file: Annotated[File, Argument("FILE", "MAT, CSV, or a capture of a SINUMERIK (.json)")],
+    out: Annotated[File | None, out_file("FILE.csv", "")] = None,
+    *,
+    column: Annotated[
+        str | Sequence[str],
+        Option("VARIABLE=NAME:UNIT", "one column; the first must be time; none: all of a capture", many=True),
+    ] = (),
+    force: Force = False,
+) -> Made:
     """Turn a recording into a CSV trace: all signals of a control's capture, or variables of a MAT or CSV file.
-
-    Args:
-        file: MAT, CSV, or a capture of a SINUMERIK (.json).
-        out: the CSV file to write; None: :meth:`Made.save` does it.
-        column: texts "VARIABLE=NAME:UNIT", one a column, the time first; none: all of a capture.
-        force: `out` may be a file of other content.
 
     Raises:
         InputError: a faulty file, a text of another form, a variable that is not there, a value that is not finite.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import overload
+from typing import Annotated, overload
 
 from feedsim.examples import Example, copy, examples
+from feedsim.jobs.parameters import Argument, Option, job
 
 
 @overload
@@ -17,10 +18,24 @@ def example() -> list[Example]: ...
 def example(names: str | Iterable[str], to: str | Path = ".") -> list[Path]: ...
 
 
-def example(names: str | Iterable[str] | None = None, to: str | Path = ".") -> list[Path] | list[Example]:
+@job("list or copy scenarios, studies and machines to begin with", needs=())
+def example(
+    names: Annotated[
+        str | Iterable[str] | None,
+        Argument(
+            "NAME",
+            "what to copy, with the files that it names; without a name all are listed",
+            many=True,
+            complete="examples:names",
+        ),
+    ] = None,
+    to: Annotated[
+        str | Path, Option("DIR", "folder to copy into (default: the working folder); all, without a name")
+    ] = ".",
+) -> list[Path] | list[Example]:
     """Copy examples into the folder `to`, with all files that they name; returns the files written.
 
-    Without names: all examples that there are. A file that is there with the same content stays.
+    The machines are synthetic, but for emps and sinumerik_840d, which were measured. Nothing is overwritten.
 
     >>> import feedsim as fs
     >>> from tempfile import TemporaryDirectory

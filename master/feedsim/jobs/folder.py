@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from feedsim.jobs.parameters import File
 from feedsim.jobs.watch import Watch
 from feedsim.outputs import forced, replacing
 from feedsim.owned import claimed
 from feedsim.report.results import replaced
-
-File = str | Path
 
 
 @contextmanager

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from feedsim.analysis import Figure, Named, linear, responses, truncation
 from feedsim.analysis.campaign import Plan, run_campaign
 from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
 from feedsim.analysis.truncation import Truncation
-from feedsim.arguments import Band, Changes, Value, between, listed, quantity, settings, spelt
+from feedsim.arguments import Band, Value, between, listed, quantity, settings, spelt
 from feedsim.cosim.plant import plant_modes
 from feedsim.errors import FeedsimError, InputError
 from feedsim.findings import severity
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.judge.loops import control as control_findings
@@ -121,52 +122,101 @@ class FrfResult(Result, Mapping[str, Complexes]):
         return page.summary(self.subject, self.responses, names)
 
 
+@job("frequency responses of drives and structure")
 def frf(
-    subject: File,
-    axes: str | Sequence[str] | None = None,
+    subject: Annotated[File, Argument("SCENARIO-or-MACHINE", "scenario file, machine file or machine folder")],
+    axes: Annotated[str | Sequence[str] | None, Option("X,Z", "axes to look at (default: all)")] = None,
     *,
-    set: Changes = None,
-    band: Band | None = None,
-    tool: bool = True,
-    overlay: Sequence[str] = (),
-    full_model: bool = True,
-    measure: bool = True,
-    excitation: Literal["multisine", "prbs"] = "multisine",
-    inject: Literal["n_add", "M_add"] = "n_add",
-    amplitude: Value | None = None,
-    periods: int = 2,
-    settle: int = 2,
-    realisations: int | None = None,
-    seed: int = 1,
-    friction: bool = False,
-    offset_speed: Value | None = None,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
+    set: Settings = None,
+    band: Annotated[
+        Band | None,
+        Option(
+            "LOW..HIGH",
+            "frequencies looked at (default: 1Hz..1000Hz, at most to half the sampling rate of the control cycle)",
+        ),
+    ] = None,
+    tool: Annotated[bool, Option("", "with the compliance at the tool (default: yes)")] = True,
+    overlay: Annotated[
+        Sequence[str],
+        Option(
+            "FILE[:RESPONSE[=NAME]]",
+            "lay a curve from a CSV or UFF58 file over, e.g. measured.csv:Z.n_a/Z.M_a; may be given several times",
+            many=True,
+        ),
+    ] = (),
+    full_model: Annotated[
+        bool,
+        Option(
+            "",
+            "where the machine names its structure: compare with all modes of the finite-element model (default: yes)",
+        ),
+    ] = True,
+    measure: Annotated[
+        bool,
+        Option(
+            "", "on the units besides (default: yes; --no-measure: closed form only)", group="measurement on the units"
+        ),
+    ] = True,
+    excitation: Annotated[
+        Literal["multisine", "prbs"],
+        Option("", "signal (default: multisine)", choices=("multisine", "prbs"), group="measurement on the units"),
+    ] = "multisine",
+    inject: Annotated[
+        Literal["n_add", "M_add"],
+        Option(
+            "",
+            "where it is added: to the speed setpoint (finds n/M and n_a/n_s) or to the torque "
+            "setpoint (finds n/M); default: n_add",
+            choices=("n_add", "M_add"),
+            group="measurement on the units",
+        ),
+    ] = "n_add",
+    amplitude: Annotated[
+        Value | None,
+        Option(
+            "VALUE",
+            "RMS of the signal, e.g. '0.5 rad/s' (default: 5 % of the torque limit)",
+            group="measurement on the units",
+        ),
+    ] = None,
+    periods: Annotated[int, Option("N", "recorded periods (default: 2)", group="measurement on the units")] = 2,
+    settle: Annotated[int, Option("N", "periods ahead of those (default: 2)", group="measurement on the units")] = 2,
+    realisations: Annotated[
+        int | None,
+        Option(
+            "N",
+            "signals with other phases, averaged (default: 1, with friction 4: only between "
+            "realisations does the coherence see what is not linear)",
+            group="measurement on the units",
+        ),
+    ] = None,
+    seed: Annotated[int, Option("N", "of the phases (default: 1)", group="measurement on the units")] = 1,
+    friction: Annotated[
+        bool, Option("", "with friction; the closed form knows none", group="measurement on the units")
+    ] = False,
+    offset_speed: Annotated[
+        Value | None,
+        Option(
+            "VALUE", "motor speed at which the excited axis moves, e.g. '5 rad/s'", group="measurement on the units"
+        ),
+    ] = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("frf_{subject}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> FrfResult:
     """Frequency responses of feed drives and structure, in closed form and, friction off, measured on the units.
 
-    Args:
-        subject: scenario file, machine file or machine folder.
-        axes: to look at; None: all.
-        set: changes of the file, as behind ``--set``.
-        band: lowest and highest frequency [Hz], or a text "1Hz..1000Hz"; None: 1 Hz to 1000 Hz, at most half the
-            sampling rate of the control cycle.
-        tool: with the compliance at the tool.
-        overlay: curves of files that are laid over, "measured.csv:Z.n_a/Z.M_a".
-        full_model: compare with all modes of the finite-element model, where the machine names its structure.
-        measure: on the units besides; the arguments that follow say how.
-        excitation: "multisine" or "prbs". inject: where it is added, "n_add" (speed setpoint) or "M_add" (torque).
-        amplitude: RMS of the signal [rad/s or N.m]; None: 5 % of the torque limit. Values may be texts, "0.5 rad/s".
-        periods: that are recorded. settle: periods ahead of those.
-        realisations: signals with other phases, averaged; None: 1, with friction 4. seed: of the phases.
-        friction: with friction; the closed form has none. offset_speed: of the motor while it is excited [rad/s].
-        fmus: folder of the archives.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Speed-controlled system n/M, reference frequency response of the speed controller, position loop, loop gains with
+    their margins, x/M, and the compliance at the tool.
+
+    Command line:
+        feedsim example xz_circle
+        feedsim frf machines/test_centre --axes X,Z --out results/frf
+        feedsim frf xz_circle.yaml --set "machine.axes.Z.drive.K_p=4 N.m.s/rad" --no-measure
+        feedsim frf machines/test_centre --axes Z --friction --offset-speed "5 rad/s" --realisations 4
+        feedsim frf machines/test_centre --axes Z --overlay measured.csv:Z.n_a/Z.n_s
 
     Raises:
         InputError: a faulty file, no such axis, wrong arguments.

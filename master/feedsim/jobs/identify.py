@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim import cosim
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Value, amount, by_name, listed, quantity, spelt
+from feedsim.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
@@ -19,7 +19,8 @@ from feedsim.identify import STAGES, Asked, Estimate, Identification, Identified
 from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.parameters import PARAMETER_KINDS
 from feedsim.identify.stages import identify as identified_from
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import identify as page
@@ -36,11 +37,12 @@ AXIS = "{axis}"  # in the name of a folder: the axis, in small letters
 class IdentifyResult(Result):
     """Friction of an axis, identified.
 
-    identified: what was found, and what it rests on. inputs_read: the files.
+    identified: what was found, and what it rests on. inputs_read: the files. place: where it was written.
     """
 
     identified: Identified
     inputs_read: Sequence[Path] = ()
+    place: Path | None = None
 
     kind = "identify"
     may_write = page.FILES
@@ -73,6 +75,10 @@ class IdentifyResult(Result):
         """What is to be known before the values are believed."""
         return self.identified.warnings
 
+    def findings_shown(self, quiet: bool) -> Sequence[str]:
+        """Without the table all findings: it has the reasons that some only repeat."""
+        return self.findings if quiet else page.terminal_warnings(self.identified)
+
     @property
     def answers(self) -> Sequence[str]:
         """How well curve and pre-sliding are known."""
@@ -104,59 +110,100 @@ class IdentifyResult(Result):
         return repr(self.found)
 
 
-def identify(
-    traces: File | Sequence[File],
-    axis: str | None = None,
-    machine: File | None = None,
+@job("friction of an axis from recorded traces")
+def identify_friction(
+    traces: Annotated[File | Sequence[File], Argument("TRACE", "CSV or MAT file (docs/traces.md)", many=True)],
+    axes: Annotated[str | None, Option("NAME", "axis that is identified (default: the only one)")] = None,
+    machine: Annotated[
+        File | None,
+        Option(
+            "MACHINE-or-SCENARIO",
+            "gives pitch, torque constant and inertia of the axis, and values for what the traces do not determine",
+        ),
+    ] = None,
     *,
-    columns: File | None = None,
-    inertia: Value | None = None,
-    mass: Value | None = None,
-    delay: Value | None = None,
-    hold: Mapping[str, Value] | None = None,
-    free: str | Sequence[str] = (),
-    stages: str | int | Sequence[int] = "both",
-    law: str = Friction.law,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
+    columns: Annotated[
+        File | None, Option("MAPPING.yaml", "which columns of the traces are what (docs/traces.md)")
+    ] = None,
+    inertia: Annotated[
+        Value | None,
+        Option(
+            "VALUE",
+            "all that the motor accelerates, e.g. '0.0164 kg.m^2', or 'estimate' (default: of the "
+            "mapping, else of the machine's modes, else estimated)",
+            group="what is known",
+        ),
+    ] = None,
+    mass: Annotated[
+        Value | None, Option("VALUE", "the same at the slide, e.g. '1600 kg'", group="what is known")
+    ] = None,
+    delay: Annotated[
+        Value | None,
+        Option(
+            "VALUE",
+            "by how much the torque is logged later than the motion, e.g. '0.5 ms' or 0, or "
+            "'estimate' (default: of the mapping, else estimated)",
+            group="what is known",
+        ),
+    ] = None,
+    hold: Annotated[
+        Pairs[Value],
+        Option("NAME=VALUE,...", "parameters that keep a value, e.g. beta=1", many=True, group="what is known"),
+    ] = None,
+    free: Annotated[
+        str | Sequence[str],
+        Option("NAME,...", "parameters that are else held: beta, v_log", many=True, group="what is known"),
+    ] = (),
+    stages: Annotated[
+        str | int | Sequence[int],
+        Option(
+            "", "1: Stribeck curve, 2: pre-sliding (default: both)", choices=("1", "2", "both"), group="what is known"
+        ),
+    ] = "both",
+    law: Annotated[
+        str,
+        Option(
+            "",
+            "law of the pre-sliding: LuGre, or generalised Maxwell slip (default: lugre)",
+            choices=("lugre", "gms"),
+            group="what is known",
+        ),
+    ] = Friction.law,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("identify_{axis}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> IdentifyResult:
-    """Identify the friction of an axis: the Stribeck curve from constant speeds, pre-sliding from reversals.
+    r"""Identify the friction of an axis: the Stribeck curve from constant speeds, pre-sliding from reversals.
 
-    Args:
-        traces: CSV or MAT files.
-        axis: that is identified; None: the only one.
-        machine: machine or scenario that gives pitch, torque constant and inertia of the axis, and values for what the
-            traces do not determine.
-        columns: mapping file, which columns of the traces are what.
-        inertia: all that the motor accelerates [kg.m2]; "estimate": from the traces, whatever mapping and machine say.
-            Values may be texts, "0.0164 kg.m^2". mass: the same at the slide [kg].
-        delay: by how much the torque is logged later than the motion [s], or "estimate".
-        hold: name -> value that a parameter keeps, SI or a text. free: names of parameters that are else held.
-        stages: 1 (Stribeck curve), 2 (pre-sliding) or "both".
-        law: of the pre-sliding, "lugre" or "gms" (generalised Maxwell slip).
-        fmus: folder of the archives.
-        out: folder that the result is written to, "{axis}" in it is the axis in small letters; None:
-            :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Leaves friction.yaml, which scenarios and machine files take as it is, a report with figures, and what the figures
+    show as CSV; every value has a confidence interval.
+
+    Command line:
+        feedsim example identify_z_constant identify_z_sine xz_circle
+        feedsim run identify_z_constant.yaml && feedsim run identify_z_sine.yaml
+        feedsim identify friction results/identify_z_constant/log.csv results/identify_z_sine/log.csv --axes Z \
+            --machine machines/test_centre
+        feedsim identify friction record.mat --columns record.yaml --delay 0
+        feedsim identify friction z.csv --axes Z --machine my_machine --hold "beta=1" --free v_log
+        feedsim run xz_circle.yaml --set machine.axes.Z.friction=results/identify_z/friction.yaml --out results/own
 
     Raises:
         InputError: a faulty file, traces of several axes, wrong arguments, traces that determine nothing.
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> result = fs.identify("log.csv", axis="Z", machine="machines/test_centre", stages=1)
+    >>> result = fs.identify_friction("log.csv", axes="Z", machine="machines/test_centre", stages=1)
     >>> 1.0 < result.estimates["F_C"].value < 3.0
     True
     """
     files = [Path(file) for file in ([traces] if isinstance(traces, str | Path) else traces)]
     if law not in (laws := (Friction.law, *FRICTION_UNITS)):
         raise InputError(f"{spelt('law')} {law}: {' or '.join(laws)} is needed")
-    asked = _asked(axis, inertia, mass, delay, hold or {}, listed(free), stages, law)
-    settings = _settings(inertia, mass, delay, hold or {}, listed(free), stages)
+    kept_values = pairs("hold", hold, "NAME=VALUE is needed, for example beta=1 or v_log='3 rad/s'")
+    asked = _asked(axes, inertia, mass, delay, kept_values, listed(free), stages, law)
+    settings = _settings(inertia, mass, delay, kept_values, listed(free), stages)
     if law != Friction.law:
         settings["law"] = law
     unit = FRICTION_UNITS.get(law, FRICTION_ROLE.shipped)
@@ -165,7 +212,7 @@ def identify(
     mapping = load_columns(columns) if columns is not None else None
     archives = None if fmus is None else Path(fmus)
     begin = perf_counter()
-    recorded = read_traces(files, mapping, axis, described, watch.progress)
+    recorded = read_traces(files, mapping, axes, described, watch.progress)
     reading = {"reading": perf_counter() - begin}
     sources = tuple(entry.provenance for entry in recorded)
     known = asked.with_traces(sources, described)
@@ -181,7 +228,7 @@ def identify(
             identification = identified_from(records, friction, known, watch.progress)
         identification = replace(identification, seconds=reading | dict(identification.seconds))
         identified = Identified(identification, records, sources, subject, settings, date.today().isoformat())
-        result = IdentifyResult(identified, inputs)
+        result = IdentifyResult(identified, inputs, folder)
         if folder is not None:
             result.save(folder, figures=figures, force=force)
     return result

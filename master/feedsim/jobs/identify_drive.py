@@ -7,12 +7,24 @@ from dataclasses import dataclass
 from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Changes, Value, quantity, spelt
+from feedsim.arguments import Value, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import (
+    Archives,
+    Argument,
+    ControlName,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    job,
+    out,
+)
 from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
@@ -83,42 +95,68 @@ class DriveResult(Result):
         page.check_writable(tuple(self.drives.found.drives), folder, inputs)
 
 
+@job("drive, inertia and friction from a record of a control")
 def identify_drive(
-    record: File,
-    axes: str | Sequence[str] | None = None,
-    machine: File | None = None,
+    record: Annotated[
+        File, Argument("RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)")
+    ],
+    axes: Annotated[
+        str | Sequence[str] | None,
+        Option("NAMES", "axes, separated by commas, such as X,Y (default: all of the machine)"),
+    ] = None,
+    machine: Annotated[
+        File | None,
+        Option(
+            "MACHINE-or-SCENARIO",
+            "whose structure and friction are known (default: rigid axes, and what the record determines)",
+        ),
+    ] = None,
     *,
-    columns: File | None = None,
-    window: str | None = None,
-    position_cycle: Value | None = None,
-    modes: int | str = 0,
-    name: str | None = None,
-    set: Changes = None,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
-    control: str = "",
+    columns: Annotated[
+        File | None, Option("MAPPING.yaml", "which columns of the record are what (docs/traces.md)")
+    ] = None,
+    window: Annotated[
+        str | None,
+        Option(
+            "BEGIN..END",
+            "the part of the record that counts, by times or by blocks of its program, e.g. '0.5 "
+            "s..2 s', 'N7..N20', 'N7' (default: all of it)",
+        ),
+    ] = None,
+    position_cycle: Annotated[
+        Value | None,
+        Option(
+            "VALUE",
+            "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as "
+            "where the drive closes that loop itself, or that of the record's rows where the record"
+            " speaks for it)",
+        ),
+    ] = None,
+    modes: Annotated[
+        int | str,
+        Option(
+            "0..5|auto",
+            "elastic modes of every rigid axis; auto: as many as predict best what a fit has not seen (default: 0)",
+        ),
+    ] = 0,
+    name: Annotated[str | None, Option("NAME", "of the machine that is written (default: name of the record)")] = None,
+    set: Settings = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("drive_{record}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    control: ControlName = "",
     watch: Watch = NO_WATCH,
 ) -> DriveResult:
     """Identify the drive of axes: delay of the setpoint, position loop, speed controller, inertia and friction.
 
-    Args:
-        record: CSV or MAT file, or a control's capture.
-        axes: of the record; None: all of the machine.
-        machine: machine or scenario whose structure and friction are known; None: rigid axes, with what the record
-            has of them.
-        columns: mapping file, which columns of the record are what.
-        window: the part that counts, by times or by blocks of the record's program: "0.5 s..2 s", "N7..N20", "N7".
-        position_cycle: cycle [s] of the position loop of rigid axes; None: the control cycle, as where the drive closes
-            that loop itself, or that of the record's rows where the record speaks for it. Also a text, "2 ms".
-        modes: elastic modes of every rigid axis, 0 to 5, or "auto": as many as predict best what a fit has not seen.
-        name: of the machine that is written; None: that of the record.
-        set: changes of the machine, as behind ``--set``.
-        fmus: folder of the archives.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force, control: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Every value has an interval. Leaves a machine folder (or, with --machine, the drive's parameters), and a report.
+
+    Command line:
+        feedsim example test_centre
+        feedsim identify drive capture.json --axes X,Y --out results/my_machine
+        feedsim replay capture.json --machine results/my_machine --axes X,Y
+        feedsim identify drive log.csv --axes Z --machine machines/test_centre
 
     Raises:
         InputError: a faulty file, no such axis, no such window, a record that does not excite an axis.

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Band, Changes, Value, between, quantity, settings, spelt
+from feedsim.arguments import Band, Value, between, quantity, settings, spelt
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Argument, FigureKinds, File, Force, Option, Settings, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.modal.identified import AxisModes
@@ -83,45 +84,51 @@ class ModesResult(Result):
         return page.summary(self.identified, names)
 
 
+@job("elastic modes of an axis from measured responses")
 def identify_modes(
-    response: File,
-    machine: File,
-    axis: str | None = None,
+    response: Annotated[
+        File, Argument("RESPONSE", "time signals (CSV, MAT, a trace), or frequency responses (CSV, UFF58, XML)")
+    ],
+    machine: Annotated[File, Option("MACHINE-or-SCENARIO", "whose axis it is")],
+    axes: Annotated[str | None, Option("NAME", "the axis (default: the first one)")] = None,
     *,
-    input: str | None = None,
-    motor: str | None = None,
-    scale: str | None = None,
-    sensor: Sequence[str] = (),
-    modes: int | Literal["auto"] | str = "auto",
-    band: Band | None = None,
-    period: int | None = None,
-    time: str | None = None,
-    interval: Value | None = None,
-    set: Changes = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
+    input: Annotated[
+        str | None, Option("NAME[:UNIT]", "of time signals: torque or current; of several runs NAME,NAME:UNIT")
+    ] = None,
+    motor: Annotated[
+        str | None, Option("NAME[:UNIT]", "angle, speed or acceleration of the motor (default: the only response)")
+    ] = None,
+    scale: Annotated[
+        str | None, Option("NAME[:UNIT]", "position, speed or acceleration at the scale, or at the load")
+    ] = None,
+    sensor: Annotated[
+        Sequence[str], Option("NAME[:UNIT]", "a further sensor; may be given several times", many=True)
+    ] = (),
+    modes: Annotated[
+        int | Literal["auto"] | str, Option("0..5|auto", "how many modes (default: auto, by cross-validation)")
+    ] = "auto",
+    band: Annotated[
+        Band | None, Option("LOW..HIGH", "lines that are used, e.g. 11Hz..250Hz (default: all that are excited)")
+    ] = None,
+    period: Annotated[int | None, Option("SAMPLES", "period of the excitation (default: looked for)")] = None,
+    time: Annotated[str | None, Option("NAME[:UNIT]", "column of the time (default: time or t)")] = None,
+    interval: Annotated[Value | None, Option("VALUE", "of the samples, in place of a time, e.g. 0.4ms")] = None,
+    set: Settings = None,
+    out: Annotated[File | None, out("modes_{response}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> ModesResult:
-    """Elastic modes of an axis from a measured response: time signals, or a file of frequency responses.
+    r"""Elastic modes of an axis from a measured response: time signals, or a file of frequency responses.
 
-    Args:
-        response: time signals (with `input`) or frequency responses.
-        machine: machine file, machine folder or scenario: whose axis it is.
-        axis: None: the first one.
-        input: of time signals: torque or current, "NAME:UNIT"; of several runs "NAME,NAME:UNIT".
-        motor: angle, speed or acceleration of the motor, "NAME:UNIT"; None: the only response.
-        scale: position, speed or acceleration at the scale, or at the load.
-        sensor: further sensors.
-        modes: how many, 0 to 5; "auto": cross-validation decides.
-        band: lines that are used [Hz], or a text "11Hz..250Hz"; None: all that are excited.
-        period: of the excitation, in samples; None: it is looked for.
-        time: column of the time; None: time or t.
-        interval: of the samples, in place of a time [s].
-        set: changes of the machine, as behind ``--set``.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Rigid motion, delays and modes, whose number cross-validation decides; written as the machine's table of modes,
+    beside the measured lines and the machine's own response.
+
+    Command line:
+        feedsim example test_centre
+        feedsim identify modes bench.mat --machine machines/test_centre --axes X --input iq_adx:A \
+          --motor theta_mx:rad --scale theta_my:rad --interval 0.4ms
+        feedsim identify modes responses.uff --machine machines/test_centre --axes Z --modes 2
 
     Raises:
         InputError: a faulty file, no such axis or signal, wrong arguments, a response that is none of an axis.
@@ -130,11 +137,11 @@ def identify_modes(
     >>> import feedsim as fs
     >>> fs.identify_modes("z_positioning.yaml", "machines/test_centre", "B")
     Traceback (most recent call last):
-    feedsim.errors.InputError: axis B: the machine has no axis 'B'; it has X, Y, Z
+    feedsim.errors.InputError: axes B: the machine has no axis 'B'; it has X, Y, Z
     """
     texts = settings(set)
     subject = load_subject(machine, texts)
-    chosen = _axis(axis, subject.machine)
+    chosen = _axis(axes, subject.machine)
     path = Path(response)
     outputs = {"motor": Channel.of(_motor(motor, input, path), spelt("motor"))}
     if scale is not None:
@@ -144,7 +151,7 @@ def identify_modes(
         outputs[more.names[0]] = more
     count = _count(modes)
     asked = {
-        "axis": axis, "input": input, "motor": motor, "scale": scale, "modes": modes, "band": band, "period": period,
+        "axes": axes, "input": input, "motor": motor, "scale": scale, "modes": modes, "band": band, "period": period,
         "interval": interval,
     }  # fmt: skip
     given = {name: str(value) for name, value in asked.items() if value is not None}
@@ -173,7 +180,7 @@ def identify_modes(
 def _axis(axis: str | None, machine: Machine) -> str:
     chosen = axis or next(iter(machine.axes))
     if chosen not in machine.axes:
-        raise InputError(f"{spelt('axis')} {chosen}: {no_axis(chosen, machine.axes)}")
+        raise InputError(f"{spelt('axes')} {chosen}: {no_axis(chosen, machine.axes)}")
     return chosen
 
 

@@ -7,14 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Value, lengths, quantity, spelt
+from feedsim.arguments import Pairs, Value, lengths, pairs, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import begins_with, forced, replacing
@@ -37,7 +38,8 @@ USUAL_MODES = 20  # that are listed
 TABLE_FILE, BUILD_FILE = "modes.csv", "build.json"
 # A frequency that is asked for belongs to the nearest mode if that is not farther away than this share.
 MODE_DISTANCE = 0.1
-Positions = Mapping[str, Value]  # axis -> position [m], or a text with a unit
+Positions = Pairs[Value]  # axis -> position [m] or a text with a unit, or texts AXIS=POSITION
+POSITION_NEEDED = "AXIS=POSITION is needed, e.g. X=800mm"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,6 +145,7 @@ class BuildResult(MachineResult):
     """Modes that were computed from a structure: the table that runs read, and how it came about."""
 
     kind = "machine build"
+    main_file = TABLE_FILE
 
     @property
     def lines(self) -> Sequence[str]:
@@ -188,26 +191,39 @@ def _of_build(folder: Path) -> Sequence[str]:
     return (TABLE_FILE, BUILD_FILE) if begins_with(b'"format"')(folder / BUILD_FILE) else ()
 
 
+@job("masses, inertias, leads, coupling limits and modes")
 def machine_info(
-    machine: File,
+    machine: Annotated[
+        File,
+        Argument(
+            "MACHINE",
+            "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
+        ),
+    ],
     *,
-    at: Positions | None = None,
-    cutoff: Value | None = None,
-    static_correction: bool = False,
-    step: Value | None = None,
-    modes: int | str | None = USUAL_MODES,
+    at: Annotated[
+        Positions,
+        Option(
+            "AXIS=POSITION",
+            "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
+            several=True,
+        ),
+    ] = None,
+    cutoff: Annotated[
+        Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")
+    ] = None,
+    static_correction: Annotated[
+        bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
+    ] = False,
+    step: Annotated[
+        Value | None, Option("TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
+    ] = None,
+    modes: Annotated[int | str | None, Option("N", "modes to list: number or all (default: 20)")] = USUAL_MODES,
     watch: Watch = NO_WATCH,
 ) -> MachineResult:
     """Masses, inertias, leads, coupling limits and modes of a machine.
 
-    Args:
-        machine: machine file, structure file, a folder with either, or a scenario.
-        at: axis -> position [m], or a text with a unit; other axes stay at the machine's pose.
-        cutoff: modes above are dropped [rad/s], or a text "1500Hz"; None: that of the structure.
-        static_correction: append pseudo-modes that make up for the static compliance of the dropped modes.
-        step: exchange step of the coupling limit [s]; None: the machine's control cycle.
-        modes: that ``lines`` list; None or "all": all of them.
-        watch: who hears how far the job is.
+    They are computed from its structure where it has one, else from its table of modes. MACHINE may be a scenario too.
 
     Raises InputError: a faulty file or pose, no structure for what was asked, a structure that cannot be solved.
 
@@ -217,27 +233,41 @@ def machine_info(
     """
     most = _listed(modes)
     described = load_described(machine)
-    info = _info(machine, described, at or {}, cutoff, static_correction, step, watch)
+    info = _info(machine, described, at, cutoff, static_correction, step, watch)
     return MachineResult(info, described, listed=most)
 
 
+@job("compute a machine's modes from its structure")
 def machine_build(
-    machine: File,
-    out: File | None = None,
+    machine: Annotated[
+        File,
+        Argument(
+            "MACHINE",
+            "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
+        ),
+    ],
+    out: Annotated[File | None, out("build_{machine}")] = None,
     *,
-    at: Positions | None = None,
-    cutoff: Value | None = None,
-    static_correction: bool = False,
-    force: bool = False,
+    at: Annotated[
+        Positions,
+        Option(
+            "AXIS=POSITION",
+            "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
+            several=True,
+        ),
+    ] = None,
+    cutoff: Annotated[
+        Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")
+    ] = None,
+    static_correction: Annotated[
+        bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
+    ] = False,
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> BuildResult:
     """Compute the modes of a machine from its structure.
 
-    Args:
-        machine: machine file, structure file, a folder with either, or a scenario.
-        out: folder for modes.csv and build.json; None: :meth:`Result.save` does it.
-        at, cutoff, static_correction, watch: as of :func:`machine_info`.
-        force: as of :meth:`Result.save`.
+    The structure is geometry, or matrices of a finite-element program (docs/structure.md).
 
     Raises:
         InputError: as of :func:`machine_info`; the machine has no structure.
@@ -254,44 +284,70 @@ def machine_build(
         )
 
     with kept(out, BuildResult.check_place, watch, [file for _, file in described.files], force=force):
-        info = _info(machine, described, at or {}, cutoff, static_correction, None, watch, fresh=True)
+        info = _info(machine, described, at, cutoff, static_correction, None, watch, fresh=True)
         result = BuildResult(info, described)
         if out is not None:
             result.save(out, force=force)
     return result
 
 
-def machine_show(
-    machine: File,
-    out: File | None = None,
+@job("draw a machine's structure and its modes", needs=("figures",))
+def machine_view(
+    machine: Annotated[
+        File,
+        Argument(
+            "MACHINE",
+            "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
+        ),
+    ],
+    out: Annotated[File | None, out("view_{machine}")] = None,
     *,
-    at: Positions | None = None,
-    cutoff: Value | None = None,
-    static_correction: bool = False,
-    step: Value | None = None,
-    mode: Sequence[int | str] = (),
-    animate: bool = False,
-    scale: float | str = "auto",
-    force: bool = False,
+    at: Annotated[
+        Positions,
+        Option(
+            "AXIS=POSITION",
+            "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
+            several=True,
+        ),
+    ] = None,
+    cutoff: Annotated[
+        Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")
+    ] = None,
+    static_correction: Annotated[
+        bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
+    ] = False,
+    step: Annotated[
+        Value | None, Option("TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
+    ] = None,
+    mode: Annotated[
+        Sequence[int | str],
+        Option(
+            "MODE",
+            "mode to draw: its number, or a frequency such as 21Hz for the nearest one; may be given several times",
+            many=True,
+        ),
+    ] = (),
+    animate: Annotated[bool, Option("", "write an animated GIF of every --mode, too")] = False,
+    scale: Annotated[
+        float | str,
+        Option(
+            "FACTOR",
+            "deflections are drawn this many times as large as usual, e.g. 2 (default: auto, a tenth of the machine)",
+        ),
+    ] = "auto",
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> MachineResult:
     """Draw the structure of a machine and its modes.
 
-    Args:
-        machine: machine file, structure file, a folder with either, or a scenario.
-        out: folder for report and pictures; None: :meth:`Result.save` does it.
-        at, cutoff, static_correction, step, watch: as of :func:`machine_info`.
-        mode: modes to draw: numbers, or frequencies such as "21Hz" for the nearest ones; none: the first ones.
-        animate: every mode of `mode` as a GIF, too.
-        scale: deflections are drawn this many times as large as usual; "auto": a tenth of the machine.
-        force: as of :meth:`Result.save`.
+    Writes pictures as PNG and SVG and a report. MACHINE may be a scenario too.
 
     Raises:
         InputError: as of :func:`machine_info`; no structure or no geometry; no such mode.
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> fs.machine_show("machines/test_centre", mode=["21Hz"]).kind
+    >>> fs.machine_view("machines/test_centre", mode=["21Hz"]).kind
     'machine'
     """
     factor = _scale(scale)
@@ -305,7 +361,7 @@ def machine_show(
         )
 
     with kept(out, MachineResult.check_place, watch, [file for _, file in described.files], force=force):
-        info = _info(machine, described, at or {}, cutoff, static_correction, step, watch)
+        info = _info(machine, described, at, cutoff, static_correction, step, watch)
         chosen = list(dict.fromkeys(_mode(entry, info.modes) for entry in mode))
         result = MachineResult(info, described, chosen, factor, animate)
         if out is not None:
@@ -380,7 +436,7 @@ def _check_complete(structure: Structure, pose: Mapping[str, float]) -> None:
 
 def positions(at: Positions) -> dict[str, float]:
     """Axis -> position [m]. Raises InputError."""
-    return lengths("at", at, "800mm")
+    return lengths("at", pairs("at", at, POSITION_NEEDED), "800mm")
 
 
 def _listed(modes: int | str | None) -> int | None:

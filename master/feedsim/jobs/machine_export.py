@@ -6,17 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import listed, spelt
+from feedsim.arguments import listed, pairs, spelt
 from feedsim.control import names_of
 from feedsim.control.archive import Archive
 from feedsim.control.view import Value
 from feedsim.control.writing import Written, changed
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
-from feedsim.jobs.machine_import import Pairs, assumed, axes_of, inputs_of, pairs, read_files
+from feedsim.jobs.folder import kept
+from feedsim.jobs.machine_import import Names, assumed, axes_of, inputs_of, read_files
+from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
@@ -84,29 +85,45 @@ class MachineExportResult(Result):
         page.check_writable([*page.named(self.written.contents)], folder, inputs)
 
 
+@job("write values of a machine into files of a control")
 def machine_export(
-    machine: File,
-    like: File | Sequence[File],
-    axes: Pairs = None,
+    machine: Annotated[File, Argument("MACHINE", "machine file, or a folder with a machine.yaml")],
+    like: Annotated[File | Sequence[File], Option("FILE", "files of the control as it is now", several=True)],
+    axes: Annotated[
+        Names,
+        Option(
+            "NAMES",
+            "axes of the control, X1,Y1; with the machine's name ahead where it is another one, "
+            "X=X1,Y=Y1 (default: the axes of the machine)",
+        ),
+    ] = None,
     *,
-    drives: Pairs = None,
-    assume: Pairs = None,
-    checked: str | Sequence[str] = (),
-    out: File | None = None,
-    force: bool = False,
+    drives: Annotated[
+        Names, Option("AXIS=LIST", "which drive object or list is that of an axis, such as X=PS000003,Y=PS000004")
+    ] = None,
+    assume: Annotated[
+        Names,
+        Option(
+            "NAME=VALUE",
+            "value of a parameter that the files do not have, such as FFW_MODE=3; may be given several times",
+            many=True,
+        ),
+    ] = None,
+    checked: Annotated[
+        str | Sequence[str],
+        Option("NUMBERS", "numbers whose unit you have checked at the control, such as MD32810,MD32000, or all"),
+    ] = (),
+    out: Annotated[File | None, out("export_{machine}")] = None,
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> MachineExportResult:
-    """Write the values of a machine file into copies of a control's files, and a sheet of old and new values.
+    r"""Write the values of a machine file into copies of a control's files, and a sheet of old and new values.
 
     The bytes of changed values differ, and no others. What cannot be written stands on the sheet, to be typed.
 
-    Args:
-        machine: machine file or folder.
-        like: files of the control, as it is now.
-        axes, drives, assume, checked: as of :func:`feedsim.machine_import`.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Command line:
+        feedsim machine export my_machine --like archive.tea --axes X=X1,Y=Y1 --out to_load
+        feedsim machine export my_machine --like nc.tea ps000003.tea --axes X=X1 --drives X=PS000003 --out to_load
 
     Raises:
         InputError: a faulty machine, one of another control, files as of :func:`feedsim.machine_import`, a change that
@@ -115,10 +132,10 @@ def machine_export(
 
     >>> import feedsim as fs
     >>> from pathlib import Path
-    >>> size = Path("mill.tea").write_text("N32200 $MA_POSCTRL_GAIN[0,AX1]=5 ; gain\\n")
+    >>> size = Path("mill.tea").write_text("N32200 $MA_POSCTRL_GAIN[0,AX1]=5 ; gain\n")
     >>> result = fs.machine_export("machines/test_centre", "mill.tea", "X=AX1")
     >>> result.written.contents["mill.tea"]
-    b'N32200 $MA_POSCTRL_GAIN[0,AX1]=4 ; gain\\n'
+    b'N32200 $MA_POSCTRL_GAIN[0,AX1]=4 ; gain\n'
     """
     paths = [Path(entry) for entry in ([like] if isinstance(like, str | Path) else like)]
     base = Path(machine)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import listed, spelt
+from feedsim.arguments import Pairs, listed, pairs, spelt
 from feedsim.control.archive import MAX_FILE_BYTES, Archive, scalar
 from feedsim.control.formats import opened
 from feedsim.control.reading import Reading, read
 from feedsim.errors import InputError, no_such_file
 from feedsim.files.regular import content
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
@@ -23,7 +24,7 @@ from feedsim.report.results import Content
 from feedsim.scenario.imported import Imported, imported
 from feedsim.scenario.machine import Machine
 
-Pairs = str | Sequence[str] | Mapping[str, str] | None
+Names = Pairs[str]  # axis of the machine -> that of the control, or texts X1 and X=X1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +41,7 @@ class MachineImportResult(Result):
     inputs_read: Sequence[Path]
 
     kind = page.KIND
+    main_file = "machine.yaml"
     may_write = page.FILES
 
     @property
@@ -85,37 +87,58 @@ class MachineImportResult(Result):
         return page.summary(self.archives, self.reading, self.made, self.inputs_read, names)
 
 
+@job("fill a machine file from the files of a control")
 def machine_import(
-    files: File | Sequence[File],
-    axes: Pairs = None,
-    machine: File | None = None,
+    files: Annotated[
+        File | Sequence[File],
+        Argument(
+            "FILE",
+            "files of one control: archive, machine data, parameters of drives, lists, INI (docs/control_files.md)",
+            many=True,
+        ),
+    ],
+    axes: Annotated[
+        Names,
+        Option(
+            "NAMES",
+            "axes of the control, X1,Y1; with the machine's name ahead where it is another one, "
+            "X=X1,Y=Y1 (default: the axes of the machine)",
+        ),
+    ] = None,
+    machine: Annotated[
+        File | None, Option("MACHINE", "machine file or folder that the values are laid into (default: a draft)")
+    ] = None,
     *,
-    drives: Pairs = None,
-    assume: Pairs = None,
-    checked: str | Sequence[str] = (),
-    name: str | None = None,
-    out: File | None = None,
-    force: bool = False,
+    drives: Annotated[
+        Names, Option("AXIS=LIST", "which drive object or list is that of an axis, such as X=PS000003,Y=PS000004")
+    ] = None,
+    assume: Annotated[
+        Names,
+        Option(
+            "NAME=VALUE",
+            "value of a parameter that the files do not have, such as FFW_MODE=3; may be given several times",
+            many=True,
+        ),
+    ] = None,
+    checked: Annotated[
+        str | Sequence[str],
+        Option("NUMBERS", "numbers whose unit you have checked at the control, such as MD32810,MD32000, or all"),
+    ] = (),
+    name: Annotated[str | None, Option("NAME", "of the machine in a draft (default: name of the file)")] = None,
+    out: Annotated[File | None, out("machine_{files}")] = None,
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> MachineImportResult:
-    """Fill drive, limits, filters and compensations of a machine file from the files of a control.
+    r"""Fill drive, limits, filters and compensations of a machine file from the files of a control.
 
     A value is taken where the file has it once, where it acts, and where a public source states its unit. All others
     are named with the reason. No value is guessed.
 
-    Args:
-        files: of one control: machine data and archives of a SINUMERIK, parameters of SINAMICS, axis lists of TwinCAT
-            CNC, .xti of TwinCAT NC, tables of parameters, INI files of LinuxCNC.
-        axes: the control's axes, "X1,Y1"; with the machine's name ahead where it is another one, "X=X1,Y=Y1". None: all
-            axes of the machine.
-        machine: machine file or folder that the values are laid into; None: a draft that lacks what no control has.
-        drives: axis -> drive object or list that is its own, "X=PS000003"; several with "+" between them.
-        assume: parameter -> value, of what the files do not have, "FFW_MODE=3".
-        checked: numbers of the table whose unit was checked at the control; "all".
-        name: of a draft; None: that of the file.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Command line:
+        feedsim example xz_circle
+        feedsim machine import archive.arc --axes X1,Y1 --out my_machine
+        feedsim machine import nc.tea ps000003.tea --axes X=X1 --machine machines/test_centre --out my_machine
+        feedsim machine import mill.ini --axes X,Y,Z --out my_machine
 
     Raises:
         InputError: a file of no known kind, no such axis, a faulty machine.
@@ -124,7 +147,7 @@ def machine_import(
     >>> import feedsim as fs
     >>> from pathlib import Path
     >>> data = ["N32200 $MA_POSCTRL_GAIN[0,AX1]=5", "N32300 $MA_MAX_AX_ACCEL[0,AX1]=2.5"]
-    >>> size = Path("mill.tea").write_text("\\n".join(data))
+    >>> size = Path("mill.tea").write_text("\n".join(data))
     >>> result = fs.machine_import("mill.tea", "X=AX1", "machines/test_centre")
     >>> [(each.parameter, each.value) for each in result.made.values]
     [('drive.K_v', 83.33333333333334), ('max_acceleration', 2.5)]
@@ -161,23 +184,7 @@ def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
     return archives
 
 
-def pairs(name: str, given: Pairs) -> dict[str, str]:
-    """Key -> text of texts KEY=TEXT. InputError: no such form, or a key twice."""
-    if isinstance(given, Mapping):
-        return {str(key): str(value) for key, value in given.items()}
-    texts = () if given is None else listed(given)
-    result: dict[str, str] = {}
-    for text in texts:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        if not (key and equals and value):
-            raise InputError(f"{spelt(name)} {text}: NAME=VALUE is needed")
-        if key in result:
-            raise InputError(f"{spelt(name)} {text}: {key} is given twice")
-        result[key] = value
-    return result
-
-
-def assumed(given: Pairs) -> Mapping[str, str]:
+def assumed(given: Names) -> Mapping[str, str]:
     """Parameter -> text of --assume. InputError: no value of a control."""
     result = pairs("assume", given)
     for key, text in result.items():
@@ -188,7 +195,7 @@ def assumed(given: Pairs) -> Mapping[str, str]:
     return result
 
 
-def axes_of(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> dict[str, str]:
+def axes_of(given: Names, machine: Path | None, archives: Sequence[Archive]) -> dict[str, str]:
     """Machine's axis -> the control's."""
     if isinstance(given, Mapping):
         return {str(key): str(value) for key, value in given.items()}

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from feedsim import cosim, scenario, units
-from feedsim.arguments import Value, by_name, spelt
+from feedsim.arguments import Pairs, Value, by_name, pairs, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File
 from feedsim.jobs.machine import Positions, positions
 from feedsim.jobs.made import Kind, Made
 from feedsim.jobs.pack import PACKED
+from feedsim.jobs.parameters import File
 from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
 from feedsim.outputs import same
 from feedsim.owned import TemporaryFolder
@@ -40,8 +40,8 @@ def machine_pack(
     machine: File,
     out: File | None = None,
     *,
-    at: Positions | None = None,
-    poses: Mapping[str, Value] | None = None,
+    at: Positions = None,
+    poses: Pairs[Value] = None,
     name: str | None = None,
     note: str | None = None,
     base: File | None = None,
@@ -65,7 +65,7 @@ def machine_pack(
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> fs.machine_pack("machines/test_centre", at={"Z": "100 mm"}).name
+    >>> fs.export("machines/test_centre", at={"Z": "100 mm"}, plant=True).name
     'plant.fmu'
     """
     described = load_described(machine)
@@ -77,7 +77,7 @@ def machine_pack(
     read = [Path(machine), loaded.modes, *files]
     with KIND.checked(out, read, force=force) as path:
         announce_archive(watch, own, "the packed plant's trial")
-        pose = _pose_of(loaded, at or {})
+        pose = _pose_of(loaded, at)
         with TemporaryFolder() as folder:
             modes = _modes_at(loaded, pose, folder / "modes.csv") if at else loaded.modes
             checked_modes(loaded.model_copy(update={"modes": modes}))  # what a run would refuse should not be packed
@@ -144,7 +144,7 @@ def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
 
 
 def _write_grid(
-    machine: Machine, pose: Mapping[str, float], modes: Path, asked: Mapping[str, Value], watch: Watch, out: Path
+    machine: Machine, pose: Mapping[str, float], modes: Path, asked: Pairs[Value], watch: Watch, out: Path
 ) -> str:
     """Compute the grid that is asked for, about `pose` [m], and write it to `out`; returns what was made, in words.
 
@@ -193,7 +193,7 @@ def _size(machine: Machine, pose: Mapping[str, float], grid: Sequence[GridAxis],
     return size
 
 
-def grid_axes(machine: Machine, poses: Mapping[str, Value]) -> list[GridAxis]:
+def grid_axes(machine: Machine, poses: Pairs[Value]) -> list[GridAxis]:
     """Grid axes of axis -> size of the cells [m], or a text CELL or LOW..HIGH/CELL.
 
     Raises:
@@ -224,4 +224,5 @@ def grid_axes(machine: Machine, poses: Mapping[str, Value]) -> list[GridAxis]:
             )
         return axis
 
-    return [*by_name("poses", poses, axis_of).values()]
+    given = pairs("poses", poses, f"{POSITIONS_EXAMPLE} is the form")
+    return [*by_name("poses", given, axis_of).values()]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.errors import OutputError
-from feedsim.jobs.folder import File
+from feedsim.jobs.parameters import File
 from feedsim.outputs import check_file, forced, replacing
 from feedsim.trace.files import written_whole
 
@@ -61,7 +61,7 @@ class Made:
         name: that it has in :meth:`files`.
 
     >>> import feedsim as fs
-    >>> made = fs.pack("machines/test_centre")
+    >>> made = fs.export("machines/test_centre")
     >>> isinstance(made, fs.Made), made.size == len(made.content), list(made.files())
     (True, True, ['machine.fmu'])
     """

@@ -8,8 +8,8 @@ from feedsim import cosim, judge, nc, scenario
 from feedsim.arguments import Changes, settings
 from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
+from feedsim.jobs.parameters import File
 from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
 from feedsim.outputs import archive_with
 from feedsim.owned import TemporaryFolder
@@ -48,7 +48,7 @@ def pack(
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> fs.pack("z_positioning.yaml", inputs=True).kind
+    >>> fs.export("z_positioning.yaml", inputs=True).kind
     'pack'
     """
     KIND.check_folder(out)

@@ -12,7 +12,7 @@ from feedsim.errors import InputError
 from feedsim.fields import no_axis
 from feedsim.files.columns import Columns, load_columns
 from feedsim.identify import Recorded
-from feedsim.jobs.folder import File
+from feedsim.jobs.parameters import File
 from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
 from feedsim.replay.window import window as window_of
 from feedsim.scenario import Machine, Subject, load_subject

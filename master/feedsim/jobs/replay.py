@@ -6,11 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Changes
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import (
+    Archives,
+    Argument,
+    ControlName,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    job,
+    out,
+)
 from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
@@ -83,38 +94,53 @@ class ReplayResult(Result):
         return page.summary(self.replayed, names)
 
 
+@job("run a record's setpoints on simulated axes, and compare")
 def replay(
-    record: File,
-    machine: File,
-    axes: str | Sequence[str] | None = None,
+    record: Annotated[
+        File, Argument("RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)")
+    ],
+    machine: Annotated[File, Option("MACHINE-or-SCENARIO", "the machine that follows the record")],
+    axes: Annotated[
+        str | Sequence[str] | None,
+        Option("NAMES", "axes, separated by commas, such as X,Y (default: all of the machine)"),
+    ] = None,
     *,
-    columns: File | None = None,
-    window: str | None = None,
-    open_loop: bool = False,
-    set: Changes = None,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
-    control: str = "",
+    columns: Annotated[
+        File | None, Option("MAPPING.yaml", "which columns of the record are what (docs/traces.md)")
+    ] = None,
+    window: Annotated[
+        str | None,
+        Option(
+            "BEGIN..END",
+            "the part of the record that counts, by times or by blocks of its program, e.g. '0.5 "
+            "s..2 s', 'N7..N20', 'N7' (default: all of it)",
+        ),
+    ] = None,
+    open_loop: Annotated[
+        bool,
+        Option(
+            "", "the recorded torque drives the rigid axis, from the recorded position and speed on, without its drive"
+        ),
+    ] = False,
+    set: Settings = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("replay_{record}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    control: ControlName = "",
     watch: Watch = NO_WATCH,
 ) -> ReplayResult:
     """Run the position setpoints of a record through the simulated axes, in closed loop, and compare.
 
-    In open loop the recorded torque drives the axes instead, from the recorded position and speed on.
+    Shows what is left of position, torque and speed setpoint: over time, as figures, as a spectrum and over the
+    position. In open loop the recorded torque drives the axes instead, from the recorded position and speed on.
 
-    Args:
-        record: CSV or MAT file, or a control's capture.
-        machine: machine or scenario that follows the record.
-        axes: of the record; None: all of the machine.
-        columns: mapping file, which columns of the record are what.
-        window: the part that counts, by times or by blocks of the record's program: "0.5 s..2 s", "N7..N20", "N7".
-        open_loop: the recorded torque drives the rigid axis, in place of its drive.
-        set: changes of the machine, as behind ``--set``.
-        fmus: folder of the archives.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force, control: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Command line:
+        feedsim example sinumerik_840d test_centre
+        feedsim replay capture.json --machine machines/sinumerik_840d --axes X,Y
+        feedsim replay log.csv --machine machines/test_centre --axes Z --window "0.5 s..2 s"
+        feedsim replay log.csv --machine machines/test_centre --axes Z --open-loop
+        feedsim replay log.csv --machine my_machine --axes Z --set axes.Z.drive.K_v="2 (m/min)/mm" --out results/other
 
     Raises:
         InputError: a faulty file, no such axis, no such window, no setpoint or no position in the record; in open loop

@@ -34,6 +34,7 @@ class Result(ABC):
     """
 
     kind: ClassVar[str]  # of the result, as summary.json has it
+    main_file: ClassVar[str] = REPORT  # of its files, the one that the command names
     own: ClassVar[Sequence[str]] = ()  # names of files that only results of this kind have
     may_write: ClassVar[Sequence[str]] = ()  # names of files that one may have besides report.html and summary.json
 
@@ -61,6 +62,15 @@ class Result(ABC):
     @abstractmethod
     def lines(self) -> Sequence[str]:
         """What the command of this job prints."""
+
+    def lines_shown(self, verbose: bool) -> Sequence[str]:
+        """What the command prints; verbose: all figures, too."""
+        figures = self.figures.items() if verbose else ()
+        return [*self.lines, *(f"  {name} = {figure}: {figure.meaning}" for name, figure in figures)]
+
+    def findings_shown(self, quiet: bool) -> Sequence[str]:
+        """Findings that the command prints; quiet: where it prints nothing else."""
+        return self.findings
 
     @abstractmethod
     def report(self) -> Report:

@@ -9,13 +9,25 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from feedsim import analysis, cosim
 from feedsim.analysis import Figure
-from feedsim.arguments import Changes
 from feedsim.findings import ranked, severity
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import (
+    Archives,
+    Argument,
+    ControlName,
+    Draws,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    job,
+    out,
+)
 from feedsim.jobs.result import Result, in_words_of
 from feedsim.jobs.subject import Opened, opened
 from feedsim.jobs.watch import NO_WATCH, Watch
@@ -208,31 +220,29 @@ def _text(content: bytes) -> str:
     return b64encode(content).decode("ascii")
 
 
+@job("run a scenario or an SSP file; figures, causes, report")
 def run(
-    scenario: File | Scenario,
+    scenario: Annotated[
+        File | Scenario, Argument("SCENARIO", "scenario file (docs/scenarios.md), or SSP (docs/ssp.md)")
+    ],
     *,
-    set: Changes = None,
-    page: bool = False,
-    uncertain: int = 0,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
-    control: str = "",
+    set: Settings = None,
+    page: Annotated[
+        bool, Option("", "leave the machine as a page that computes beside the report, which links it (docs/page.md)")
+    ] = False,
+    uncertain: Draws = 0,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("{scenario}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    control: ControlName = "",
     watch: Watch = NO_WATCH,
 ) -> RunResult:
     """Run a scenario.
 
-    Args:
-        scenario: a file, an SSP file, or what :func:`load` has returned.
-        set: changes, as behind ``--set``: a mapping, or texts "KEY=VALUE".
-        page: with the machine as a page that computes, which the report links.
-        uncertain: draws of the machine from the intervals of its identified values, 19 or more, which give intervals of
-            figures and bands of curves; 0: none.
-        fmus: folder of the archives.
-        out: folder that the result is written to, row by row while it runs; None: :meth:`RunResult.save` does it.
-        figures, force, control: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    An FMU is a program, and so is an SSP, which holds some: to run it is to run its libraries with your rights.
+    Libraries other than the shipped ones are named on standard error, with their place and SHA-256, before they are
+    executed. No text in an archive makes feedsim read a file outside of it.
 
     Raises:
         InputError: a faulty file, a motion that violates a limit, an evaluation that cannot be made, no identified

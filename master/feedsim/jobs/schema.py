@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 from feedsim.arguments import spelt
 from feedsim.errors import InputError
-from feedsim.scenario.schema import Kind, json_schema
+from feedsim.jobs.parameters import Argument, job
+from feedsim.scenario.schema import Kind as FileKind
+from feedsim.scenario.schema import json_schema
 
 
-def schema(kind: Kind = "scenario") -> dict[str, Any]:
+@job("print the JSON Schema of a kind of file, for editors", needs=())
+def schema(
+    kind: Annotated[
+        FileKind, Argument("", "", choices=("scenario", "machine", "structure", "columns", "tolerances", "study"))
+    ] = "scenario",
+) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of files that people write.
-
-    Args:
-        kind: "scenario", "machine", "structure", "columns" (the mapping of a recording), "tolerances" or "study".
 
     Raises InputError: there is no such kind.
 
@@ -21,6 +25,6 @@ def schema(kind: Kind = "scenario") -> dict[str, Any]:
     >>> fs.schema("study")["title"]
     'feedsim study file'
     """
-    if kind not in get_args(Kind):
-        raise InputError(f"{spelt('kind')} is {kind!r}; allowed: {', '.join(get_args(Kind))}")
+    if kind not in get_args(FileKind):
+        raise InputError(f"{spelt('kind')} is {kind!r}; allowed: {', '.join(get_args(FileKind))}")
     return json_schema(kind)

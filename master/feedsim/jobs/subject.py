@@ -11,7 +11,7 @@ from feedsim import nc, scenario
 from feedsim.arguments import Changes, settings, spelt
 from feedsim.errors import InputError
 from feedsim.files.source import is_ssp, is_study
-from feedsim.jobs.folder import File
+from feedsim.jobs.parameters import File
 from feedsim.nc import Program
 from feedsim.scenario import Scenario
 

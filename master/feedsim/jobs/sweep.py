@@ -6,15 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Changes, settings
+from feedsim.arguments import settings
 from feedsim.findings import WRONG, Wrong
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.owned import TemporaryFolder
@@ -124,35 +125,38 @@ class SweepResult(Result):
         return repr(self.table)
 
 
+@job("make the runs of a study; table, sensitivities, report", needs=("sweep",))
 def sweep(
-    study: File,
-    out: File | None = None,
+    study: Annotated[File, Argument("STUDY.yaml", "study file (docs/sweeps.md)")],
+    out: Annotated[File | None, out("{study}")] = None,
     *,
-    set: Changes = None,
-    runs: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    format: Format = "csv",
-    restart: bool = False,
-    fmus: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
+    set: Settings = None,
+    runs: Annotated[int | None, Option("N", "in place of the study's sampling.runs")] = None,
+    workers: Annotated[int | None, Option("N", "processes (default: the cores; 0: this one alone)")] = None,
+    scheduler: Annotated[
+        str | None, Option("ADDRESS", "make the runs on the Dask cluster with this scheduler, tcp://host:8786")
+    ] = None,
+    format: Annotated[Format, Option("", "of the table (default: csv)", choices=("csv", "parquet"))] = "csv",
+    restart: Annotated[bool, Option("", "begin anew; discards the runs that DIR has")] = False,
+    fmus: Archives = None,
+    figures: FigureKinds = (),
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> SweepResult:
     """Make the runs of a study; those that `out` has are not made again.
 
-    Args:
-        study: study file.
-        out: folder that keeps journal, table and report; None: a temporary one, as long as the result lives.
-        set: changes of the study's scenario, as behind ``--set``.
-        runs: in place of the study's own number.
-        workers: processes; None: the cores, 0: this one alone.
-        scheduler: address of a Dask cluster, "tcp://host:8786", that makes the runs.
-        format: of the table, "csv" or "parquet".
-        restart: discard the runs that the folder has.
-        fmus: folder of the archives.
-        figures, force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    A study varies parameters of a scenario over a grid, a Latin hypercube or a Sobol sequence (docs/sweeps.md). Leaves
+    table.csv or table.parquet with a row per run, study.json and a report. A run that fails is a row with its message.
+    A study that was interrupted continues when the same command is given again. Exit code 3: all runs failed, or all
+    workers were lost.
+
+    Command line:
+        feedsim example friction_wear z_stop
+        feedsim sweep studies/friction_wear.yaml
+        feedsim sweep studies/z_stop.yaml --runs 20 --out results/try
+        feedsim sweep studies/z_stop.yaml --set "machine.axes.Z.friction.W=0 rad" --format parquet
+        feedsim sweep studies/friction_wear.yaml --scheduler tcp://node1:8786
+        feedsim check studies/z_stop.yaml
 
     Raises:
         InputError: a faulty file, or a folder that belongs to another state of the study.
@@ -197,6 +201,9 @@ def sweep(
                 say=watch.say,
                 discard=lambda: discard(folder),
             )
+        except KeyboardInterrupt:
+            watch.announce(f"what is done stays in {folder}; the same command continues")
+            raise
         except AllFailed as error:
             # The report groups failures by what they have in common.
             page.write(error.table, loaded, planned, folder, drawn=figures)

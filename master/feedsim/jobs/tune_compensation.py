@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim import scenario as scenarios
 from feedsim.analysis import Figure
-from feedsim.arguments import Changes, listed, settings, spelt
+from feedsim.arguments import listed, settings, spelt
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report import tune as page
@@ -75,34 +76,34 @@ class TuneCompensationResult(Result):
         return page.summary(self.judged, names)
 
 
+@job("values of a friction compensation, judged on other circles")
 def tune_compensation(
-    scenario: File,
+    scenario: Annotated[File, Argument("SCENARIO.yaml", "scenario with a circle")],
     *,
-    kind: str = "pulse_characteristic",
-    axes: str | Sequence[str] | None = None,
-    objective: str = "ratio",
-    uncertain: int = 0,
-    set: Changes = None,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
+    kind: Annotated[
+        str, Option("KIND", "pulse, pulse_characteristic, table or model (default: pulse_characteristic)")
+    ] = "pulse_characteristic",
+    axes: Annotated[
+        str | Sequence[str] | None, Option("NAMES", "axes of the plane that are compensated (default: both)")
+    ] = None,
+    objective: Annotated[str, Option("NAME", "what is minimised: ratio, worst or largest (default: ratio)")] = "ratio",
+    uncertain: Draws = 0,
+    set: Settings = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("tune_{scenario}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> TuneCompensationResult:
     """Find the values of a friction compensation on short circles, and judge them on other radii and feeds.
 
-    Args:
-        scenario: file whose machine is meant; its first circle gives the plane.
-        kind: pulse, pulse_characteristic, table or model.
-        axes: of the plane, that are compensated; both where they are not given.
-        objective: what is minimised: ratio, worst or largest.
-        uncertain: draws of the machine from the intervals of its identified values, 19 or more, which the values are
-            judged on; they are found on a few other ones. 0: none.
-        set: changes of the scenario, as behind ``--set``.
-        fmus: folder of the archives.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    A pulse on the speed setpoint, constant or with a characteristic over the acceleration (SINUMERIK), a torque over
+    the commanded speed (TwinCAT CNC), or the friction model as torque feedforward.
+
+    Command line:
+        feedsim example xz_circle
+        feedsim tune compensation xz_circle.yaml --kind pulse
+        feedsim tune compensation xz_circle.yaml --kind table --axes Z --out results/table
 
     Raises:
         InputError: a faulty file, no circle, units of other makers, an unknown kind or objective, no identified

@@ -6,13 +6,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim import scenario as scenarios
 from feedsim.analysis import Figure
-from feedsim.arguments import Changes, Value, amount, given, quantity, settings, spelt
+from feedsim.arguments import Value, amount, given, quantity, settings, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import (
+    Archives,
+    Argument,
+    ControlName,
+    Draws,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    job,
+    out,
+)
 from feedsim.jobs.result import Result, in_words_of
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report.content import Report
@@ -100,22 +113,36 @@ class TuneDriveResult(Result):
         page.check_writable(folder, list(self.tuned.scenario.machine.axes), inputs)
 
 
+@job("values of a drive within stability margins")
 def tune_drive(
-    scenario: File,
-    axis: str,
+    scenario: Annotated[File, Argument("SCENARIO.yaml", "scenario whose machine is meant")],
+    axes: Annotated[str, Option("NAME", "axis whose drive is tuned")],
     *,
-    gain_margin: Value = 8.0,
-    phase_margin: Value = 40.0,
-    encoder_noise: Value = 10e-6,
-    at: Sequence[str] = (),
-    evaluations: int = EVALUATIONS,
-    uncertain: int = 0,
-    set: Changes = None,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
-    control: str = "",
+    gain_margin: Annotated[Value, Option("DB", "least gain margin (default: 8 dB)")] = 8.0,
+    phase_margin: Annotated[Value, Option("DEG", "least phase margin (default: 40 deg)")] = 40.0,
+    encoder_noise: Annotated[
+        Value,
+        Option(
+            "ANGLE",
+            "standard deviation of the motor encoder's angle per control cycle; it bounds the gains (default: 10 urad)",
+        ),
+    ] = 1e-05,
+    at: Annotated[
+        Sequence[str],
+        Option(
+            "POSE",
+            "a further pose at which the margins hold, such as X=100mm,Z=600mm; may be given several times",
+            many=True,
+        ),
+    ] = (),
+    evaluations: Annotated[int, Option("N", "candidates per start of the search (default: 130)")] = EVALUATIONS,
+    uncertain: Draws = 0,
+    set: Settings = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("tune_drive_{scenario}_{axes}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    control: ControlName = "",
     watch: Watch = NO_WATCH,
 ) -> TuneDriveResult:
     """Tune the drive of an axis within margins: K_p, T_n, K_v, T_sym, T_dyn, reference model, current filters.
@@ -123,22 +150,11 @@ def tune_drive(
     Margins hold at the pose of the machine file and at further ones, for elastic modes 10 % lower and higher. Moves and
     circles of the axis are run; the result is judged on others.
 
-    Args:
-        scenario: file whose machine is meant; a circle in it names the second axis of the circles.
-        axis: whose drive is tuned.
-        gain_margin: least gain margin [dB]. phase_margin: least phase margin [deg].
-        encoder_noise: standard deviation of the motor encoder's angle per control cycle [rad]; the torque that it makes
-            stays below 2 % of the torque limit, or below what it is with the present drive.
-        at: further poses at which the margins hold, such as "X=100mm,Z=600mm"; the machine names its structure.
-        evaluations: candidates per start of the search, of which there are three.
-        uncertain: draws of the machine from the intervals of its identified values, 19 or more, which the drive is
-            judged on; it is found on a few other ones. 0: none.
-        set: changes of the scenario, as behind ``--set``.
-        fmus: folder of the archives.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
-        control: names of parameters, in reports and sheets: sinumerik, twincat, heidenhain, linuxcnc.
-        watch: who hears how far the job is.
+    Command line:
+        feedsim example z_positioning
+        feedsim tune drive z_positioning.yaml --axes Z
+        feedsim tune drive z_positioning.yaml --axes Z --control sinumerik --at Z=600mm --at X=100mm,Z=600mm
+        feedsim run z_positioning.yaml --set machine.axes.Z.drive=results/tune_drive_z_positioning_Z/drive_Z.yaml
 
     Raises:
         InputError: a faulty file, no such axis, units of other makers, a pose that cannot be had, no
@@ -161,20 +177,20 @@ def tune_drive(
     changes = settings(set)
     plan = scenarios.load(scenario, changes)
     try:
-        check_axis(plan, axis)
+        check_axis(plan, axes)
     except InputError as error:
-        raise InputError(f"{spelt('axis')} {axis}: {error}") from None
+        raise InputError(f"{spelt('axes')} {axes}: {error}") from None
     cloud = None
     if uncertain:
         check_count(uncertain)
         cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
-    axes = list(plan.machine.axes)
+    machine_axes = list(plan.machine.axes)
     places = _places(plan.machine, at)
-    asked = _asked(axis, limits, at, evaluations, uncertain)
+    asked = _asked(axes, limits, at, evaluations, uncertain)
 
     def check(folder: Path, inputs: Sequence[Path]) -> None:
-        page.check_writable(folder, axes, inputs)
+        page.check_writable(folder, machine_axes, inputs)
 
     with in_words_of(control), kept(
         out, check, watch, input_paths(plan), [*changes, *(f"{name}={text}" for name, text in asked.items())],
@@ -183,7 +199,7 @@ def tune_drive(
         announce(watch, plan.machine, archives, plan.coupling)
         poses = _poses(plan.machine, places, watch)
         tuned = tune(
-            plan, axis, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations, cloud=cloud,
+            plan, axes, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations, cloud=cloud,
             count=uncertain,
         )  # fmt: skip
         result = TuneDriveResult(tuned, control, asked, "" if out is None else str(out))
@@ -212,7 +228,7 @@ def _decibels(value: Value, name: str) -> float:
 def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int, uncertain: int) -> dict[str, str]:
     """What was asked for besides changes of the scenario, the same text for the same value."""
     result = {
-        "axis": axis,
+        "axes": axis,
         "gain_margin": f"{limits.gain_margin:g} dB",
         "phase_margin": f"{limits.phase_margin:g} deg",
         "encoder_noise": f"{1e6 * limits.encoder_noise:g} urad",

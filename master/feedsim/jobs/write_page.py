@@ -8,8 +8,8 @@ from pathlib import Path
 from feedsim import cosim, nc
 from feedsim.analysis import check
 from feedsim.arguments import Changes, listed, settings
-from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
+from feedsim.jobs.parameters import File
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.judge import judged
 from feedsim.outputs import begins_with
@@ -48,7 +48,7 @@ def write_page(
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> fs.write_page("z_positioning.yaml").name
+    >>> fs.export("z_positioning.yaml", kind="html").name
     'z_positioning.html'
     """
     KIND.check_folder(out)

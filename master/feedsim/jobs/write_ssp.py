@@ -8,8 +8,8 @@ from feedsim import ssp
 from feedsim.arguments import Changes, settings, spelt
 from feedsim.errors import InputError
 from feedsim.files.source import is_ssp
-from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
+from feedsim.jobs.parameters import File
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import archive_with
 from feedsim.owned import TemporaryFolder
@@ -47,7 +47,7 @@ def write_ssp(
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> made = fs.write_ssp("z_positioning.yaml")
+    >>> made = fs.export("z_positioning.yaml", kind="ssp")
     >>> made.content[:2]
     b'PK'
     """

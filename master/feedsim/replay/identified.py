@@ -211,7 +211,7 @@ def _refuse_own_setpoint(each: AxisRecord) -> None:
             f"{each.record.name}, axis {each.axis}: the position setpoint is the recorded position (largest difference "
             f"{1e9 * off:.3g} nm of a way of {1e3 * way:.4g} mm). The distance between them shows the drive, and a fit "
             "without it gives a wrong load and friction. Name the column of the setpoint, or identify inertia and "
-            "friction alone: feedsim identify"
+            "friction alone: feedsim identify friction"
         )
 
 

@@ -18,8 +18,8 @@ from feedsim.variables import parameters
 
 NOTE = (
     "A value follows from the parameters of the machine file in closed form. Margins are the least of the speed and "
-    "the position loop of the axis, moving and at rest. feedsim run --try makes a second run with the proposals and "
-    "lays it over this one. A proposal is as good as the machine file."
+    "the position loop of the axis, moving and at rest. feedsim tune proposals makes a second run with the proposals "
+    "and lays it over this one. A proposal is as good as the machine file."
 )
 
 TUNED = ("K_p", "T_n", "K_v", "T_sym", "T_dyn", "omega_0", "D")  # what feedsim tune drive finds
@@ -54,7 +54,7 @@ def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
     axes = dict.fromkeys(proposal.axis for proposal in proposals if proposal.parameter.removeprefix("drive.") in TUNED)
     result: list[Text] = [
         (f"All values of the drive of {axis} together, within margins: ",
-         code(f"feedsim tune drive {scenario} --axis {axis}"))
+         code(f"feedsim tune drive {scenario} --axes {axis}"))
         for axis in axes
     ]  # fmt: skip
     if any(proposal.cause.startswith(REVERSALS) for proposal in proposals):

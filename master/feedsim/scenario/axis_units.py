@@ -52,8 +52,8 @@ _AT_GUIDE_ALONE = [
     if name.startswith(("guide.place_", "guide.warm_"))
 ]  # fmt: skip
 _IDENTIFIED = (
-    "Where the parameters come from, as feedsim identify writes it: kept and shown, never calculated with. Its keys "
-    "are free, but names of parameters are refused: they would have no effect here"
+    "Where the parameters come from, as feedsim identify friction writes it: kept and shown, never calculated with. "
+    "Its keys are free, but names of parameters are refused: they would have no effect here"
 )
 
 

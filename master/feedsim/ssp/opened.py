@@ -205,7 +205,7 @@ def _with_motions(
             if changed is None or not (_same(changed.x_s, planned.x_s) and _same(changed.n_ffw, planned.n_ffw)):
                 raise InputError(
                     f"{path}: {', '.join(f'--set {text}' for text in overrides)}: would change the setpoints, which "
-                    "the file has as a table; change the scenario and export it anew (feedsim ssp)"
+                    "the file has as a table; change the scenario and export it anew (feedsim export)"
                 )
             _check_cycles(scenario, parts, path)
             scenario, lost = setpoints.evaluation(scenario, planned, program)

@@ -87,7 +87,7 @@ def packaging() -> Iterator[None]:
 
 
 def plant_tables(modes: Path, pose: Mapping[str, float], poses: Path | None) -> MachineTables:
-    """A machine's files as an archive holds them, checked; arguments as those of `pack`."""
+    """A machine's files as an archive holds them, checked; arguments as those of `export`."""
     from feedsim_packager import machine_tables
     from feedsim_packager.resources import File
 
@@ -119,7 +119,7 @@ def packed(
     level: int = 9,
 ) -> Packed:
     """Pack the unit of the archive `base` with what is `given`; `model`: its modelName, where it is not the unit's; the
-    rest as in `pack`."""
+    rest as in `export`."""
     from feedsim_packager.machine import named
     from feedsim_packager.repack import repack
 

@@ -193,7 +193,7 @@ def warnings(change: PoseChange) -> tuple[str, ...]:
         sentences.append(
             f"axis {axis.axis} moves {axis.distance * 1e3:.4g} mm away from the pose that the modes belong to; there "
             f"the mode at {mode.frequency:.4g} Hz ({moving}) has changed its frequency by {100 * mode.change:+.2g} %; "
-            f"for a plant that follows: feedsim machine pack ... --poses {axis.axis}=20mm"
+            f"for a plant that follows: feedsim export --plant ... --poses {axis.axis}=20mm"
         )
     return tuple(sentences)
 

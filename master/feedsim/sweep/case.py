@@ -68,7 +68,7 @@ def scenario_of(chosen: Case) -> tuple[Scenario, Path]:
 
     InputError: the study's files, units or version are no more those of its runs.
     """
-    again = f"`feedsim sweep STUDY --row {chosen.run}` prints the command that makes the run alone"
+    again = f"`feedsim check STUDY --row {chosen.run}` prints the command that makes the run alone"
     try:
         record = record_of(chosen.folder)
         parts, place = dict(record["parts"]), dict(record["place"])

@@ -197,7 +197,7 @@ def _found(
 
 
 def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str], fmus: Path | None) -> TorqueFeedforward:
-    """The friction model of the machine file as torque feedforward, as feedsim compensate has it."""
+    """The friction model of the machine file as torque feedforward, as feedsim tune feedforward has it."""
     frictions = {axis: machine.friction_of(axis, "the model") for axis in axes}
     delays = {axis: lag_of(machine.shipped_drive(axis, "the model"), machine.cycles).delay for axis in axes}
     with FrictionLaws(fmus) as laws:

@@ -288,7 +288,8 @@ def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
         return
     reason = f"shortest with {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
     if not searched:
-        reason = f"as short as margins of {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg allow; --try finds the value"
+        margins = f"{GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg"
+        reason = f"as short as margins of {margins} allow; feedsim tune proposals finds the value"
         yield Proposal(cause, axis, "drive.T_n", drive.T_n, None, "s", reason, "lower")
         return
     before = least_margins(judge(machine, modes), axis)

@@ -1,7 +1,7 @@
 """Draws of a machine from the intervals and correlations that its identified values have.
 
-A friction file of feedsim identify or identify-drive holds, in its group `identified`, an interval of 95 % of every
-estimated parameter and their correlation matrix. Together they are the covariance of a normal distribution. A draw
+A friction file of feedsim identify holds, in its group `identified`, an interval of 95 % of every estimated
+ parameter and their correlation matrix. Together they are the covariance of a normal distribution. A draw
 outside the range of a parameter, or with less static than Coulomb friction, is drawn anew: the normal distribution,
 truncated to what is possible.
 
@@ -96,7 +96,7 @@ def cloud_of(machine: Machine, axes: Sequence[str] | None = None) -> Cloud:
     if not result:
         raise InputError(
             f"{machine.name}: no axis has identified values with intervals, which draws could be made from; give an "
-            "axis the friction file of feedsim identify or identify-drive"
+            "axis the friction file of feedsim identify friction or identify-drive"
         )
     return Cloud(machine, result)
 
@@ -133,7 +133,7 @@ def known_of(friction: FrictionParameters, axis: str, present: Mapping[str, Any]
         return _known(identified, axis, present)
     except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
         raise InputError(
-            f"axis {axis}: the group identified of its friction is not as feedsim identify writes it: {error}"
+            f"axis {axis}: the group identified of its friction is not as feedsim identify friction writes it: {error}"
         ) from None
 
 

@@ -224,7 +224,7 @@ function reach_warnings({ axes, pose, limits, reach }, rows) {
       const change = f / over.frequency[k] - 1;
       if (Math.abs(change) > Math.abs(largest)) [largest, mode] = [change, k];
     });
-    if (Math.abs(largest) > reach.large) result.push(`${away}; there the mode at ${general(over.frequency[mode], 4)} Hz (${over.moving[mode]}) has changed its frequency by ${largest > 0 ? "+" : ""}${general(100 * largest, 2)} %; for a plant that follows: feedsim machine pack ... --poses ${axis}=20mm`);
+    if (Math.abs(largest) > reach.large) result.push(`${away}; there the mode at ${general(over.frequency[mode], 4)} Hz (${over.moving[mode]}) has changed its frequency by ${largest > 0 ? "+" : ""}${general(100 * largest, 2)} %; for a plant that follows: feedsim export --plant ... --poses ${axis}=20mm`);
   });
   return result;
 }

@@ -95,7 +95,7 @@ def report_of(
         answer=answers(diagnosis),
         warnings=list(recorded.doubts),
         tiles=tiles,
-        next_step=("Lay a simulated circle over it:\n", code(f"feedsim show {typed(files[0])} FOLDER_OF_A_RUN")),
+        next_step=("Lay a simulated circle over it:\n", code(f"feedsim diff {typed(files[0])} FOLDER_OF_A_RUN")),
         main=[
             picture(circle, recorded, diagnosis),
             diagnosis_section(prefix, diagnosis),

@@ -41,10 +41,10 @@ def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
         tiles=list(_tiles(compensation)),
         next_step=(
             "See what becomes of it as the machine wears or warms:\n",
-            code(f"feedsim compensate {typed(scenario.file)} --table"),
+            code(f"feedsim tune feedforward {typed(scenario.file)} --table"),
         )
         if not compensation.table
-        else ("Lay it over another run:\n", code(f"feedsim show {FOLDER} OTHER_FOLDER")),
+        else ("Lay it over another run:\n", code(f"feedsim diff {FOLDER} OTHER_FOLDER")),
         main=[
             *pictures,
             _errors(compensation) if compensation.table else None,

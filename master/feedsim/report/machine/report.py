@@ -71,7 +71,7 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         tiles=list(_tiles(info)),
         next_step=(
             "See how a mode moves:\n",
-            code(f"feedsim machine show {typed(files[0][1])} --mode {_lowest(info)} --animate --out {FOLDER}"),
+            code(f"feedsim machine view {typed(files[0][1])} --mode {_lowest(info)} --animate --out {FOLDER}"),
         ),
         main=[*pictures, _axes(info), _modes(info)],
         provenance=provenance_section(rows, hashed(list(files))),

@@ -121,7 +121,7 @@ def check_writable(axes: Sequence[str], directory: Path, inputs: Sequence[Path] 
 def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str]:
     """Comment at the top of the files."""
     part = f", {window[0]:g} to {window[1]:g} s" if window is not None else ""
-    return [f"Identified by feedsim identify-drive from {record.name}{part}, {day}.",
+    return [f"Identified by feedsim identify drive from {record.name}{part}, {day}.",
             "Intervals hold 95 % as far as the model is that of the axis."]  # fmt: skip
 
 

@@ -85,7 +85,7 @@ def report_of(replayed: Replayed) -> Report:
         tiles=list(_tiles(replayed.figures)),
         next_step=(
             "Identify the drives from the record:\n",
-            code(f"feedsim identify-drive {typed(replayed.sources[0].file)} --machine {typed(replayed.subject.file)}"),
+            code(f"feedsim identify drive {typed(replayed.sources[0].file)} --machine {typed(replayed.subject.file)}"),
         ),
         main=[
             *pictures,

@@ -60,17 +60,17 @@ def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Te
     """What to do with a run, by what it has shown first: a command to copy. change: that is proposed, in words."""
     file = typed(run.scenario.file)
     if change:
-        return f"Try {change}:\n", code(f"feedsim run {file} --try")
+        return f"Try {change}:\n", code(f"feedsim tune proposals {file}")
     first_causes = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
     if first_causes[:1] == ["peaks"]:
-        return "See what friction compensation takes away:\n", code(f"feedsim compensate {file}")
+        return "See what friction compensation takes away:\n", code(f"feedsim tune feedforward {file}")
     if first_causes[:1] == ["servo"]:
         return "See how each axis answers:\n", code(f"feedsim frf {file}")
     for task in tasks(run.scenario, run.program):
         axis = task.approach.axis if isinstance(task, PositioningTask) else ""
         if axis and isinstance(run.scenario.machine.axes[axis].drive, Drive):
-            return "Find drive values with which it stops better:\n", code(f"feedsim tune drive {file} --axis {axis}")
-    return "Lay another run or a record over it:\n", code(f"feedsim show {FOLDER} OTHER_FOLDER")
+            return "Find drive values with which it stops better:\n", code(f"feedsim tune drive {file} --axes {axis}")
+    return "Lay another run or a record over it:\n", code(f"feedsim diff {FOLDER} OTHER_FOLDER")
 
 
 def moved_words(trace: Trace) -> list[str]:

@@ -194,12 +194,12 @@ def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) 
 def _next(account: Account) -> Text:
     study = account.study
     if (result := account.best) is not None:
-        return "The command that makes this run by itself:\n", code(f"feedsim sweep {typed(study.file)} --row "
+        return "The command that makes this run by itself:\n", code(f"feedsim check {typed(study.file)} --row "
                                                                     f"{account.runs[result[1]]}")  # fmt: skip
     if not (outputs := drawn(account)):
         return ""
     name = study.explain or outputs[0].name
-    return "Lay the two ends over each other:\n", code(f"feedsim show {FOLDER}:min={name} {FOLDER}:max={name}")
+    return "Lay the two ends over each other:\n", code(f"feedsim diff {FOLDER}:min={name} {FOLDER}:max={name}")
 
 
 def answers(account: Account) -> list[str]:

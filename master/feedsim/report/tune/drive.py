@@ -53,7 +53,7 @@ BINDS = 0.06  # of a limit: a margin that is as near to it binds
 RIGID_WARNING = (
     "the machine has no elastic modes, and a real axis resonates. So K_p and the filters stay at most as they are, and "
     "T_n raises the gain by 1 dB at most: a resonance that nobody has measured nearly keeps its margin. Measure the "
-    "frequency response of the speed loop and take its modes in (feedsim identify-modes) for more"
+    "frequency response of the speed loop and take its modes in (feedsim identify modes) for more"
 )
 COMPENSATED = "its friction compensation was set for the present drive: tune that anew (feedsim tune compensation)"
 CHECK = (

@@ -6,15 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim import analysis, nc
 from feedsim import scenario as scenarios
 from feedsim.analysis import compensation
 from feedsim.analysis.compensation import Compensation, check_moves, lags_of, moving_axes
-from feedsim.arguments import Changes, Value, amount, by_name, settings, spelt
+from feedsim.arguments import Pairs, Value, amount, by_name, pairs, settings, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report import compensate as page
@@ -115,39 +116,50 @@ class CompensateResult(Result):
         }  # fmt: skip
 
 
-def compensate(
-    scenario: File,
+@job("a circle without and with torque feedforward of friction")
+def tune_feedforward(
+    scenario: Annotated[File, Argument("SCENARIO.yaml", "scenario with a circle")],
     *,
-    friction: Mapping[str, File] | None = None,
-    delay: Value | Mapping[str, Value] | None = None,
-    table: bool = True,
-    uncertain: int = 0,
-    set: Changes = None,
-    fmus: File | None = None,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
+    friction: Annotated[
+        Pairs[File],
+        Option(
+            "AXIS=FILE.yaml",
+            "friction parameters that the compensation of an axis uses (default: the machine's own, which the machine "
+            "keeps in any case); may be given several times",
+            many=True,
+        ),
+    ] = None,
+    delay: Annotated[
+        Value | Pairs[Value],
+        Option(
+            "[AXIS=]VALUE",
+            "delay of the feedforward behind the speed setpoint, e.g. '4.2 ms' (default: from the parameters of the "
+            "drive); may be given several times",
+            many=True,
+        ),
+    ] = None,
+    table: Annotated[
+        bool, Option("", "with the runs that show what errors of the delay and of the parameters cost (default: yes)")
+    ] = True,
+    uncertain: Draws = 0,
+    set: Settings = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("feedforward_{scenario}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> CompensateResult:
     """Run a circle without and with friction compensation of every axis that moves.
 
     A friction model, driven by the speed setpoint with the lag of the axis, gives a torque that is added to the torque
-    setpoint.
+    setpoint. Without --friction the model has the machine's own parameters: what is possible at best. With the file of
+    an identified set it shows how well that set compensates.
 
-    Args:
-        scenario: file with a circle.
-        friction: axis -> file of the parameters that its compensation uses; the machine's own for the other axes.
-        delay: of the feedforward behind the speed setpoint [s], of all axes or axis -> delay; of the drive's parameters
-            where it is not given. Values may be texts, "4.2 ms". In a mapping "" is all axes.
-        table: with the runs that show what errors of the delay and of the parameters cost, and what the compensation
-            does where the machine has other effects.
-        uncertain: draws of identified values, 19 or more, which give intervals of figures and bands of contours: of the
-            machine, and of the files of `friction` of axes whose machine values do not vary; 0: none.
-        set: changes of the scenario, as behind ``--set``.
-        fmus: folder of the archives.
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
+    Command line:
+        feedsim example xz_circle
+        feedsim tune feedforward xz_circle.yaml
+        feedsim tune feedforward xz_circle.yaml --friction X=friction_x.yaml --friction Z=friction_z.yaml
+        feedsim tune feedforward xz_circle.yaml --delay "4.2 ms" --no-table
 
     Raises:
         InputError: a faulty file, no circle, an axis that rests, a drive whose lag is not known, no identified values
@@ -156,7 +168,7 @@ def compensate(
         OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
-    >>> result = fs.compensate("xz_circle.yaml", table=False)
+    >>> result = fs.tune_feedforward("xz_circle.yaml", table=False)
     >>> float(result.figures["before.G"]) > 5 * float(result.figures["after.G"])
     True
     """
@@ -164,7 +176,8 @@ def compensate(
     plan = scenarios.load(scenario, changes)
     program = nc.plan(plan)
     compensation.circle_task(plan, program)
-    files = by_name("friction", friction or {}, lambda axis, file: _file(axis, file, program))
+    named = pairs("friction", friction, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
+    files = by_name("friction", named, lambda axis, file: _file(axis, file, program))
     sets = {axis: read_friction(file) for axis, file in files.items()}
     delays = _delays(delay, program)
     _check_lags(plan, [axis for axis in moving_axes(program) if axis not in delays])
@@ -214,7 +227,7 @@ def _file(axis: str, file: File, program: nc.Program) -> Path:
     return Path(file)
 
 
-def _delays(delay: Value | Mapping[str, Value] | None, program: nc.Program) -> dict[str, float]:
+def _delays(delay: Value | Pairs[Value], program: nc.Program) -> dict[str, float]:
     """Axis -> delay [s]; one without an axis is that of all, and one with it counts more."""
 
     def read(axis: str, value: Value) -> float:
@@ -222,7 +235,8 @@ def _delays(delay: Value | Mapping[str, Value] | None, program: nc.Program) -> d
             check_moves(axis, program)
         return amount(value, "s", "4.2 ms")
 
-    values = delay if isinstance(delay, Mapping) else {} if delay is None else {"": delay}
+    needed = "[AXIS=]VALUE is needed, such as Z='4.2 ms'"
+    values = {"": delay} if isinstance(delay, int | float) else pairs("delay", delay, needed, common=True)
     read_ones = by_name("delay", values, read)
     common = dict.fromkeys(moving_axes(program), read_ones.pop("")) if "" in read_ones else {}
     return common | read_ones

@@ -7,14 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from feedsim import cosim
 from feedsim.analysis import Figure, Named
 from feedsim.analysis.alignment import aligned
 from feedsim.analysis.side_by_side import Source, differing, named_apart, read_sources
 from feedsim.errors import InputError
-from feedsim.jobs.folder import File, kept
+from feedsim.jobs.folder import kept
+from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, job, out
 from feedsim.jobs.result import Result
 from feedsim.jobs.run import RunResult
 from feedsim.jobs.watch import NO_WATCH, Watch
@@ -28,23 +29,24 @@ Shown = str | Path | RunResult
 
 
 class Overlay(Result):
-    """Results and records over each other: what :func:`feedsim.show` returns.
+    """Results and records over each other: what :func:`feedsim.diff` returns.
 
     Attributes:
         names: of the results, in their order.
 
     >>> import feedsim as fs
-    >>> over: fs.Overlay = fs.show(fs.run("z_positioning.yaml"))
+    >>> over: fs.Overlay = fs.diff(fs.run("z_positioning.yaml"))
     >>> over.names
     ('Z positioning',)
     """
 
-    kind = "show"
+    kind = "diff"
 
     def __init__(self, results: Mapping[str, Shown]) -> None:
         """results: name -> a result, its folder, or a CSV file. Raises InputError: nothing, or what is no result."""
         if not results:
             raise InputError("nothing can be shown: no result is given")
+        self.place: Path | None = None  # where it was written
         self.names = tuple(results)
         # The report reads results from where they are written; those of a prompt are written for as long as this lives.
         self._folder = TemporaryFolder()
@@ -101,25 +103,32 @@ class Overlay(Result):
         return "\n".join([f"Overlay of {', '.join(self.names)}", *self.lines])
 
 
-def show(
-    *results: Shown,
-    out: File | None = None,
-    figures: Sequence[str] = (),
-    force: bool = False,
-    control: str = "",
+@job("what differs between results and records, for people")
+def diff(
+    *results: Annotated[
+        Shown, Argument("RESULT", "folder of feedsim run, CSV file with a column of time, or run of a study", many=True)
+    ],
+    out: Annotated[File | None, out("diff")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    control: ControlName = "",
     watch: Watch = NO_WATCH,
     **named: Shown,
 ) -> Overlay:
     """Lay results over each other.
 
-    Args:
-        results: what :func:`run` returned, folders of ``feedsim run``, CSV files with a time. A run of a study is named
-            by its folder and its number or what is least or largest: "results/z_stop:17",
-            "results/z_stop:max=Z.overshoot".
-        out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force, control: as of :meth:`Result.save`.
-        watch: who hears how far the job is.
-        named: results under names of your own; the others are called by their scenario or file.
+    Contours of circles, stops, following error, torque, speed, position and spectra, a table of figures with their
+    differences, and the parameters that differ. Sources are aligned by their setpoints, circles by the angle; the page
+    says how. A run of a study is FOLDER:17, FOLDER:min=FIGURE or FOLDER:max=FIGURE; it is made again.
+
+    Command line:
+        feedsim example xz_circle z_stop
+        feedsim run xz_circle.yaml --out results/as_is
+        feedsim run xz_circle.yaml --set machine.axes.Z.drive.K_v="5 (m/min)/mm" --out results/faster
+        feedsim diff results/as_is results/faster
+        feedsim diff results/as_is/result.csv record.csv --out results/against_record
+        feedsim sweep studies/z_stop.yaml
+        feedsim diff results/z_stop:min=Z.overshoot results/z_stop:max=Z.overshoot results/z_stop:17
 
     Raises:
         InputError: nothing, or what is no result.
@@ -128,7 +137,7 @@ def show(
     >>> import feedsim as fs
     >>> now = fs.run("z_positioning.yaml")
     >>> stiff = fs.run("z_positioning.yaml", set={"machine.axes.Z.drive.K_v": "5 (m/min)/mm"})
-    >>> over = fs.show(now=now, stiff=stiff)
+    >>> over = fs.diff(now=now, stiff=stiff)
     >>> over.parameters["machine.axes.Z.drive.K_v"]
     ('66.6666667 1/s', '83.3333333 1/s')
     """

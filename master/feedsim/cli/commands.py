@@ -1,0 +1,320 @@
+"""Which commands there are, and the parser that follows from the declarations of their jobs.
+
+May use: jobs/parameters, errors. Start reading at COMMANDS, then at add_options(), which makes the options of a command
+from the signature of its job.
+"""
+
+from __future__ import annotations
+
+import argparse
+from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from feedsim.errors import InputError, no_such_file
+from feedsim.jobs.parameters import Argument, Declaration, Option, Parameter, declaration
+
+PACKAGE = Path(__file__).resolve().parents[1]
+# What stands behind "feedsim" -> the function that does it, in the order of --help.
+COMMANDS = {
+    "example": "jobs.example:example",
+    "run": "jobs.run:run",
+    "check": "jobs.check:check",
+    "circle": "jobs.circle:circle",
+    "identify friction": "jobs.identify:identify_friction",
+    "identify drive": "jobs.identify_drive:identify_drive",
+    "identify modes": "jobs.identify_modes:identify_modes",
+    "replay": "jobs.replay:replay",
+    "frf": "jobs.frf:frf",
+    "tune drive": "jobs.tune_drive:tune_drive",
+    "tune compensation": "jobs.tune_compensation:tune_compensation",
+    "tune feedforward": "jobs.tune_feedforward:tune_feedforward",
+    "tune proposals": "jobs.tune_proposals:tune_proposals",
+    "diff": "jobs.diff:diff",
+    "compare": "jobs.compare:compare",
+    "export": "jobs.export:export",
+    "sweep": "jobs.sweep:sweep",
+    "machine build": "jobs.machine:machine_build",
+    "machine info": "jobs.machine:machine_info",
+    "machine view": "jobs.machine:machine_view",
+    "machine import": "jobs.machine_import:machine_import",
+    "machine export": "jobs.machine_export:machine_export",
+    "docs": "jobs.terminal:docs",
+    "tools schema": "jobs.schema:schema",
+    "tools convert": "jobs.convert:convert",
+    "tools completion": "jobs.terminal:completion",
+}
+GROUPS = {
+    "identify": "friction, drives or modes from records",
+    "tune": "values of a drive, or of a friction compensation",
+    "machine": "build and view a machine; import it from a control, export it",
+    "tools": "schemas of files, conversion of records, completion in shells",
+}
+# Names of version 0.2 -> words of today. They work for one version more.
+OLD_COMMANDS = {
+    "validate": "check",
+    "identify-drive": "identify drive",
+    "identify-modes": "identify modes",
+    "compensate": "tune feedforward",
+    "show": "diff",
+    "pack": "export",
+    "ssp": "export",
+    "page": "export",
+    "machine pack": "export --plant",
+    "machine show": "machine view",
+    "schema": "tools schema",
+    "convert": "tools convert",
+    "completion": "tools completion",
+}
+OLD_OPTIONS = {"--axis": "--axes"}
+# What every command takes besides the parameters of its job.
+COMMON = {
+    "quiet": Option("", "print warnings and errors alone", short="-q"),
+    "verbose": Option("", "print all figures, too", short="-v"),
+    "json": Option("", "print the result as JSON, and nothing else"),
+    "strict": Option("", "end with status 1 where a finding is WRONG"),
+    "color": Option("WHEN", "auto, always or never (default: auto)", choices=("auto", "always", "never")),
+}
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: what stands behind "feedsim", such as "machine info", and where its job is."""
+
+    name: str
+    home: str
+
+    @cached_property
+    def declared(self) -> Declaration:
+        """The job as its source declares it."""
+        module, _, function = self.home.partition(":")
+        return declaration(PACKAGE / f"{module.replace('.', '/')}.py", function)
+
+    @property
+    def options(self) -> list[Parameter]:
+        """Parameters of the job that the command line has."""
+        return [parameter for parameter in self.declared.parameters if parameter.option is not None]
+
+    def job(self) -> Any:
+        """The function itself."""
+        module, _, function = self.home.partition(":")
+        return getattr(import_module(f"feedsim.{module}"), function)
+
+    def missing_file(self, options: Namespace) -> str:
+        """A sentence on the first file that is named and is not there; "" where all are."""
+        for parameter in self.options:
+            if "File" not in parameter.type or "Mapping" in parameter.type or (parameter.option or Option()).writes:
+                continue
+            value = getattr(options, parameter.name, None)
+            for path in value if isinstance(value, list) else [value]:
+                if path is not None and not path.exists():
+                    typed = f"{parameter.typed}: " if parameter.typed else ""
+                    return typed + no_such_file(path)
+        return ""
+
+    def default_out(self, options: Namespace) -> Path | None:
+        """Where the result goes if nobody says so: below results/, by the names of what it is made of."""
+        option = next((p.option for p in self.options if p.name == "out"), None)
+        if option is None or not option.default:
+            return None
+        values = {name: _stem(value) for name, value in vars(options).items()}
+        return Path("results") / option.default.format_map(_Open(values))
+
+
+class _Open(dict[str, str]):
+    """Names that are not known stay as they are: the axis that a record is of is found by the job."""
+
+    def __missing__(self, name: str) -> str:
+        return f"{{{name}}}"
+
+
+def _stem(value: Any) -> str:
+    first = value[0] if isinstance(value, list) and value else value
+    path = Path(str(first))
+    return path.resolve().name if path.is_dir() else path.stem
+
+
+@cache
+def commands() -> tuple[Command, ...]:
+    """All of them."""
+    return tuple(Command(name, home) for name, home in COMMANDS.items())
+
+
+def by_name(name: str) -> Command:
+    """The command of that name."""
+    return next(command for command in commands() if command.name == name)
+
+
+def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Words of the command line in names of today, and a sentence on every name that was another one."""
+    result, notes = [*words], []
+    plain = next((k for k, word in enumerate(result) if not word.startswith("-")), len(result))
+    first, pair = " ".join(result[plain : plain + 1]), " ".join(result[plain : plain + 2])
+    old = pair if pair in OLD_COMMANDS else first if first in OLD_COMMANDS else ""
+    if old:
+        result[plain : plain + len(old.split())] = OLD_COMMANDS[old].split()
+        notes.append(f"feedsim {old} is called feedsim {OLD_COMMANDS[old]}")
+    elif first == "run" and "--try" in result:
+        result.remove("--try")
+        result[plain : plain + 1] = ["tune", "proposals"]
+        notes.append("feedsim run --try is called feedsim tune proposals")
+    elif first == "identify" and result[plain + 1 :] and result[plain + 1] not in _below("identify") | {"-h", "--help"}:
+        result.insert(plain + 1, "friction")
+        notes.append("feedsim identify is called feedsim identify friction")
+    for k, word in enumerate(result):
+        name, equals, value = word.partition("=")
+        if name in OLD_OPTIONS:
+            result[k] = OLD_OPTIONS[name] + equals + value
+            notes.append(f"the option {name} is called {OLD_OPTIONS[name]}")
+    return result, [f"{note} now; the old name goes with the next version" for note in dict.fromkeys(notes)]
+
+
+def _below(group: str) -> set[str]:
+    return {name.split()[1] for name in COMMANDS if name.startswith(f"{group} ")}
+
+
+def add_commands(top: argparse.ArgumentParser, only: str = "") -> None:
+    """Add the commands to the parser; where `only` is the first word of some, their options alone are read."""
+    places: dict[str, Any] = {"": top.add_subparsers(dest="command", metavar="COMMAND")}
+    chosen = [command for command in commands() if command.name.split()[0] == only] or commands()
+    for command in chosen:
+        group, _, name = command.name.rpartition(" ")
+        if group not in places:
+            parser = places[""].add_parser(group, help=GROUPS[group], description=f"{_capital(GROUPS[group])}.")
+            places[group] = parser.add_subparsers(dest=f"{group}_command", metavar="COMMAND", required=True)
+        declared = command.declared
+        parser = places[group].add_parser(
+            name,
+            help=declared.help,
+            description=declared.description,
+            epilog=f"examples:\n{_indented(declared.examples)}" if declared.examples else None,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        add_options(parser, command)
+        parser.set_defaults(chosen=command, called=f"feedsim {command.name}")
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def _indented(text: str) -> str:
+    return "\n".join(f"  {line}" if line else "" for line in text.splitlines())
+
+
+def add_options(parser: argparse.ArgumentParser, command: Command) -> None:
+    """The options of a command from the signature of its job, and those that all commands have."""
+    groups: dict[str, Any] = {"": parser}
+    for parameter in command.options:
+        assert parameter.option is not None
+        if parameter.option.group not in groups:
+            groups[parameter.option.group] = parser.add_argument_group(parameter.option.group)
+        flags, words = _words(parameter, parameter.option)
+        action = groups[parameter.option.group].add_argument(*flags, **words)
+        if parameter.option.complete:
+            action.completer = _completer(parameter.option.complete)
+    common = parser.add_argument_group("every command")
+    taken = {parameter.name for parameter in command.options}
+    for name, option in COMMON.items():
+        if name not in taken:
+            flags, words = _words(Parameter(name, "", option, ""), option)
+            words["default"] = "auto" if option.value else False
+            common.add_argument(*flags, **words)
+
+
+def _completer(home: str) -> Callable[..., list[str]]:
+    """What argcomplete asks for the values that a shell offers."""
+
+    def values(**given: object) -> list[str]:
+        module, _, function = home.partition(":")
+        return list(getattr(import_module(f"feedsim.{module}"), function)())
+
+    return values
+
+
+def _words(parameter: Parameter, option: Option) -> tuple[list[str], dict[str, Any]]:
+    """What argparse takes for a parameter."""
+    words: dict[str, Any] = {"help": option.help.replace("%", "%%")}
+    if option.value:
+        words["metavar"] = option.value
+    if option.choices:
+        words["choices"] = option.choices
+    if ("File" in parameter.type and "Mapping" not in parameter.type) or parameter.name == "out":
+        words["type"] = _path
+    elif parameter.name == "figures":
+        words["type"] = _kinds
+    elif "int" in parameter.type.split(" | ") and "str" not in parameter.type:
+        words["type"] = int
+    else:
+        words["type"] = _text
+    # What is not typed is not handed over: the defaults are those of the job.
+    words["default"] = argparse.SUPPRESS
+    needed = parameter.default is None
+    if isinstance(option, Argument):
+        if option.many:
+            words["nargs"] = "+" if needed else "*"
+        elif not needed:
+            words["nargs"] = "?"
+        return [parameter.name], words
+    words |= {"dest": parameter.name, "required": needed or (parameter.name == "out" and not option.default)}
+    if not option.value and not option.choices:
+        del words["type"]
+        words["action"] = BooleanOptionalAction if parameter.default == "True" else "store_true"
+    elif option.several:
+        words |= {"nargs": "+", "action": "extend"}
+    elif option.many:
+        words["action"] = "append"
+    return [*([option.short] if option.short else []), parameter.typed], words
+
+
+def _kinds(text: str) -> tuple[str, ...]:
+    """Kinds of files of figures."""
+    from feedsim.arguments import listed
+    from feedsim.report.picture import PICTURE_FORMATS
+
+    asked = listed(text)
+    if not asked or any(kind not in PICTURE_FORMATS for kind in asked):
+        raise ArgumentTypeError(f"{text!r}: of {', '.join(PICTURE_FORMATS)}, one or several, with commas between them")
+    return tuple(dict.fromkeys(asked))
+
+
+def _path(text: str) -> Path:
+    if not text:
+        raise ArgumentTypeError("a name is needed, not an empty text; '.' is the working directory")
+    return Path(text)
+
+
+def _text(text: str) -> str:
+    """What was typed, also under a locale of few characters, such as C: it is taken for UTF-8 there."""
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8")
+    except UnicodeDecodeError:
+        raise ArgumentTypeError("not UTF-8") from None
+
+
+def arguments(command: Command, options: Namespace) -> dict[str, Any]:
+    """Parameter -> value for the job, of what was typed."""
+    typed = vars(options)
+    result = {parameter.name: typed[parameter.name] for parameter in command.options if parameter.name in typed}
+    if "out" not in result and (place := command.default_out(options)) is not None:
+        result["out"] = place
+    return result
+
+
+def given_files(command: Command, options: Namespace) -> Iterator[tuple[str, Any]]:
+    """Arguments of a command that name files: ("", value), and the value of --machine: ("--machine", value)."""
+    for parameter in command.options:
+        if isinstance(parameter.option, Argument):
+            yield "", getattr(options, parameter.name, None)
+        elif parameter.name == "machine":
+            yield "--machine", getattr(options, parameter.name, None)
+
+
+def refuse_missing_files(command: Command, options: Namespace) -> None:
+    """Raise InputError for a file that is named and is not there: before any library is loaded that would read it."""
+    if sentence := command.missing_file(options):
+        raise InputError(sentence)

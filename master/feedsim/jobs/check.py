@@ -1,0 +1,165 @@
+"""A scenario, an SSP or a study, checked without a step of it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from feedsim import analysis, judge
+from feedsim.arguments import settings, spelt
+from feedsim.errors import InputError
+from feedsim.files.source import is_study
+from feedsim.findings import severity
+from feedsim.jobs.parameters import Archives, Argument, File, Option, Settings, job
+from feedsim.jobs.subject import opened
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
+from feedsim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from feedsim.scenario.study import Study
+    from feedsim.sweep import Design
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What can be said of a valid scenario or study before it is run. A faulty one raises InputError instead.
+
+    Attributes:
+        answers: that it is valid, and what it holds.
+        findings: what a user should know before running it, a sentence each.
+    """
+
+    answers: Sequence[str]
+    findings: Sequence[str] = ()
+    kind: ClassVar[str] = "check"
+
+    def __repr__(self) -> str:
+        wrong = [finding for finding in self.findings if severity(finding) != "note"]
+        warned = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
+        return "; ".join([*self.answers, *warned])
+
+
+@job("check a scenario, SSP or study without running it")
+def check(
+    scenario: Annotated[
+        File | Scenario,
+        Argument("SCENARIO", "scenario file (docs/scenarios.md), SSP (docs/ssp.md) or study (docs/sweeps.md)"),
+    ],
+    *,
+    set: Settings = None,
+    runs: Annotated[int | None, Option("N", "of a study: in place of its sampling.runs")] = None,
+    trial: Annotated[bool, Option("", "of a study: make some runs, which show how long all will take")] = False,
+    row: Annotated[int | None, Option("RUN", "of a study: print the command that makes this one run by itself")] = None,
+    fmus: Archives = None,
+    watch: Watch = NO_WATCH,
+) -> Checked:
+    """Check a scenario, an SSP or a study, its machine and its motion without running it.
+
+    The shipped units judge their parameters. No program of another maker is executed; a finding says what is therefore
+    not checked.
+
+    Command line:
+        feedsim example xz_circle z_stop
+        feedsim check xz_circle.yaml
+        feedsim check studies/z_stop.yaml --trial
+        feedsim check studies/z_stop.yaml --row 17
+
+    Raises:
+        InputError: lists what is wrong, with file and line.
+
+    >>> import feedsim as fs
+    >>> fs.check("xz_circle.yaml")
+    xz_circle.yaml: valid; 2 motions, 11.98 s on Test centre
+    """
+    if not isinstance(scenario, Scenario) and is_study(Path(scenario)):
+        return _study(Path(scenario), settings(set), runs, trial, row, None if fmus is None else Path(fmus), watch)
+    for name, value in (("runs", runs), ("trial", trial or None), ("row", row)):
+        if value is not None:
+            raise InputError(f"{spelt(name)} {value}: is for a study; {scenario} is none")
+    with opened(scenario, set, fmus) as subject:
+        plan, program = subject.plan, subject.program
+        analysis.check(plan, program)
+        warnings = subject.warnings(judge.check(plan, program, fmus=subject.fmus))
+    shown = plan.name if isinstance(scenario, Scenario) else scenario
+    motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
+    apart = (
+        " as far as no other maker's program has a say"
+        if any(": not checked: " in warning for warning in warnings)
+        else ""
+    )
+    return Checked([f"{shown}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"], warnings)
+
+
+def _study(
+    file: Path, changes: list[str], runs: int | None, trial: bool, row: int | None, fmus: Path | None, watch: Watch
+) -> Checked:
+    """A study, its scenario, and a run from the middle; with `trial` some that are made; or the command of one run."""
+    from feedsim.scenario.study import load_study
+    from feedsim.sweep import design
+    from feedsim.sweep import trial as trials
+
+    study = load_study(file, changes, runs=runs)
+    planned = design(study)
+    if row is not None:
+        return Checked([_command(study, planned, row, fmus)], study.warnings)
+    run, warnings, failed = trials.check(study, planned, fmus)
+    refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
+    valid = Checked([f"{file}: valid; {planned.runs} runs of {study.scenario}"], (*study.warnings, *refused, *warnings))
+    if not trial:
+        return valid
+    announce(watch, study.base.scenario.machine, fmus, study.base.scenario.coupling)
+    tried = _trial(study, planned, fmus)
+    return Checked([*valid.answers, *tried.answers], [*dict.fromkeys((*valid.findings, *tried.findings))])
+
+
+def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
+    """The command that makes one run of a study: the same figures, bit for bit."""
+    if not 0 <= row < planned.runs:
+        raise InputError(f"{spelt('row')} {row} is outside the allowed range: from 0 to {planned.runs - 1}")
+    words = ["feedsim", "run", str(study.scenario)]
+    words += ["--fmus", str(fmus)] if fmus is not None else []
+    for option in (*study.settings, *study.overrides, *planned.options(row)):
+        words += ["--set", option]
+    return shlex.join([*words, "--out", str(Path("results") / f"{study.file.stem}_{row}")])
+
+
+def _trial(study: Study, planned: Design, fmus: Path | None) -> Checked:
+    """What the study is, and how long it would take by the durations of some runs."""
+    from feedsim.sweep.table import chosen
+    from feedsim.sweep.trial import trial
+
+    lines = [f"{study.name}: {planned.runs} runs ({study.sampling.method}) of {study.scenario}"]
+    for i, parameter in enumerate(planned.parameters):
+        column = planned.values[:, i]
+        if parameter.worded:
+            values = ", ".join(choice.label for choice in parameter.choices)
+        else:
+            values = f"{column.min():.6g} to {column.max():.6g} {parameter.unit}".removesuffix(" 1")
+        times = "factor " if parameter.factor else ""
+        lines.append(f"  {parameter.name}: {times}{values} ({', '.join(parameter.keys)})")
+    result = trial(study, planned, fmus)
+    lines.append(f"  figures: {', '.join(chosen(result.figures, study.figures))}")
+    if result.failed:
+        lines.append(f"  {len(result.failed)} of the {result.tried} runs tried fail")
+    least, most = result.seconds
+    which = f"run{'s'[: len(result.runs) != 1]} {', '.join(map(str, result.runs))}"
+    lines.append(
+        f"  {which} took {_range(least, most, '{:.2g} s'.format)}; all together about "
+        f"{_range(least * planned.runs, most * planned.runs, _duration)} on one core"
+    )
+    return Checked(lines, [f"run {run} fails: {why}" for run, why in result.failed.items()])
+
+
+def _range(least: float, most: float, shown: Callable[[float], str]) -> str:
+    low, high = shown(least), shown(most)
+    return low if low == high else f"{low} to {high}"
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("h", 3600), ("min", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"

@@ -1,0 +1,234 @@
+"""How a job declares its parameters: one annotation a parameter, from which all else follows.
+
+The annotation of a parameter says what its option on the command line is called, what its value is called, what it is
+for and which values it may have. Parser, ``--help``, completion, the page of the reference and the section of arguments
+of the docstring follow from it. May use: arguments. Start reading at Option, then at the signature of a job, such as
+circle().
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from feedsim.arguments import Changes
+
+F = TypeVar("F", bound=Callable[..., Any])
+File = str | Path
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a command, and the parameter of a job.
+
+    Attributes:
+        value: what its value is called; "": a switch.
+        help: what it is for, with the default where that is not the parameter's own.
+        choices: that there are; none: any text.
+        many: it may be given several times. several: with several values behind it, too.
+        typed: how it is typed, where that is not the parameter's name.
+        short: a short form, such as "-o".
+        complete: the function that lists what a shell may offer, as "module:function".
+        group: the title that the help lists it under.
+        writes: its value is a file or folder that the job makes.
+        default: of the command line alone, a name of a file with the names of other parameters, "circle_{records}".
+    """
+
+    value: str = ""
+    help: str = ""
+    choices: Sequence[str] = ()
+    many: bool = False
+    several: bool = False
+    typed: str = ""
+    short: str = ""
+    complete: str = ""
+    group: str = ""
+    writes: bool = False
+    default: str = ""
+
+
+@dataclass(frozen=True)
+class Argument(Option):
+    """A parameter that has no name on the command line."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a job: name, type as text, option (None: Python alone has it), default as text (None: needed)."""
+
+    name: str
+    type: str
+    option: Option | None
+    default: str | None
+
+    @property
+    def typed(self) -> str:
+        """How it is typed on the command line; "" of an argument."""
+        assert self.option is not None
+        return "" if isinstance(self.option, Argument) else self.option.typed or f"--{self.name.replace('_', '-')}"
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """A job as its source declares it.
+
+    help: a few words, for the list of commands. description, examples: of its docstring. needs: extras without which it
+    is not begun.
+    """
+
+    name: str
+    help: str
+    needs: Sequence[str]
+    description: str
+    examples: str
+    parameters: Sequence[Parameter]
+
+
+Archives = Annotated[
+    File | None,
+    Option("DIR", "folder of the units' archives (default: $FEEDSIM_FMUS, else those that come along)"),
+]
+Settings = Annotated[
+    Changes,
+    Option(
+        "KEY=VALUE",
+        "override one entry of the file, such as machine.axes.Z.friction.F_C='1.8 N.m', or the entries of a YAML file "
+        "with a group set; may be given several times",
+        many=True,
+    ),
+]
+FigureKinds = Annotated[Sequence[str], Option("png,svg", "draw the figures as files, too, into the folder figures")]
+Force = Annotated[
+    bool, Option("", "replace files that feedsim did not write, and results of another kind; never an input")
+]
+CONTROL_CHOICES = ("sinumerik", "twincat", "heidenhain", "linuxcnc")
+ControlName = Annotated[
+    str,
+    Option(
+        "NAME",
+        f"show parameters in the names and units of a control, too: {', '.join(CONTROL_CHOICES)} (default: the "
+        "one that the machine file names)",
+        choices=CONTROL_CHOICES,
+    ),
+]
+Draws = Annotated[
+    int,
+    Option(
+        "N",
+        "draws of the machine from the intervals of its identified values, 19 or more (39 hold 95 %): figures get "
+        "intervals, curves bands; tuning judges its values on them; 0: none",
+    ),
+]
+Base = Annotated[File | None, Option("UNIT.fmu", "archive whose binaries are taken (default: that of --fmus)")]
+NamesOfAxes = Annotated[str | Sequence[str] | None, Option("A,B", "names of axes with commas between them")]
+
+
+def out(default: str) -> Option:
+    """The option for the folder of a result. default: below results/, where a command does not name one."""
+    return Option(
+        "DIR", f"where the result goes (default: results/{_shown(default)})", short="-o", writes=True, default=default
+    )
+
+
+def out_file(value: str, help: str) -> Option:
+    """The option for a file that a job makes."""
+    return Option(value, help, short="-o", writes=True)
+
+
+def _shown(template: str) -> str:
+    """A name of a folder as the help shows it: "circle_{records}" is circle_RECORDS."""
+    return template.replace("{", "<").replace("}", ">")
+
+
+def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
+    """Mark a function as a job; its docstring gets the section of arguments from the annotations.
+
+    help, needs: as of :class:`Declaration`.
+    """
+
+    def documented(function: F) -> F:
+        lines = [_argument_line(entry) for entry in _parameters(inspect.signature(function))]
+        summary, *rest = inspect.cleandoc(function.__doc__ or "").split("\n\n")
+        sections = [text for text in rest if not text.startswith("Command line:")]
+        at = next((i for i, text in enumerate(sections) if text.startswith(("Raises", ">>>"))), len(sections))
+        sections.insert(at, "Args:\n" + "\n".join(lines))
+        function.__doc__ = "\n\n".join([summary, *sections])
+        return function
+
+    return documented
+
+
+def _parameters(signature: inspect.Signature) -> list[Parameter]:
+    return [
+        Parameter(name, *read_annotation(str(entry.annotation)), None)
+        for name, entry in signature.parameters.items()
+    ]  # fmt: skip
+
+
+def _argument_line(entry: Parameter) -> str:
+    if entry.option is None:
+        return (
+            f"    {entry.name}: who hears how far the job is."
+            if entry.name == "watch"
+            else f"    {entry.name}: {entry.type}"
+        )
+    choices = f"; {', '.join(entry.option.choices)}" if entry.option.choices and not entry.option.value else ""
+    amount = "; a number in SI units, or a text with a unit" if "Value" in entry.type else ""
+    words = f"{entry.name}: {entry.option.help}{choices}{amount}."
+    return textwrap.fill(words, 110, initial_indent="    ", subsequent_indent="        ")
+
+
+def read_annotation(text: str) -> tuple[str, Option | None]:
+    """Type and option of an annotation, given as text; of a name of this module, such as Archives, what that is."""
+    node = ast.parse(text, mode="eval").body
+    if isinstance(node, ast.Name) and node.id in globals():
+        parts = get_args(globals()[node.id])
+        return (node.id, None) if len(parts) < 2 or not isinstance(parts[1], Option) else (str(parts[0]), parts[1])
+    if not (isinstance(node, ast.Subscript) and ast.unparse(node.value) == "Annotated"):
+        return text, None
+    assert isinstance(node.slice, ast.Tuple)
+    kind, option = node.slice.elts
+    return ast.unparse(kind), eval(compile(ast.Expression(option), text, "eval"), globals())
+
+
+def _text(node: ast.expr | None) -> str | None:
+    return None if node is None else ast.unparse(node)
+
+
+def declaration(file: Path, name: str) -> Declaration:
+    """The job `name` as the file declares it; nothing of the file is executed, so that no library is loaded for it."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    node = [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == name][-1]  # behind its overloads
+    mark = next(d for d in node.decorator_list if isinstance(d, ast.Call) and ast.unparse(d.func) == "job")
+    words: Mapping[str, Any] = {key.arg or "": ast.literal_eval(key.value) for key in mark.keywords}
+    sections = (ast.get_docstring(node) or "").split("\n\n")
+    ends = next(
+        (i for i, text in enumerate(sections) if text.startswith(("Command line:", "Raises", ">>>"))), len(sections)
+    )
+    examples = next((text for text in sections if text.startswith("Command line:")), "")
+    arguments = [*node.args.args, *node.args.kwonlyargs]
+    defaults: list[ast.expr | None] = [None] * (len(node.args.args) - len(node.args.defaults))
+    defaults += [*node.args.defaults, *node.args.kw_defaults]
+    parameters = [
+        Parameter(
+            a.arg, *read_annotation(ast.unparse(a.annotation) if a.annotation else ""), ast.unparse(d) if d else None
+        )
+        for a, d in zip(arguments, defaults, strict=True)
+    ]
+    if node.args.vararg is not None and node.args.vararg.annotation is not None:
+        several = node.args.vararg
+        kind, option = read_annotation(ast.unparse(several.annotation or ast.Constant("")))
+        parameters.insert(0, Parameter(several.arg, f"*{kind}", option, None))
+    return Declaration(
+        name,
+        ast.literal_eval(mark.args[0]),
+        words.get("needs", ("run",)),
+        "\n\n".join(sections[:ends]),
+        textwrap.dedent(examples.partition("\n")[2]),
+        parameters,
+    )

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import json
 import shutil
 import subprocess
+import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +19,10 @@ from command_helpers import feedsim, feedsim_process
 from feedsim.cli import COMMANDS
 from feedsim.cli.completion import SHELLS, places
 from feedsim.cli.kinds import INPUT_KINDS, kind
-from feedsim.cli.terminal import painted
+from feedsim.cli.terminal import Painted, painted, shown_streams
 
 ROOT = Path(__file__).resolve().parents[2]
+CENTRE = ROOT / "scenarios" / "machines" / "test_centre"
 
 
 @pytest.fixture(scope="module")
@@ -195,3 +200,34 @@ def _offered(shell: str, script: Path, words: list[str], folder: Path) -> str:
         return "\n".join(line for line in done.stdout.splitlines() if line.startswith(words[-1]))
     code = ASKED[shell].format(**values, line=" ".join(words))
     return subprocess.run([shell, "-c", code], capture_output=True, text=True, cwd=folder, check=True).stdout
+
+
+HOSTILE = "a\x1b]0;pwned\x07\x1b[31mred\x9b2J\u202eb\rc"
+
+
+def test_no_text_of_a_file_moves_the_terminal(fmus: Path, tmp_path: Path) -> None:
+    """Of a scenario's name, of a file's name, in output and in errors."""
+    (tmp_path / "esc.yaml").write_text(f"name: {json.dumps(HOSTILE)}\nmachine: {CENTRE}\n"
+                                       "motions:\n  - {kind: dwell, duration: 0.05 s}\n")  # fmt: skip
+    done = [
+        feedsim("run", "esc.yaml", "--out", "o", fmus=fmus, cwd=tmp_path),
+        feedsim("run", f"{HOSTILE}.yaml", fmus=fmus, cwd=tmp_path),
+        feedsim("run", "esc.yaml", f"--{HOSTILE}", fmus=fmus, cwd=tmp_path),
+    ]
+    assert [each.returncode for each in done] == [0, 2, 2]
+    for each in done:
+        assert "\\x1b" in each.stdout + each.stderr
+        assert not any(c in each.stdout + each.stderr for c in "\x1b\x07\x9b\u202e\r")
+
+
+def test_a_traceback_and_colours_of_our_own() -> None:
+    stream = Terminal()
+    with contextlib.redirect_stderr(stream), shown_streams():
+        try:
+            raise ValueError(HOSTILE)
+        except ValueError:
+            traceback.print_exc()
+        print(Painted("\x1b[31mwrong\x1b[0m"), file=sys.stderr)
+    assert "\x1b]" not in stream.getvalue()
+    assert "\\u202e" in stream.getvalue()
+    assert "\x1b[31mwrong\x1b[0m" in stream.getvalue()

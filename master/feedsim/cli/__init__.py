@@ -42,7 +42,7 @@ from feedsim.cli import (
 from feedsim.cli.grammar import Parser
 from feedsim.cli.kinds import meant
 from feedsim.cli.start import START_TEXT
-from feedsim.cli.terminal import painted, prepare_streams
+from feedsim.cli.terminal import painted, prepare_streams, shown_streams
 from feedsim.owned import remove_orphans
 
 EPILOG = """exit codes:
@@ -115,6 +115,11 @@ class _Version(argparse.Action):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    with shown_streams():
+        return _main(arguments)
+
+
+def _main(arguments: Sequence[str] | None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     options = parser(given[0] if given else "").parse_args(given)
     if options.command is None:

@@ -50,7 +50,7 @@ def opened(name: str, data: bytes, path: PurePath | None = None, include: Includ
             archive = Archive(name, control, form, text, encoding, container=bool(BINARY.search(text)))
             archive.path = path or PurePath(name)
             parse(archive, include)
-            if archive.entries or any(each.entries for each in archive.included.values()):
+            if archive.entries or any(inner.entries for inner in archive.included.values()):
                 return archive
             if archive.in_programs:
                 entry = archive.in_programs[0]
@@ -124,10 +124,10 @@ def _xti(archive: Archive, _: Include | None) -> None:
 def _without_comments(archive: Archive) -> str:
     """The text of an XML file, blanks in place of comments and of what is no markup; one without an end goes on."""
     text, parts, at = archive.text, [], 0
-    for start in (found.start() for found in re.finditer("<!", text)):
+    for start in (mark.start() for mark in re.finditer("<!", text)):
         if start < at:
             continue
-        opening = next((mark for mark in ("<!--", "<![CDATA[") if text.startswith(mark, start)), "")
+        opening = next((words for words in ("<!--", "<![CDATA[") if text.startswith(words, start)), "")
         if not opening:
             line = _LineNumbers(text).of(start)
             raise InputError(f"{archive.path}:{line}: declarations of XML (<!DOCTYPE) are not read; no .xti has them")

@@ -20,7 +20,7 @@ from feedsim.errors import InputError
 Include = Callable[[str], tuple[PurePath, bytes]]  # as #INCLUDE names a file -> its path and content
 MAX_INCLUDES = 100  # #INCLUDE lines, those of included files counted again each time
 _SECTION = re.compile(r"\[([^\[\]]*)\]")
-_KEY = re.compile(r"(?P<name>[A-Za-z_]\w*)[ \t]*=[ \t]*(?P<value>.*)$")
+_ASSIGNED = re.compile(r"(?P<name>[A-Za-z_]\w*)[ \t]*=[ \t]*(?P<value>.*)$")
 _COMMENT = re.compile(r"[ \t][#;]")
 MAX_JOINTS = 16  # of LinuxCNC (EMCMOT_MAX_JOINTS)
 _AXIS_LETTERS = "XYZABCUVW"
@@ -69,8 +69,8 @@ def parse(archive: Archive, include: Include | None) -> None:
             by_section.setdefault(one.section, []).append(one)
     for joint in joints:
         _of_joint(joint, archive.axis_names.get(joint, ""), by_section, first, old)
-    for each in (archive, *archive.included.values()):
-        each.entries.sort(key=lambda entry: entry.span)
+    for file in (archive, *archive.included.values()):
+        file.entries.sort(key=lambda entry: entry.span)
 
 
 class _Reader:
@@ -95,14 +95,14 @@ class _Reader:
                 self._section = head[1].strip().upper() if head else ""
                 if head is None:
                     archive.add_odd(number, line, "a section without its closing bracket")
-            elif (found := _KEY.match(bare)) and self._section:
-                at = start + len(line) - len(bare) + found.start("value")
-                comment = _COMMENT.search(" " + found["value"])
-                text = (found["value"][: comment.start()] if comment else found["value"]).rstrip()
+            elif (assigned := _ASSIGNED.match(bare)) and self._section:
+                at = start + len(line) - len(bare) + assigned.start("value")
+                comment = _COMMENT.search(" " + assigned["value"])
+                text = (assigned["value"][: comment.start()] if comment else assigned["value"]).rstrip()
                 if several:
                     archive.add_odd(number, line, "a value of several lines")
                 span = None if several else (at, at + len(text))
-                yield _Setting(archive, self._section, found["name"].upper(), text, number, span)
+                yield _Setting(archive, self._section, assigned["name"].upper(), text, number, span)
             else:
                 archive.add_odd(number, line, "no KEY = VALUE below a section")
 
@@ -121,7 +121,7 @@ class _Reader:
             except InputError as error:
                 raise InputError(f"{where}: {error}") from None
             # The same file by another name, ./a.inc of a.inc.
-            known = next((each for each in self._root.included.values() if each.path == path), None)
+            known = next((file for file in self._root.included.values() if file.path == path), None)
             if known is None:
                 text, encoding = decoded(data)
                 known = Archive(path.name, archive.control, archive.form, text, encoding, path=path)

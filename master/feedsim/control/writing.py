@@ -307,7 +307,7 @@ def _apply(written: Written, edits: Sequence[_Edit], archives: Sequence[Archive]
 
 def _read_again(archives: Sequence[Archive], contents: Mapping[str, bytes]) -> list[Archive]:
     """The files as they would be, those that others include behind them."""
-    inner = {id(each) for archive in archives for each in archive.included.values()}
+    inner = {id(file) for archive in archives for file in archive.included.values()}
     result: list[Archive] = []
     for archive in archives:
         if id(archive) not in inner:
@@ -316,7 +316,7 @@ def _read_again(archives: Sequence[Archive], contents: Mapping[str, bytes]) -> l
                 return included[word].path, contents.get(included[word].name, included[word].content)
 
             made = opened(archive.name, contents.get(archive.name, archive.content), archive.path, include)
-            result += [made, *{id(each): each for each in made.included.values()}.values()]
+            result += [made, *{id(file): file for file in made.included.values()}.values()]
     return result
 
 

@@ -161,7 +161,7 @@ def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
         if path.is_dir():
             raise InputError(f"{path} is a folder; name the files in it")
         archive = opened(path.name, content(path, MAX_FILE_BYTES), path, partial(_included, path.parent))
-        others = {id(each): each for each in archive.included.values()}
+        others = {id(file): file for file in archive.included.values()}
         archives += [archive, *others.values()]
     return archives
 

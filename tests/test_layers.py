@@ -45,6 +45,7 @@ ORDER = [
     "findings",
     "outputs",
     "owned",
+    "sheets",
     "cache",
     "called",
     "extras",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import json
 import os
 import shutil
 import subprocess
 import sys
+import traceback
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +18,10 @@ import pytest
 from command_helpers import feedsim, feedsim_process
 from feedsim.cli.commands import COMMANDS
 from feedsim.cli.kinds import INPUT_KINDS, kind
-from feedsim.cli.terminal import painted
+from feedsim.cli.terminal import Painted, painted, shown_streams
 
 ROOT = Path(__file__).resolve().parents[2]
+CENTRE = ROOT / "scenarios" / "machines" / "test_centre"
 
 
 @pytest.fixture(scope="module")
@@ -186,3 +190,34 @@ def test_the_script_of_a_shell_is_one(shell: str, fmus: Path, tmp_path: Path) ->
     assert (done.returncode, done.stderr) == (0, "")
     (tmp_path / "completion").write_text(done.stdout)
     subprocess.run([shell, "-n", tmp_path / "completion"], check=True)
+
+
+HOSTILE = "a\x1b]0;pwned\x07\x1b[31mred\x9b2J\u202eb\rc"
+
+
+def test_no_text_of_a_file_moves_the_terminal(fmus: Path, tmp_path: Path) -> None:
+    """Of a scenario's name, of a file's name, in output and in errors."""
+    (tmp_path / "esc.yaml").write_text(f"name: {json.dumps(HOSTILE)}\nmachine: {CENTRE}\n"
+                                       "motions:\n  - {kind: dwell, duration: 0.05 s}\n")  # fmt: skip
+    done = [
+        feedsim("run", "esc.yaml", "--out", "o", fmus=fmus, cwd=tmp_path),
+        feedsim("run", f"{HOSTILE}.yaml", fmus=fmus, cwd=tmp_path),
+        feedsim("run", "esc.yaml", f"--{HOSTILE}", fmus=fmus, cwd=tmp_path),
+    ]
+    assert [each.returncode for each in done] == [0, 2, 2]
+    for each in done:
+        assert "\\x1b" in each.stdout + each.stderr
+        assert not any(c in each.stdout + each.stderr for c in "\x1b\x07\x9b\u202e\r")
+
+
+def test_a_traceback_and_colours_of_our_own() -> None:
+    stream = Terminal()
+    with contextlib.redirect_stderr(stream), shown_streams():
+        try:
+            raise ValueError(HOSTILE)
+        except ValueError:
+            traceback.print_exc()
+        print(Painted("\x1b[31mwrong\x1b[0m"), file=sys.stderr)
+    assert "\x1b]" not in stream.getvalue()
+    assert "\\u202e" in stream.getvalue()
+    assert "\x1b[31mwrong\x1b[0m" in stream.getvalue()

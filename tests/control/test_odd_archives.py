@@ -15,6 +15,7 @@ from feedsim.control.formats import opened
 from feedsim.control.reading import Reading, read
 from feedsim.control.view import Value
 from feedsim.control.writing import changed
+from feedsim.errors import InputError
 
 LATIN = "; Sch\xe4rfe der Achsen, \xb5m\n"
 # Spaces, tabs, letters of either case, no blank behind the block number, several assignments in a line, values that are
@@ -243,3 +244,86 @@ def test_a_comparison_is_no_value() -> None:
     reading = read([opened("nc.tea", text.encode())], {"X": "AX1"})
     assert values_of(reading, "X") == {"max_acceleration": 2.0}
     assert [item.reason for item in reading.refused if item.name.number == "MD32200"] == ["below an IF"]
+
+
+DATA = "N32200 $MA_POSCTRL_GAIN[0,AX1]=5\nN32300 $MA_MAX_AX_ACCEL[0,AX1]=6\n"
+ASSIGNED = "N10 IF R1==7\nN20 $MA_MAX_AX_ACCEL[0,AX1]=4\nENDIF\n$MA_BACKLASH[0,AX1]=0.5\nRET\n"
+
+
+@pytest.mark.parametrize(
+    ("archive", "program"),
+    [
+        (
+            "%_N_NC_TEA\n;$PATH=/_N_NC_ACT_DIR\n{data}M17\n%_N_SLOW_SPF\n;$PATH=/_N_CMA_DIR\nPROC SLOW\n{program}",
+            "_N_SLOW_SPF",
+        ),
+        ("%_N_SLOW_SPF\n{program}M17\n%_N_INITIAL_INI\n{data}M17\n", "_N_SLOW_SPF"),
+        ("%_N_PART_MPF\n;$PATH=/_N_WKS_DIR/_N_PART_WPD\n{program}M30\n%_N_AX_TEA\n{data}", "_N_PART_MPF"),
+        ("%_N_MGUD_DEF\n{program}M17\n% _N_AX_TEA ; data\n{data}", "_N_MGUD_DEF"),
+        ("{data};$PATH=/_N_CST_DIR/_N_CYCLE_SPF\n{program}", "_N_CYCLE_SPF"),
+        ("{data}PROC SLOW(INT A)\n{program}", "SLOW"),
+        ("%MPF12\n{program}M30\n%_N_AX_TEA\n{data}", "%MPF12"),
+        ("\x02_N_AX_TEA\x00\n{data}\x00\x01/_N_CUS_DIR/\\CUS.DIR\\SLOW.SPF\x00\n{program}", "SLOW.SPF"),
+        ("\x02\\CMA.DIR\\_N_SLOW_SPF\x00\n{program}RET\x00\x03_N_AX_TEA\x00\n{data}", "SLOW.SPF"),
+        ("%_N_NC_TEA\n{data}%_N_NOTES_TXT\n{program}", "_N_NOTES_TXT"),
+    ],
+)  # fmt: skip
+def test_what_programs_set_is_no_value_of_an_archive(archive: str, program: str) -> None:
+    """Values of the machine data are taken all the same, and what only a program sets is refused with that reason."""
+    text = archive.format(data=DATA, program=ASSIGNED)
+    reading = read([opened("a.arc", text.encode())], {"X": "AX1"}, checked=["all"])
+    assert values_of(reading, "X") == {"drive.K_v": pytest.approx(5000 / 60), "max_acceleration": 6.0}
+    refused = {item.name.number: item.reason for item in reading.refused}
+    assert refused["MD32450"] == f"only the program {program} sets it, when it runs"
+    assert any("MD32300" in note and "set by programs" in note for note in reading.notes)
+
+
+def test_a_condition_that_only_a_program_sets_is_missing() -> None:
+    text = "%_N_AX_TEA\nN32610 $MA_VELO_FFW_WEIGHT[0,AX1]=0.9\n%_N_A_SPF\n$MA_FFW_MODE[AX1]=3\n"
+    refused = {item.name.number: item.reason for item in read([opened("a.arc", text.encode())], {"X": "AX1"}).refused}
+    assert refused["MD32610"].endswith("only the program _N_A_SPF sets it, when it runs")
+
+
+@pytest.mark.parametrize("name", ["slow.spf", "PART.MPF"])
+def test_a_program_by_itself_holds_no_machine_data(name: str) -> None:
+    with pytest.raises(InputError, match="only programs set machine data here"):
+        opened(name, ASSIGNED.encode())
+
+
+def test_a_value_below_an_if_is_not_taken_by_checking_units() -> None:
+    text = "IF R1==1\nN32200 $MA_POSCTRL_GAIN[0,AX1]=3\nENDIF\n"
+    (refused,) = read([opened("nc.tea", text.encode())], {"X": "AX1"}, checked=["all"]).refused
+    assert refused.reason == "below an IF"
+
+
+def test_axes_are_named_in_another_file_of_the_same_control() -> None:
+    names = opened("nc.tea", b'N10000 $MN_AXCONF_MACHAX_NAME_TAB[1]="Y1"\n')
+    data = opened("ax.tea", DATA.replace("AX1", "AX2").encode())
+    assert values_of(read([names, data], {"Y": "Y1"}), "Y")["max_acceleration"] == 6.0
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("p1656[0]=1.5", None), ("p1656[0]=-1", None), ("p1656[0]=1e999", None), ("p1656[0]='H1'", 455.0),
+    ],
+)  # fmt: skip
+def test_bits_are_those_of_a_whole_number(text: str, value: float | None) -> None:
+    reading = read([opened("d.tea", f"{text}\np1657=1\np1658=455\n".encode())], {"X": "X"}, places={"X": ["drive"]})
+    assert values_of(reading, "X").get("drive.filter_1.f") == value
+
+
+def test_a_point_that_may_group_thousands_is_refused() -> None:
+    table = "Parameter;Wert\np1460[0];1.250\np1462[0];12,5\np316[0];1.6\n"
+    reading = read([opened("p.csv", table.encode())], {"X": "p"})
+    assert values_of(reading, "X") == {"drive.K_t": pytest.approx(1.6 / 2**0.5)}
+    assert {item.name.number: item.reason for item in reading.refused} == {
+        "p1460": "the table has decimal commas, so that its point may group thousands", "p1462": "no number"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_the_unit_of_a_column_is_read_in_every_encoding(encoding: str) -> None:
+    table = "Paramètre;Valeur;Unité\np1462[0];5;s\np316[0];1.6;Nm/A\n"
+    (refused,) = read([opened("p.csv", table.encode(encoding))], {"X": "p"}).refused
+    assert refused.reason == "the file has it in 's', the table of names in ms"

@@ -124,6 +124,7 @@ def test_every_way_of_use(installed: Installation) -> None:
     run(
         "identify",
         "friction",
+        "friction",
         "constant/log.csv",
         "--axes",
         "Z",

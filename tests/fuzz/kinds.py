@@ -15,6 +15,7 @@ import numpy as np
 
 from feedsim import judge, scenario, ssp, trace
 from feedsim.analysis import check as check_evaluation
+from feedsim.control import formats, reading
 from feedsim.cosim.archive import Archive, folders
 from feedsim.cosim.roles import foreign
 from feedsim.errors import FeedsimError
@@ -88,6 +89,15 @@ def _poses(path: Path) -> None:
     read_cell(path, ("X", "spindle_2", "W"), {"X": 0.8, "spindle_2": 0.3, "W": 0.1})
 
 
+def read_control(path: Path) -> None:
+    """A file of a control, and the values of its first axis or list."""
+    archive = formats.opened(path.name, path.read_bytes(), path)
+    axes = [entry.axis for entry in archive.entries if entry.axis] or list(archive.places)
+    if axes:
+        with suppress(FeedsimError):
+            reading.read([archive], {"X": axes[0]}, checked=["all"])
+
+
 def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:
     """Every kind of file that feedsim reads, with files that can be read; made in `folder`."""
     from fmu.pose_file import Grid
@@ -146,9 +156,19 @@ def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:
         "matrix": Kind(".mtx", lambda path: market.read_matrix(path, "mass"), [matrix.encode(), dense.encode()]),
         "mesh": Kind(".inp", lambda path: list(calculix._cards(path)), [mesh.encode()]),
         "table": Kind(".csv", read_table, [table.encode()]),
+        "control": Kind(".arc", read_control, _controls()),
         "fmu": Kind(".fmu", _open_archive, _fmus(fmus)),
         "ssp": Kind(".ssp", _judge, [_ssp(folder, fmus)]),
     }
+
+
+def _controls() -> list[bytes]:
+    from control_helpers import DRIVE, INI, NC, TABLE
+
+    xti = '<TcSmItem><Axis><Name>X</Name><AxisPara><Velo Maximum="250"/></AxisPara></Axis></TcSmItem>'
+    programs = "%_N_SLOW_SPF\nPROC SLOW\nN20 $MA_MAX_AX_ACCEL[0,AX1]=4\nRET\n"
+    found = [NC + programs, NC + DRIVE, DRIVE, TABLE, INI, xti, "kopf.log_achs_name X\ngetriebe[0].kv 5000 # 0.01/s\n"]
+    return [text.encode() for text in found]
 
 
 def _mat() -> list[bytes]:

@@ -98,3 +98,40 @@ def test_another_reader_of_the_standard_agrees(exported: Path) -> None:
         with package.system_structure as structure:
             assert len(structure.system.elements) == 8
             assert len(structure.system.connections) == 24
+
+
+@pytest.mark.parametrize(
+    ("place", "source"),
+    [
+        ("resources/my friction.fmu", "resources/my%20friction.fmu"),
+        ("resources/my friction.fmu", "./resources/./my%20friction.fmu"),
+        ("resources/my friction.fmu", "resources/other/../my%20friction.fmu"),
+        ("resources/reibung_\xfc#1.fmu", "resources/reibung_%C3%BC%231.fmu"),
+        ("resources/100%.fmu", "resources/100%25.fmu"),
+        ("resources/as it is.fmu", "resources/as it is.fmu"),  # as some programs write it
+        ("resources/as%20it%20is.fmu", "resources/as%20it%20is.fmu"),
+    ],
+)
+def test_sources_are_uris(place: str, source: str, exported: Path, tmp_path: Path) -> None:
+    """Of units and of sets of parameters; the system is the same."""
+    files = {}
+    for name, content in ssp_helpers.contents(exported).items():
+        if name == STRUCTURE:
+            content = content.replace(b"resources/friction.fmu", source.encode())
+            content = content.replace(b"resources/plant.ssv", source.replace(".fmu", ".ssv").encode())
+        name = place if name == "resources/friction.fmu" else name
+        files[place.replace(".fmu", ".ssv") if name == "resources/plant.ssv" else name] = content
+    with ssp.opened(exported) as plain, ssp.opened(ssp_helpers.write(tmp_path / "uri.ssp", files)) as opened:
+        assert opened.scenario.machine.axes == plain.scenario.machine.axes
+
+
+@pytest.mark.parametrize("name", ["resources/my friction.fmu", "resources/reibung_\xfc#1?.fmu", "resources/100%25.fmu"])
+def test_names_are_written_as_uris(name: str) -> None:
+    from urllib.parse import unquote
+
+    from feedsim.ssp.archive import as_source, inside
+
+    source = as_source(name)
+    assert source.isascii()
+    assert not {" ", "#", "?"} & {*source}
+    assert unquote(source) == name == inside(source, {name})

@@ -24,7 +24,7 @@ from feedsim.cli.commands import Command, add_commands, arguments, given_files, 
 from feedsim.cli.grammar import Parser
 from feedsim.cli.kinds import meant
 from feedsim.cli.start import START_TEXT
-from feedsim.cli.terminal import choose_colour, finish, painted, prepare_streams, watching
+from feedsim.cli.terminal import choose_colour, finish, painted, prepare_streams, shown_streams, watching
 from feedsim.owned import remove_orphans
 
 EPILOG = """exit codes:
@@ -64,7 +64,12 @@ class _Version(argparse.Action):
 
 def main(arguments_given: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    words, notes = renamed(sys.argv[1:] if arguments_given is None else [*arguments_given])
+    with shown_streams():
+        return _main(sys.argv[1:] if arguments_given is None else [*arguments_given])
+
+
+def _main(given: Sequence[str]) -> int:
+    words, notes = renamed(given)
     options = parser(words[0] if words else "").parse_args(words)
     if options.command is None:
         print(START_TEXT, end="")

@@ -11,7 +11,8 @@ from argparse import Namespace
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
+from unicodedata import category
 
 from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.jobs.watch import Watch
@@ -35,17 +36,17 @@ class TerminalWatch(Watch):
         if what != self._what:
             self._what = what
             self._bar.reset(total)
-            self._bar.set_description(what, refresh=not before)
+            self._bar.set_description(visible(what), refresh=not before)
             if before:
                 self._bar.initial = self._bar.n = before
                 self._bar.refresh()
         if note:
-            self._bar.set_postfix_str(note, refresh=False)
+            self._bar.set_postfix_str(visible(note), refresh=False)
         self._bar.update(done - self._bar.n)
 
     def _aside(self) -> AbstractContextManager[Any]:
         """A block that prints beside the bar."""
-        return nullcontext() if self._bar is None else self._bar.external_write_mode(file=sys.stderr)
+        return nullcontext() if self._bar is None else self._bar.external_write_mode(file=_plain_error())
 
     def announce(self, sentence: str) -> None:
         """Whose programs the job executes."""
@@ -97,7 +98,13 @@ def prepare_streams() -> None:
             buffer = io.BufferedWriter(_Standard(number, "w", closefd=False))
             lines = number == 2 or stream is None or stream.line_buffering
             encoding = stream.encoding if stream is not None else "utf-8"
-            setattr(sys, name, io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=lines))
+            wrapper = io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=lines)
+            setattr(sys, name, Shown(wrapper))
+
+
+def _plain_error() -> Any:
+    """Standard error for a progress bar, which moves the cursor."""
+    return sys.stderr.stream if isinstance(sys.stderr, Shown) else sys.stderr
 
 
 @contextmanager
@@ -108,7 +115,7 @@ def watching(quiet: bool) -> Iterator[TerminalWatch]:
         return
     from tqdm import tqdm
 
-    with tqdm(unit_scale=True, leave=False) as bar:
+    with tqdm(unit_scale=True, leave=False, file=_plain_error()) as bar:
         yield TerminalWatch(bar, quiet)
 
 
@@ -121,9 +128,53 @@ def choose_colour(when: str) -> None:
     _WHEN["colour"] = when or "auto"
 
 
+class Painted(str):
+    """Text with the colours of this program, which Shown lets pass."""
+
+    def __str__(self) -> str:
+        return self
+
+
+class Shown:
+    """A stream that obeys no control character of what is printed to it: text comes from files of other people.
+
+    Line feeds and tabs stay. All that commands print goes through here, tracebacks included; tqdm writes past it.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        if not (isinstance(text, Painted) or text.isprintable()):
+            text = "\n".join("\t".join(map(visible, line.split("\t"))) for line in text.split("\n"))
+        return self.stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+@contextmanager
+def shown_streams() -> Iterator[None]:
+    """Standard output and error as Shown for the block; what they have become in it otherwise stays, such as None."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is not None and not isinstance(stream, Shown):
+            setattr(sys, name, Shown(stream))
+            try:
+                with shown_streams():
+                    yield
+            finally:
+                if isinstance(getattr(sys, name), Shown):
+                    setattr(sys, name, stream)
+            return
+    yield
+
+
 def visible(line: str) -> str:
     """As the terminal may show it: names come from files, and control characters in them are not obeyed."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in line)
+    return "".join(
+        c if c.isprintable() or category(c) == "Zs" else c.encode("unicode_escape").decode("ascii") for c in line
+    )
 
 
 def painted(text: str, colour: str, stream: Any) -> str:
@@ -132,7 +183,7 @@ def painted(text: str, colour: str, stream: Any) -> str:
     plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb" or not stream.isatty()
     if not colour or _WHEN["colour"] == "never" or (plain and _WHEN["colour"] == "auto"):
         return text
-    return f"\x1b[{COLOURS[colour]}m{text}\x1b[0m"
+    return Painted(f"\x1b[{COLOURS[colour]}m{text}\x1b[0m")
 
 
 def warn(warnings: Iterable[str]) -> None:

@@ -52,7 +52,7 @@ class Taken:
     def called(self) -> str:
         """Name of that parameter; of a condition also what does not act."""
         if not self.condition:
-            return self.name.name
+            return self.name.name.replace("[JOINT_n]", (self.entry and self.entry.section) or "[JOINT_n]")
         own = f"{self.entry.key}: " if self.entry and self.entry.key != self.number else ""
         return f"{own}{self.name.number} {self.name.name} does not act"
 
@@ -205,8 +205,8 @@ def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) ->
     if name.number.startswith("MD") and {entry.number, entry.key} - {"", name.number, name.key}:
         refuse(f"the file has {entry.number} {entry.key}, the table of names {name.number} {name.key}")
         return
-    if entry.doubt and name.number not in checked and ALL not in checked:
-        refuse(entry.doubt)
+    if doubt := entry.doubt or ("" if {name.number, ALL} & {*checked} else entry.unsure):
+        refuse(doubt)
         return
     try:
         raw = view.value(name.number) if "." in name.number and name.number[0] == "p" and not name.number.startswith(
@@ -223,6 +223,11 @@ def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) ->
         refuse(reason)
         return
     reading.taken.append(Taken(view.axis, name, value, entry, archive))
+    if sought.note:
+        reading.notes.append(f"{view.axis}: {name.number}: {sought.note}")
+    if programs := view.set_by_programs(name.key):
+        lines = ", ".join(f"{own.program} ({its.name}:{own.line})" for its, own in programs[:3])
+        reading.notes.append(f"{view.axis}: {name.number} {name.name} is also set by programs when they run: {lines}")
     reading.doubts += [
         f"{view.axis}: {name.number} {name.name} is taken, but {text}: it holds for a part of the range alone"
         for text in said.doubts

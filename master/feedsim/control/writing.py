@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from pathlib import PurePath
 
 from feedsim.control.archive import Archive, Entry, scalar
 from feedsim.control.conditions import shown, tied
@@ -117,6 +118,14 @@ def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, val
         return
     new, reason = _text(view, taken.name, taken.entry, ours)
     own = [entry for entry in view.entries(taken.name.key, taken.name.number) if (entry[1].index or 0) == 0]
+    if taken.entry.sense:  # of a limit that sections share those that would still be tighter
+        own = [
+            (archive, entry) for archive, entry in own
+            if entry is taken.entry
+            or entry.sense * taken.name.ours(float(scalar(entry.text)) * entry.scale) < entry.sense * float(ours)
+        ]  # fmt: skip
+    if not reason and any(entry.section == "[TRAJ]" for _, entry in own):
+        reason = "[TRAJ] limits all axes: type the value"
     if not reason and any(entry.checksum for _, entry in own):
         reason = "the line has a checksum; switch it off (MD11230 bit 0), or type the value"
     if not reason and any(archive.container for archive, _ in own):
@@ -124,7 +133,7 @@ def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, val
     if reason:
         written.changes.append(Change(taken.axis, taken.name, _old(taken), new, False, reason, taken.where))
         return
-    edits += [_Edit(archive, entry, new) for archive, entry in own]
+    edits += [_Edit(archive, entry, _text(view, taken.name, entry, ours)[0]) for archive, entry in own]
     also = []
     for other, right, sign in tied(taken.name.acts):
         if right != taken.name.key:
@@ -296,19 +305,32 @@ def _apply(written: Written, edits: Sequence[_Edit], archives: Sequence[Archive]
         written.contents[archive.name] = "".join([*text, archive.text[at:]]).encode(archive.encoding)
 
 
+def _read_again(archives: Sequence[Archive], contents: Mapping[str, bytes]) -> list[Archive]:
+    """The files as they would be, those that others include behind them."""
+    inner = {id(file) for archive in archives for file in archive.included.values()}
+    result: list[Archive] = []
+    for archive in archives:
+        if id(archive) not in inner:
+
+            def include(word: str, included: Mapping[str, Archive] = archive.included) -> tuple[PurePath, bytes]:
+                return included[word].path, contents.get(included[word].name, included[word].content)
+
+            made = opened(archive.name, contents.get(archive.name, archive.content), archive.path, include)
+            result += [made, *{id(file): file for file in made.included.values()}.values()]
+    return result
+
+
 def _check(
     result: Written, archives: Sequence[Archive], axes: Mapping[str, str],
     values: Mapping[str, Mapping[str, Value]], edits: Sequence[_Edit], how: Mapping[str, object],
 ) -> None:  # fmt: skip
     """Read what was made: every value is as it was, but the changed ones, which are as they should be."""
-    again = []
-    for archive in archives:
-        made = opened(archive.name, result.contents[archive.name]) if archive.name in result.contents else archive
+    again = _read_again(archives, result.contents)
+    for archive, made in zip(archives, again, strict=True):
         changed_ones = {id(edit.entry): edit.text for edit in edits if edit.archive is archive}
         wanted = [changed_ones.get(id(entry), entry.text) for entry in archive.entries]
         if [entry.text for entry in made.entries] != wanted or made.odd_count != archive.odd_count:
             raise InputError(f"{archive.name}: writing the values would change others; nothing was written")
-        again.append(made)
     now = {(entry.axis, entry.parameter): entry.value for entry in read(again, axes, **how).taken}  # type: ignore[arg-type]
     for change in result.changes:
         if change.written:

@@ -139,11 +139,11 @@ def machine_export(
     """
     paths = [Path(entry) for entry in ([like] if isinstance(like, str | Path) else like)]
     base = Path(machine)
-    names = [path.name for path in paths]
-    if twice := next((name for name in names if names.count(name) > 1), ""):
-        raise InputError(f"{spelt('like')}: two files are called {twice}; their copies stand in one folder")
     own = load_machine(base)
     archives = read_files(paths, watch)
+    names = [archive.name for archive in archives]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise InputError(f"{spelt('like')}: two files are called {twice}; their copies stand in one folder")
     if own.control and own.control != archives[0].control:
         raise InputError(f"{base}: is of the control {own.control}, the files are of {archives[0].control}")
     chosen = axes_of(axes, base, archives)
@@ -159,10 +159,11 @@ def machine_export(
         assume=assumed(assume),
         checked=listed(checked),
     )
-    result = MachineExportResult(archives, written, own, chosen, inputs_of(paths, base))
+    inputs = inputs_of(archives, base)
+    result = MachineExportResult(archives, written, own, chosen, inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
     with kept(out, lambda folder, inputs: page.check_writable(page.kept_apart(names), folder, inputs), watch,
-              inputs_of(paths, base), (), force=force):  # fmt: skip
+              inputs, (), force=force):  # fmt: skip
         if out is not None:
             result.save(out, force=force)
     return result

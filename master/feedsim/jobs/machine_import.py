@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import Pairs, listed, pairs, spelt
-from feedsim.control.archive import MAX_FILE_BYTES, Archive, scalar
+from feedsim.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
 from feedsim.control.formats import opened
 from feedsim.control.reading import Reading, read
 from feedsim.errors import InputError, no_such_file
@@ -165,23 +167,35 @@ def machine_import(
         checked=listed(checked),
     )
     made = imported(reading, base, name or paths[0].stem)
-    result = MachineImportResult(archives, reading, made, inputs_of(paths, base))
+    inputs = inputs_of(archives, base)
+    result = MachineImportResult(archives, reading, made, inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
-    with kept(out, MachineImportResult.check_place, watch, inputs_of(paths, base), (), force=force):
+    with kept(out, MachineImportResult.check_place, watch, inputs, (), force=force):
         if out is not None:
             result.save(out, force=force)
     return result
 
 
 def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
-    """The files of a control. InputError: of several controls, or of none."""
-    archives = []
+    """The files of a control, and those that they include. InputError: of several controls, or of none."""
+    archives: list[Archive] = []
     for k, path in enumerate(paths):
         watch.progress("reading", k, len(paths))
         if path.is_dir():
             raise InputError(f"{path} is a folder; name the files in it")
-        archives.append(opened(path.name, content(path, MAX_FILE_BYTES), path))
+        archive = opened(path.name, content(path, MAX_FILE_BYTES), path, partial(_included, path.parent))
+        others = {id(file): file for file in archive.included.values()}
+        archives += [archive, *others.values()]
     return archives
+
+
+def _included(folder: Path, word: str) -> tuple[Path, bytes]:
+    """Path and content of a file that an INI file in the folder names; LinuxCNC looks for it from that folder on."""
+    path = folder / os.path.expanduser(word)  # noqa: PTH111 - Path's ends in an exception where there is no such user
+    real = os.path.realpath(path)
+    if not Path(real).is_relative_to(os.path.realpath(folder)):
+        raise InputError(f"{real} is outside of the folder of the INI file, {folder}, and not read; copy it into there")
+    return Path(os.path.normpath(path)), content(path, MAX_INCLUDED_BYTES)
 
 
 def assumed(given: Names) -> Mapping[str, str]:
@@ -220,7 +234,7 @@ def axes_of(given: Names, machine: Path | None, archives: Sequence[Archive]) -> 
     return result
 
 
-def inputs_of(paths: Sequence[Path], machine: Path | None) -> list[Path]:
+def inputs_of(archives: Sequence[Archive], machine: Path | None) -> list[Path]:
     """Files of the control, and that of the machine."""
     own = [] if machine is None else [machine / Machine.IN_FOLDER if machine.is_dir() else machine]
-    return [*paths, *own]
+    return [*(Path(archive.path) for archive in archives), *own]

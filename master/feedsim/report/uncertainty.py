@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.report.chart import Axis, Band, Chart, Curve, Panel
@@ -108,14 +107,12 @@ def answers(uncertainty: Uncertainty, figures: Mapping[str, Figure], leading: Se
 
 def bands_csv(uncertainty: Uncertainty) -> str:
     """All bands as CSV: which, abscissa, value, and the ends of the interval [um]."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["of", "curve", "angle [deg] or time [ms]", "value [um]", "from [um]", "to [um]"])
+    rows: list[Sequence[str]] = [["of", "curve", "angle [deg] or time [ms]", "value [um]", "from [um]", "to [um]"]]
     for band in uncertainty.bands:
         at = np.degrees(band.at) if band.kind == "contour" else 1e3 * band.at
         for row in zip(at, *(1e6 * values for values in (band.nominal, band.low, band.high)), strict=True):
-            writer.writerow([band.prefix, band.kind, *(f"{value:.6g}" for value in row)])
-    return text.getvalue()
+            rows.append([band.prefix, band.kind, *(f"{value:.6g}" for value in row)])
+    return sheets.text_of(rows)
 
 
 def summary_part(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -> dict[str, Any]:

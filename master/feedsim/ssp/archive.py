@@ -3,10 +3,12 @@ not at all."""
 
 from __future__ import annotations
 
+import posixpath
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import quote, unquote, urlsplit
 
 from feedsim.cosim import untrusted
 from feedsim.cosim.untrusted import Allowance
@@ -65,6 +67,36 @@ class Files(Mapping[str, bytes]):
         self.allowance.take(self._entries[name].file_size, str(self.path))
         with untrusted.readable(f"{self.path}: {untrusted.shortened(name)} cannot be unpacked"):
             untrusted.copy(self._package, self._entries[name], to)
+
+
+def inside(source: str, files: Container[str]) -> str:
+    """Name of the file that a `source` means: a URI (RFC 3986) relative to the SSP file's top. InputError: there is
+    none, in words that go on behind "source 'x'".
+
+    Some programs write names as they are: such a source is taken where the file has that very name.
+    """
+    if source in files:
+        return source
+    try:
+        uri = urlsplit(source)
+        path = unquote(uri.path, errors="strict")
+    except ValueError:
+        raise InputError("is not in the file: it is no URI (RFC 3986)") from None
+    if uri.scheme or uri.netloc or path.startswith("/"):
+        raise InputError("is not in the file: it is not relative to it")
+    if "\\" in path or not path.isprintable():
+        raise InputError("is not in the file: it has backslashes or control characters, where / parts folders")
+    name = posixpath.normpath(path)
+    if name.split("/")[0] == "..":
+        raise InputError("is not in the file: it leads out of it")
+    if name not in files:
+        raise InputError("is not in the file")
+    return name
+
+
+def as_source(name: str) -> str:
+    """The URI of a file inside, relative to the top."""
+    return quote(name, safe="/!$&'()*+,;=@~")
 
 
 @contextmanager

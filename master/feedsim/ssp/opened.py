@@ -113,12 +113,14 @@ def _archives(
     """Component -> its archive, one for each source."""
     problems: list[str] = []
     by_source: dict[str, Archive] = {}
+    names: dict[str, str] = {}
     for component in structure.components:
-        source = component.source
-        if source in by_source:
+        try:
+            source = names[component.name] = archive.inside(component.source, files)
+        except InputError as error:
+            problems.append(f"{path}: component {component.name}: its source {component.source!r} {error}")
             continue
-        if source not in files:
-            problems.append(f"{path}: component {component.name}: its source {source!r} is not in the file")
+        if source in by_source:
             continue
         unpacked = folder / "archives" / str(len(by_source)) / PurePosixPath(source).name
         try:
@@ -130,7 +132,7 @@ def _archives(
         problems.append(f"{path}: {archive.STRUCTURE} has no components")
     if problems:
         raise InputError.of(str(path), problems)
-    return {component.name: by_source[component.source] for component in structure.components}
+    return {component: by_source[source] for component, source in names.items()}
 
 
 def _table(setpoint: Archive, where: str) -> Table:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from feedsim.cosim.archive import UnitDefinition
 from feedsim.errors import InputError
 from feedsim.ssp import xml
+from feedsim.ssp.archive import as_source
 from feedsim.ssp.parameter_set import ParameterSet, from_element, number
 from feedsim.ssp.xml import append_units, read_units
 
@@ -38,7 +39,10 @@ class Binding:
 
 @dataclass(frozen=True)
 class Component:
-    """An instance of the archive `source`, a path inside the SSP; `box` is x1, y1, x2, y2 in a picture, y upwards."""
+    """An instance of the archive `source`; `box` is x1, y1, x2, y2 in a picture, y upwards.
+
+    The source is a path inside an SSP that is written, and the URI of one that was read (`archive.inside`).
+    """
 
     name: str
     source: str
@@ -119,7 +123,7 @@ def _append(elements: xml.Element, component: Component) -> None:
     entry = xml.child(
         elements,
         "ssd:Component",
-        {"name": component.name, "type": FMU, "source": component.source, "implementation": "CoSimulation"},
+        {"name": component.name, "type": FMU, "source": as_source(component.source), "implementation": "CoSimulation"},
     )
     connectors = xml.child(entry, "ssd:Connectors")
     for connector in component.connectors:
@@ -132,7 +136,7 @@ def _append(elements: xml.Element, component: Component) -> None:
         bindings = xml.child(entry, "ssd:ParameterBindings")
         for binding in component.bindings:
             assert binding.source is not None
-            xml.child(bindings, "ssd:ParameterBinding", {"source": binding.source})
+            xml.child(bindings, "ssd:ParameterBinding", {"source": as_source(binding.source)})
 
 
 def read(content: bytes, where: str) -> Structure:

@@ -9,6 +9,7 @@ from feedsim.cosim.archive import Archive
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
 from feedsim.ssp import parameter_set
+from feedsim.ssp.archive import inside
 from feedsim.ssp.parameter_set import Parameter, ParameterSet, Value
 from feedsim.ssp.system_structure import Binding, Structure
 
@@ -120,9 +121,12 @@ def _sets(
             continue
         place = f"{where}: {binding.source}"
         try:
-            result.append((place, parameter_set.read(files[str(binding.source)], place), binding.prefix))
-        except KeyError:
-            problems.append(f"{place}: is named by a parameter binding, but not in the file")
+            source = inside(str(binding.source), files)
+        except InputError as error:
+            problems.append(f"{place}: is named by a parameter binding, but {str(error).removeprefix('is ')}")
+            continue
+        try:
+            result.append((place, parameter_set.read(files[source], place), binding.prefix))
         except InputError as error:
             problems += error.problems
     return result

@@ -21,6 +21,7 @@ from feedsim.errors import InputError, OutputError, no_such_file
 from feedsim.extras import need
 from feedsim.fields import did_you_mean
 from feedsim.scenario.study import Parameter
+from feedsim.sheets import read_rows, write_rows
 from feedsim.sweep.design import Design, Outcome
 from feedsim.trace import matches
 from feedsim.trace.files import written_whole
@@ -186,7 +187,7 @@ def write_table(table: Table, path: str | Path) -> None:
     elif path.suffix == ".csv":
         with written_whole(path) as file:
             text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-            csv.writer(text, lineterminator="\n").writerows(_rows(table))
+            write_rows(text, _rows(table))
             text.detach()
     else:
         raise InputError(f"{path}: a table is written as .csv or .parquet")
@@ -243,7 +244,7 @@ def _cell(value: Any) -> str:
 def _read_csv(path: Path) -> Table:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
+            rows = [row for row in read_rows(file) if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path} cannot be read: {error}") from None
     if not rows or "run" not in rows[0] or "status" not in rows[0]:

@@ -1,6 +1,6 @@
 """Draws of a machine from the intervals and correlations that its identified values have.
 
-A friction file of feedsim identify holds, in its group `identified`, an interval of 95 % of every estimated
+A friction file of feedsim identify friction holds, in its group `identified`, an interval of 95 % of every estimated
  parameter and their correlation matrix. Together they are the covariance of a normal distribution. A draw
 outside the range of a parameter, or with less static than Coulomb friction, is drawn anew: the normal distribution,
 truncated to what is possible.

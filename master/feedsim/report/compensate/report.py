@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.analysis.compensation import Compensation
 from feedsim.analysis.compensation_errors import Quality
@@ -176,14 +175,12 @@ def rows_of(compensation: Compensation) -> list[Row]:
 def table_csv(compensation: Compensation) -> str:
     """The table as CSV."""
     axes = compensation.turn.axes
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     columns = [f"{kind}_{axis} [um]" for kind in ("peak", "dip") for axis in axes]
-    writer.writerow(["compensation", "error", "unit of the error", *columns, "G [um]"])
+    rows: list[Sequence[str]] = [["compensation", "error", "unit of the error", *columns, "G [um]"]]
     for what, change, unit, quality in rows_of(compensation):
         numbers = [*quality.peak.values(), *quality.dip.values(), quality.G]
-        writer.writerow([what, f"{change:.6g}", unit, *(f"{1e6 * number:.6g}" for number in numbers)])
-    return text.getvalue()
+        rows.append([what, f"{change:.6g}", unit, *(f"{1e6 * number:.6g}" for number in numbers)])
+    return sheets.text_of(rows)
 
 
 def friction_files(files: Mapping[str, Path]) -> list[InputFile]:

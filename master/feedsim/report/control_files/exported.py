@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.control.archive import Archive
 from feedsim.control.writing import Written
@@ -90,15 +89,13 @@ def change_lines(written: Written) -> list[str]:
 
 def sheet(written: Written) -> str:
     """Old and new values as CSV, in the control's words."""
-    out = io.StringIO()
-    rows = csv.writer(out, lineterminator="\n")
-    rows.writerow(["axis", "number", "name", "old", "new", "unit", "unit confirmed", "written", "reason", "where"])
-    for change in written.changes:
-        rows.writerow([
-            change.axis, change.name.number, change.name.name, change.old, change.new, change.name.unit,
-            "yes" if change.name.confirmed else "no", "yes" if change.written else "no", change.reason, change.where,
-        ])  # fmt: skip
-    return out.getvalue()
+    heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "written", "reason", "where")
+    rows = (
+        (change.axis, change.name.number, change.name.name, change.old, change.new, change.name.unit,
+         "yes" if change.name.confirmed else "no", "yes" if change.written else "no", change.reason, change.where)
+        for change in written.changes
+    )  # fmt: skip
+    return sheets.text_of((heads, *rows))
 
 
 def report_of(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.control.archive import Archive
 from feedsim.control.reading import Reading, Refused, Taken
@@ -112,29 +111,18 @@ def _named(refused: Refused) -> str:
 
 def sheet(reading: Reading, made: Imported) -> str:
     """Every value as CSV: taken or not, in the control's words and in ours."""
-    out = io.StringIO()
-    rows = csv.writer(out, lineterminator="\n")
-    rows.writerow(["axis", "number", "name", "value", "unit", "ours", "value in the machine file", "taken", "reason",
-                   "where"])  # fmt: skip
-    for value in made.values:
-        rows.writerow(
-            [
-                value.axis,
-                value.number,
-                value.called,
-                value.text,
-                value.unit,
-                value.parameter,
-                _ours(value),
-                "yes",
-                "",
-                value.where,
-            ]
-        )
-    for gone in (*reading.refused, *made.refused):
-        rows.writerow([gone.axis, gone.name.number, gone.name.name, gone.text, gone.name.unit, gone.name.parameter, "",
-                       "no", gone.reason, gone.where])  # fmt: skip
-    return out.getvalue()
+    heads = ("axis", "number", "name", "value", "unit", "ours", "value in the machine file", "taken", "reason", "where")
+    taken = (
+        (value.axis, value.number, value.called, value.text, value.unit, value.parameter, _ours(value), "yes", "",
+         value.where)
+        for value in made.values
+    )  # fmt: skip
+    refused = (
+        (gone.axis, gone.name.number, gone.name.name, gone.text, gone.name.unit, gone.name.parameter, "", "no",
+         gone.reason, gone.where)
+        for gone in (*reading.refused, *made.refused)
+    )  # fmt: skip
+    return sheets.text_of((heads, *taken, *refused))
 
 
 def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inputs: Sequence[Path]) -> Report:

@@ -7,14 +7,13 @@ Start with sheets_of().
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from feedsim import sheets
 from feedsim.analysis import AccuracyTask, CircleTask, Figure, contour, tasks
 from feedsim.analysis.circularity import Turn
 from feedsim.cosim import Run
@@ -244,19 +243,15 @@ def _printed(value: float, digits: str) -> str:
     return "" if math.isnan(value) else minus(f"{value:{digits}}")
 
 
-def table(sheets: Sequence[Filled]) -> str:
+def table(filled: Sequence[Filled]) -> str:
     """sheet.csv: conditions, readings and figures, a row each, with the columns HEADS."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(HEADS)
-    for sheet in sheets:
+    rows: list[Sequence[str]] = [HEADS]
+    for sheet in filled:
         name = f"{sheet.title} ({sheet.standard})"
-        writer.writerows([name, "condition", what, "", "", "", "", how, "", "", ""] for what, how in sheet.conditions)
-        writer.writerows([name, "reading", *row, "", ""] for row in sheet.readings)
+        rows += [[name, "condition", what, "", "", "", "", how, "", "", ""] for what, how in sheet.conditions]
+        rows += [[name, "reading", *row, "", ""] for row in sheet.readings]
         for result in sheet.results:
             limit = "" if math.isnan(result.limit) else f"{result.limit:.9g}"
             verdict = "" if result.verdict == NO_LIMIT_TEXT else result.verdict
-            writer.writerow(
-                [name, "figure", result.symbol, "", "", "", "", f"{result.value:.6f}", "um", limit, verdict]
-            )
-    return text.getvalue()
+            rows.append([name, "figure", result.symbol, "", "", "", "", f"{result.value:.6f}", "um", limit, verdict])
+    return sheets.text_of(rows)

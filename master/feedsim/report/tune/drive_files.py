@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from feedsim import sheets
 from feedsim.control import Name, names_of
 from feedsim.replay.machine_files import drive_file, drive_text
 from feedsim.report.control import asked
@@ -46,9 +47,8 @@ def drives(tuned: Tuned) -> dict[str, str]:
 
 def sheet(tuned: Tuned, control: str = "") -> str:
     """Values to type: old and new, in the control's unit where its name is known."""
-    lines = ["axis,number,name,old,new,unit,unit confirmed,parameter"]
-    lines += [",".join(row) for row in rows(tuned, control)]
-    return "\n".join(lines) + "\n"
+    heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter")
+    return sheets.text_of((heads, *rows(tuned, control)))
 
 
 def rows(tuned: Tuned, control: str = "") -> Iterator[tuple[str, ...]]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.analysis.figures import Array
 from feedsim.control import Name, names_of
@@ -173,7 +174,7 @@ def settings(judged: Judged) -> str:
 
 def sheet(judged: Judged) -> str:
     """Values to type: old and new, in the control's unit where its name is known."""
-    lines = ["axis,number,name,old,new,unit,unit confirmed,parameter"]
+    sheet_rows = [["axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter"]]
     for axis, parameter, name, old, value in rows(judged):
         if name is not None:
             known = "yes" if name.confirmed else "no"
@@ -181,8 +182,8 @@ def sheet(judged: Judged) -> str:
         else:
             unit, display = _units(parameter)
             cells = ["", "", *(_shown(x, unit, display) for x in (old, value)), display, ""]
-        lines.append(",".join([axis, *cells, parameter]))
-    return "\n".join(lines) + "\n"
+        sheet_rows.append([axis, *cells, parameter])
+    return sheets.text_of(sheet_rows)
 
 
 def _units(parameter: str) -> tuple[str, str]:

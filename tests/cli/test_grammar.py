@@ -91,7 +91,7 @@ def test_nearest_names(typed: str, said: str, fmus: Path, folder: Path) -> None:
         ("diff tuned", "tuned is a folder of results without a record (result.csv); feedsim diff takes results of"),
         ("frf tuned", "tuned is a folder of results without a record (result.csv); feedsim frf takes a scenario"),
         (
-            "show drive",
+            "diff drive",
             "drive has results of feedsim tune drive, without a record (result.csv), its page is drive/report"
             ".html; feedsim diff takes results of a study",
         ),
@@ -99,7 +99,7 @@ def test_nearest_names(typed: str, said: str, fmus: Path, folder: Path) -> None:
         ("diff odd", "odd is a folder of results without a record (result.csv); feedsim diff takes results of"),
         ("run values.yaml", "values.yaml is a file of values for the option --set; feedsim run takes a scenario"),
         (
-            "compensate results",
+            "tune feedforward results",
             "results is a folder of results, which feedsim diff takes; feedsim tune feedforward takes",
         ),
         ("run model.fmu", "model.fmu is a unit for simulators (FMU); feedsim run takes a scenario or an SSP file"),

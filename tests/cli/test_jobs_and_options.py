@@ -57,7 +57,7 @@ def test_old_names_are_commands_of_today(old: str) -> None:
 
 
 def test_identify_alone_is_of_friction() -> None:
-    words, notes = renamed(["identify", "log.csv", "--axes=Z"])
+    words, notes = renamed(["identify", "log.csv", "--axis=Z"])
     assert words == ["identify", "friction", "log.csv", "--axes=Z"]
     assert len(notes) == 2
     assert renamed(["identify", "drive", "x.csv"]) == (["identify", "drive", "x.csv"], [])

@@ -7,6 +7,7 @@ from the signature of its job.
 from __future__ import annotations
 
 import argparse
+import re
 from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -107,7 +108,7 @@ class Command:
     def missing_file(self, options: Namespace) -> str:
         """A sentence on the first file that is named and is not there; "" where all are."""
         for parameter in self.options:
-            if "File" not in parameter.type or "Mapping" in parameter.type or (parameter.option or Option()).writes:
+            if not _is_path(parameter) or (parameter.option or Option()).writes:
                 continue
             value = getattr(options, parameter.name, None)
             for path in value if isinstance(value, list) else [value]:
@@ -236,6 +237,11 @@ def _completer(home: str) -> Callable[..., list[str]]:
     return values
 
 
+def _is_path(parameter: Parameter) -> bool:
+    """Whether its value is the name of a file or folder, or several."""
+    return bool(re.search(r"\bFile\b", parameter.type)) and not re.search("Mapping|Pairs", parameter.type)
+
+
 def _words(parameter: Parameter, option: Option) -> tuple[list[str], dict[str, Any]]:
     """What argparse takes for a parameter."""
     words: dict[str, Any] = {"help": option.help.replace("%", "%%")}
@@ -243,7 +249,7 @@ def _words(parameter: Parameter, option: Option) -> tuple[list[str], dict[str, A
         words["metavar"] = option.value
     if option.choices:
         words["choices"] = option.choices
-    if ("File" in parameter.type and "Mapping" not in parameter.type) or parameter.name == "out":
+    if _is_path(parameter):
         words["type"] = _path
     elif parameter.name == "figures":
         words["type"] = _kinds

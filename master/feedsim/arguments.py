@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -131,4 +132,6 @@ def listed(names: str | Sequence[str]) -> tuple[str, ...]:
     >>> listed("X, Z")
     ('X', 'Z')
     """
-    return tuple(part.strip() for part in names.split(",") if part.strip()) if isinstance(names, str) else tuple(names)
+    # Commas within brackets are of a name, data(:,2).
+    parts = re.split(r",(?![^()]*\))", names) if isinstance(names, str) else [*names]
+    return tuple(part.strip() for part in parts if part.strip()) if isinstance(names, str) else tuple(parts)

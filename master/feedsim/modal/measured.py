@@ -6,6 +6,7 @@ position is differentiated twice, a speed once.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi
@@ -25,6 +26,7 @@ from feedsim.trace.trace import Array
 OUTPUTS = {"rad": 2, "m": 2, "rad/s": 1, "m/s": 1, "rad/s^2": 0, "m/s^2": 0}
 INPUTS = ("N.m", "A")
 EVEN_INTERVAL_SHARE = 1e-3  # of an interval: by how much sampling may be uneven
+OUTSIDE_BRACKETS = r"(?![^()]*\))"  # those within are of a name, data(:,2)
 COHERENT = 0.5  # least coherence of a line of a file that is used
 
 
@@ -38,10 +40,9 @@ class Channel:
     @classmethod
     def of(cls, text: str, option: str) -> Channel:
         """ "NAME:UNIT" or "NAME"; several runs "NAME,NAME:UNIT". InputError: nothing is named."""
-        name, colon, unit = text.rpartition(":")
-        if not colon:
-            name, unit = text, ""
-        names = tuple(part.strip() for part in name.split(",") if part.strip())
+        *ahead, last = re.split(rf":{OUTSIDE_BRACKETS}", text)
+        name, unit = (":".join(ahead), last) if ahead else (text, "")
+        names = tuple(part.strip() for part in re.split(rf",{OUTSIDE_BRACKETS}", name) if part.strip())
         if not names:
             raise InputError(f"{option} {text!r}: NAME or NAME:UNIT is needed, such as n_act:rpm")
         return cls(names, unit.strip())

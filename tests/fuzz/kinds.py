@@ -235,6 +235,13 @@ def _uff(folder: Path) -> list[bytes]:
             }], mode="add",
         )  # fmt: skip
         found.append(file.read_bytes())
+    # Units of the file, and an accelerance without labels.
+    units = pyuff.prepare_164(
+        units_code=5, units_description="mm", temp_mode=1, length=1e3, force=1e3, temp=1.0, temp_offset=0.0
+    )
+    pyuff.UFF(str(folder / "units.uff")).write_sets([units], mode="add")
+    unlabelled = re.sub(rb"(?m)(  )[mN] {18}", rb"\1NONE               ", found[0])
+    found.append((folder / "units.uff").read_bytes() + unlabelled.replace(b"\n         8 ", b"\n        12 "))
     return found
 
 

@@ -119,7 +119,8 @@ def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[
             f"--overlay {text}: holds none of the responses shown, but {', '.join(read.names)}. Say which it is: "
             f"FILE:NAME, such as {text[: at if at > 0 else None]}:{known[0]}; shown are {', '.join(known)}"
         )
-    overlays, warnings = [], []
+    overlays: list[Overlay] = []
+    warnings: list[str] = []
     for name in mine:
         alone = read.select([name])
         wanted = unit_of(name)

@@ -175,8 +175,8 @@ def unit_warnings(assembly: Assembly) -> list[str]:
     if np.any(masses) and not LEAST_MASS <= np.max(masses) <= MOST_MASS:
         mass = float(np.max(masses))
         text = f"the model's mass is {mass:.4g} kg; a machine has {LEAST_MASS:g} kg to {MOST_MASS:g} kg"
-        stated = assembly.units.mass if assembly.units else ""
-        warnings.append(text + _unit_hint("mass", mass, stated, MASS_UNITS, LEAST_MASS, MOST_MASS))
+        stated_mass = assembly.units.mass if assembly.units else ""
+        warnings.append(text + _unit_hint("mass", mass, stated_mass, MASS_UNITS, LEAST_MASS, MOST_MASS))
     geometry = assembly.geometry
     if geometry is not None and len(geometry.nodes) > 1:
         size = float(np.max(np.ptp(geometry.nodes, axis=0)))

@@ -85,7 +85,7 @@ def test_every_extra_brings_its_modules(extra: str) -> None:
 
 def test_all_brings_what_commands_need() -> None:
     needed = {module for command in LEAVES.values() for extra in command.needs for module in extras.EXTRAS[extra]}
-    assert needed | {"pyuff", "xlsxwriter"} == set(packages("all"))
+    assert needed | {"pyuff", "xlsxwriter", "h5py"} == set(packages("all"))
 
 
 @pytest.mark.parametrize("name", LEAVES)

@@ -64,6 +64,7 @@ SOLE_USERS = {
     "tqdm": {"cli"},
     "pandas": {"jobs/run.py", "jobs/sweep.py", "trace/trace.py", "sweep/table.py"},
     "pyuff": {"trace/uff.py"},
+    "h5py": {"trace/mat_hdf5.py"},
     "distributed": {"sweep"},
     "dask": {"sweep"},
     "pyarrow": {"sweep"},

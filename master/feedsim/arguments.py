@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -160,5 +161,6 @@ def listed(names: str | Sequence[str]) -> tuple[str, ...]:
     >>> listed("X, Z")
     ('X', 'Z')
     """
+    # Commas within brackets are of a name, data(:,2).
     texts = [names] if isinstance(names, str) else names
-    return tuple(part.strip() for text in texts for part in text.split(",") if part.strip())
+    return tuple(part.strip() for text in texts for part in re.split(r",(?![^()]*\))", text) if part.strip())

@@ -18,7 +18,7 @@ from feedsim.errors import InputError
 _RUN = ("fmpy", "scipy", "ruckig")
 EXTRAS = {
     "run": _RUN, "figures": (*_RUN, "PIL", "resvg_py"), "sweep": (*_RUN, "distributed"), "uff": (*_RUN, "pyuff"),
-    "xlsx": (*_RUN, "xlsxwriter"),
+    "xlsx": (*_RUN, "xlsxwriter"), "hdf5": ("h5py",),
     "parquet": ("pyarrow",), "pandas": ("pandas",),
 }  # fmt: skip
 

@@ -105,4 +105,5 @@ def test_files_of_an_instrument_alone_are_refused(
     file = tmp_path / f"test{suffix}"
     file.write_bytes(b"\x00\x01")
     assert cli.main(["circle", str(file), "--out", str(tmp_path / "out")]) == 2
-    assert "read by their instrument's own program, and how they are built is not public" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert f"{file} is a file that its instrument's own program reads; export the test as text or CSV" in err

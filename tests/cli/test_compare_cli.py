@@ -243,7 +243,7 @@ def test_a_run_against_a_measured_record(tmp_path: Path, capsys: pytest.CaptureF
     assert "same in 99 % of the rows: 2 variables" in out  # the record is shorter than the run
     assert "shifted by 12.3" in out
     assert run(result, record) == 2
-    assert "a MAT file needs a mapping" in capsys.readouterr().out
+    assert "no column in common: the result has no column 'enc'" in capsys.readouterr().out
 
 
 def test_rules_that_match_nothing_are_told(reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

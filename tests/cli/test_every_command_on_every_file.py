@@ -201,6 +201,25 @@ def test_every_command(subject: str, place: Path, fmus: Path, tmp_path: Path) ->
     assert state(place) == before
 
 
+UNREAD = {"scope.svdx": "a project of TwinCAT Scope", "a.rst": "a file of ANSYS", "a.emat": "a file of ANSYS",
+          "a.db": "a file of ANSYS", "a.OP2": "a file of Nastran", "a.odb": "a file of Abaqus",
+          "a.frd": "a result of CalculiX", "a.tdms": "a recorder's file"}  # fmt: skip
+READERS = (
+    "identify", "compare", "convert", "show", "circle", "replay", "identify-drive", "identify-modes", "machine build",
+    "machine info",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNREAD)
+def test_files_that_nothing_reads(name: str, place: Path, fmus: Path, tmp_path: Path) -> None:
+    """Every command that takes files of records or structures says what it is, and what to do."""
+    (tmp_path / name).write_bytes(b"abc\0def")
+    for command in READERS:
+        done = feedsim(*words(command, str(tmp_path / name), tmp_path), fmus=fmus, cwd=place)
+        assert done.returncode == 2, command
+        assert f"{name} is {UNREAD[name]}" in done.stderr + done.stdout, command
+
+
 def test_the_list_is_that_of_the_command_line() -> None:
     assert {"run", "frf", "identify friction", "identify drive", "replay", "tune feedforward", "circle", "diff",
             "sweep", "compare", "tools convert", "export"} <= set(COMMANDS)  # fmt: skip

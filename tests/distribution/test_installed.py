@@ -125,6 +125,7 @@ def test_every_way_of_use(installed: Installation) -> None:
         "identify",
         "friction",
         "friction",
+        "friction",
         "constant/log.csv",
         "--axes",
         "Z",

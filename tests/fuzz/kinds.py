@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+import mat_helpers
 from feedsim import judge, scenario, ssp, trace
 from feedsim.analysis import check as check_evaluation
 from feedsim.control import formats, reading
@@ -139,6 +140,8 @@ def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:
         "setpoints": Kind(".csv", lambda path: trace.read_signals(path, {"Z": ("Z.x_a", None)}, "m"), traces[:1]),
         "response": Kind(".csv", read_response, responses),
         "mat": Kind(".mat", lambda path: _all(trace.read_recording(path)), _mat()),
+        "mat_series": Kind(".mat", read_series, _modelica()),
+        "mat_hdf5": Kind(".mat", lambda path: _all(trace.read_recording(path)), _hdf5()),
         "capture": Kind(".json", lambda path: _all(trace.read_recording(path)), [_capture()]),
         "xml": Kind(".xml", lambda path: _all(trace.read_recording(path)), _xml()),
         "response_xml": Kind(".xml", read_response, _xml()[1:]),
@@ -177,6 +180,7 @@ def _mat() -> list[bytes]:
     content = {"t": np.arange(20) / 500, "n": np.arange(20, dtype=np.int16), "k": 2.5, "q": np.eye(3)}
     more = {
         "s": {"a": np.ones(4), "b": {"c": 1.0}},
+        "several": np.array([(np.ones(4), "y"), (np.ones(4), "z")], dtype=[("values", object), ("label", object)]),
         "text": "x",
         "c": np.array([1, "y"], dtype=object),
         "z": np.ones(3) * 1j,
@@ -187,6 +191,22 @@ def _mat() -> list[bytes]:
         savemat(buffer, content if form == "4" else content | more, format=form, do_compression=compressed)
         found.append(buffer.getvalue())
     return found
+
+
+def _modelica() -> list[bytes]:
+    """Result files of Modelica tools in both layouts, and a matrix with its time in the first row."""
+    time = np.arange(20) / 500
+    tables = [np.array([[0.0, 2.5], [time[-1], 2.5]]), np.column_stack([time, np.sin(time)])]
+    variables = {"x": ("position [m]", 2, 2), "minus_x": ("alias", 2, -2), "k": ("parameter [1/s]", 1, 2)}
+    return [mat_helpers.modelica(time, variables, tables, across) for across in (True, False)]
+
+
+def _hdf5() -> list[bytes]:
+    """Version 7.3: Simulink's structure with time, and nested ones."""
+    time = np.arange(20) / 500
+    signals = [{"values": time, "label": "x [mm]"}, {"values": np.column_stack([time, time]), "label": ""}]
+    contents = ({"t": time, "simout": {"time": time, "signals": signals}}, {"a": {"b": {"c": time}}, "text": "x"})
+    return [mat_helpers.hdf5(content) for content in contents]
 
 
 def _capture() -> bytes:
@@ -235,6 +255,13 @@ def _uff(folder: Path) -> list[bytes]:
             }], mode="add",
         )  # fmt: skip
         found.append(file.read_bytes())
+    # Units of the file, and an accelerance without labels.
+    units = pyuff.prepare_164(
+        units_code=5, units_description="mm", temp_mode=1, length=1e3, force=1e3, temp=1.0, temp_offset=0.0
+    )
+    pyuff.UFF(str(folder / "units.uff")).write_sets([units], mode="add")
+    unlabelled = re.sub(rb"(?m)(  )[mN] {18}", rb"\1NONE               ", found[0])
+    found.append((folder / "units.uff").read_bytes() + unlabelled.replace(b"\n         8 ", b"\n        12 "))
     return found
 
 

@@ -214,7 +214,20 @@ FAULTS = {
     ),
     "no dofs": ({"matrices_dof": "\n"}, "matrices.dof: empty"),
     "dof": ({"matrices_dof": "1.1\n1.7\n"}, "matrices.dof:2: '1.7'; node.direction is expected, such as 12.3"),
-    "dof twice": ({"matrices_dof": "1.1\n1.1\n"}, "matrices.dof:2: node 1 ux occurs twice"),
+    "dof twice": (
+        {"matrices_dof": "1.1\n1.1\n"},
+        "matrices.dof:2: node 1 ux occurs twice",
+        "expands beams, shells and other flat elements into solids, whose",
+        "or kind: matrices",
+    ),
+    "beams": (
+        {
+            "matrices_dof": "1.1\n1.1\n",
+            "mesh_inc": "*ELEMENT, TYPE=B31, ELSET=a\n*ELEMENT, TYPE=C3D8\n*element,type=S8R\n",
+        },
+        "into solids (",
+        "mesh.inc has B31, S8R), whose nodes share a number. Use solid elements",
+    ),
     "no nodes": ({"mesh_inc": "*ELEMENT, TYPE=MASS\n"}, "mesh.inc: no nodes (*NODE) in it"),
     "position": ({"mesh_inc": "*NODE\n1, 0, up, 0\n"}, "mesh.inc:2: '1, 0, up, 0'; node, x, y, z are expected"),
     "unknown node": (
@@ -228,6 +241,13 @@ FAULTS = {
     "no include": ({"mesh_inc": "*INCLUDE, INPUT=lost.inc\n"}, "lost.inc: cannot be read"),
     "endless": ({"mesh_inc": "*INCLUDE, INPUT=mesh.inc\n"}, "files include one another more than 8 deep"),
 }
+
+
+def test_a_result_where_a_matrix_is_needed(tmp_path: Path) -> None:
+    copy(tmp_path)
+    (tmp_path / "matrices.sti").rename(tmp_path / "matrices.frd")
+    with pytest.raises(InputError, match=r"matrices\.frd is a result of CalculiX; store the matrices with \*FREQUENCY"):
+        structure(tmp_path, stiffness="matrices.frd")
 
 
 @pytest.mark.parametrize("case", FAULTS.values(), ids=FAULTS)

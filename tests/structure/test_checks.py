@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from fe_models import assembly, chain, geometry
 from scipy import sparse
 
 from feedsim.errors import InputError
+from feedsim.scenario.structure.matrices import SI, UnitSystem
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.model_check import check, frequency_warnings
 
@@ -214,9 +216,9 @@ def test_ports_that_excite_nothing() -> None:
     assert "axis Y has no port n_Y" in fault(assembly(MASS, STIFFNESS, axes=("X", "Y")))
 
 
-def units(factor: float, spacing: float) -> list[str]:
+def units(factor: float, spacing: float, system: UnitSystem | None = SI) -> list[str]:
     mass, stiffness = chain([3000.0 * factor] * 3, [4e6, 9e6])
-    return check(assembly(mass, stiffness, geometry=geometry(3, spacing)))
+    return check(replace(assembly(mass, stiffness, geometry=geometry(3, spacing)), units=system))
 
 
 def test_units_that_look_like_others() -> None:
@@ -234,6 +236,25 @@ def test_units_that_look_like_others() -> None:
     assert units(1.0, 1e-3) == [
         "the model measures 0.002 m; a machine measures 0.05 m to 100 m; was it converted from millimetres twice?"
     ]
+
+
+@pytest.mark.parametrize(
+    ("factor", "spacing", "system", "hint"),
+    [
+        (1e-3, 1.0, UnitSystem(length="mm", mass="t"), "9 kg; a machine has 20 kg to 1e+06 kg"),
+        (1e-3, 1.0, UnitSystem(length="m", mass="g"), "; 9000 looks like kilograms, units: {mass: kg}"),
+        (1e-6, 1.0, UnitSystem(length="m", mass="g"), "; 9 looks like tonnes, units: {mass: t}"),
+        (1e3, 1.0, UnitSystem(length="m", mass="t"), "; 9000 looks like kilograms, units: {mass: kg}"),
+        (1e-3, 1.0, None, "9 kg; a machine has 20 kg to 1e+06 kg"),
+        (1.0, 1e3, UnitSystem(length="mm", mass="t"), "measures 2000 m; a machine measures 0.05 m to 100 m"),
+        (1.0, 1e-3, UnitSystem(length="mm", mass="t"), "; 2 looks like metres, units: {length: m}"),
+        (1.0, 1e3, None, "measures 2000 m; a machine measures 0.05 m to 100 m"),
+    ],
+)
+def test_no_hint_of_a_unit_that_is_set(factor: float, spacing: float, system: UnitSystem | None, hint: str) -> None:
+    """What is proposed is what the file's own number is in another unit than the stated one."""
+    (warning,) = units(factor, spacing, system)
+    assert warning.endswith(hint)
 
 
 def test_mass_by_labels_counts_translations_alone() -> None:

@@ -24,7 +24,8 @@ from scipy.io import loadmat, savemat
 
 from feedsim.errors import InputError
 from feedsim.trace import read_recording
-from feedsim.trace.mat import Other, flat, read_mat
+from feedsim.trace.mat import read_mat
+from feedsim.trace.mat_values import Other, flat
 
 CONTENT: dict[str, Any] = {
     "t": np.arange(500) / 500,
@@ -74,11 +75,14 @@ def assert_same(path: Path) -> int:
     mine, count = dict(flat(read_mat(path))), 0
     for name, value in as_scipy_reads(path):
         array = np.asarray(value)
-        if array.dtype.kind not in "fiuc" or isinstance(mine[name], Other):
-            assert isinstance(mine[name], Other), name
+        found = mine.get(name)
+        if array.dtype.kind == "U" and array.shape == () and isinstance(found, np.ndarray):
+            assert "".join(found.ravel().tolist()).rstrip() == str(array).rstrip(), name
+            continue
+        if array.dtype.kind not in "fiuc" or isinstance(found, Other):
+            assert not isinstance(found, np.ndarray) or found.dtype.kind == "U", name
             assert array.dtype.kind in "UO" or array.shape == () or hasattr(value, "tocsc"), name
             continue
-        found = mine[name]
         assert isinstance(found, np.ndarray)
         assert found.shape == array.shape or found.size == array.size == 0, name
         assert np.array_equal(found.ravel(), array.ravel(), equal_nan=True), name
@@ -99,6 +103,9 @@ def test_files_that_matlab_has_written(tmp_path: Path) -> None:
     for path in MATLAB_S_OWN:
         if any(word in path.name for word in ("object", "duplicate", "utf8", "scalarcell")):
             continue  # objects' fields, names that are none: told as what they are
+        if "hdf5" in path.name:  # version 7.3, which SciPy does not read
+            np.testing.assert_allclose(read_mat(path)["testdouble"], [np.arange(9) * np.pi / 4], rtol=1e-15)
+            continue
         try:
             names = [name for name, _ in as_scipy_reads(path)]
         except (ValueError, NotImplementedError, zlib.error, TypeError):

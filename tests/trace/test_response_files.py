@@ -245,6 +245,94 @@ def test_universal_file_refused(tmp_path: Path) -> None:
         read_response(broken)
 
 
+# A mode at 60 Hz, 20 nm/N, D 2 %: its receptance, and j omega.
+LINES = np.array([1.0, 20.0, 60.0, 300.0])
+S = 2j * np.pi * LINES
+RECEPTANCE = 20e-9 / (1 - (LINES / 60) ** 2 + 0.04j * LINES / 60)
+
+
+@pytest.mark.parametrize(
+    ("unit", "values", "words"),
+    [
+        ("m/N", RECEPTANCE, ""),
+        ("um/N", 1e6 * RECEPTANCE, ""),
+        ("(m/s^2)/N", S**2 * RECEPTANCE, "divided by -(2 pi f)^2"),
+        ("m/s²/N", S**2 * RECEPTANCE, "divided by -(2 pi f)^2"),
+        ("g/N", S**2 * RECEPTANCE / 9.80665, "g is taken as 9.80665 m/s^2, divided by -(2 pi f)^2"),
+        ("mg/N", None, "unknown unit 'mg'"),
+        ("gn/kN", 1e3 * S**2 * RECEPTANCE / 9.80665, "g is taken as 9.80665 m/s^2, divided by"),
+        ("(mm/s)/N", 1e3 * S * RECEPTANCE, "divided by j 2 pi f"),
+        ("N/um", 1e-6 / RECEPTANCE, "the reciprocal is taken"),
+        ("N/(m/s)", 1 / (S * RECEPTANCE), "the reciprocal is taken, divided by j 2 pi f"),
+        ("kg", 1 / (S**2 * RECEPTANCE), "the reciprocal is taken, divided by -(2 pi f)^2"),
+        ("N/g", 9.80665 / (S**2 * RECEPTANCE), "g is taken as 9.80665 m/s^2, the reciprocal is taken, divided by"),
+        ("m/N/s^3", None, "is that of"),
+        ("rad/(N.m)", None, "is that of"),
+    ],
+)
+def test_accelerance_and_its_kin(tmp_path: Path, unit: str, values: np.ndarray | None, words: str) -> None:
+    given = RECEPTANCE if values is None else values
+    rows = "".join(f"{f:.17g},{v.real:.17g},{v.imag:.17g}\n" for f, v in zip(LINES, given, strict=True))
+    file = written(tmp_path, f"frequency [Hz],a re [{unit}],a im [{unit}]\n0,1,1\n{rows}")
+    found = read_response_csv(file)
+    assert found.notes == (f"{file}: the line at 0 Hz is left out",)
+    if values is None:
+        with pytest.raises(InputError, match=words):
+            found.converted({"a": "m/N"})
+        return
+    receptance = found.converted({"a": "m/N"})
+    np.testing.assert_allclose(receptance["a"], RECEPTANCE, rtol=1e-12)
+    assert words in (receptance.notes[1] if words else "")
+    assert len(receptance.notes) == 1 + bool(words)
+    np.testing.assert_allclose(receptance.converted({"a": "(m/s^2)/N"})["a"], S**2 * RECEPTANCE, rtol=1e-12)
+
+
+def test_plain_quotients_are_not_integrated(tmp_path: Path) -> None:
+    file = written(tmp_path, "f,a re [1/s],a im [1/s]\n1,1,1\n")
+    with pytest.raises(InputError, match="one of a plain number is expected"):
+        read_response_csv(file).converted({"a": "1"})
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("dB re (m/s^2)/N", 1), ("dB re 1 (m/s^2)/N", 1), ("dB (re 1 mm/s^2/N)", 1e-3), ("dB re 1e-6 (m/s^2)/N", 1e-6)],
+)
+def test_decibels_of_an_accelerance(tmp_path: Path, unit: str, factor: float) -> None:
+    file = written(tmp_path, f"f,a gain [{unit}],a phase [deg]\n10,40,180\n")
+    found = read_response_csv(file).converted({"a": "m/N"})
+    np.testing.assert_allclose(found["a"], [100 * factor / (20 * np.pi) ** 2], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("labels", "types", "values", "words"),
+    [
+        (("m/s^2", "N"), (12, 13), S**2 * RECEPTANCE, "divided by -(2 pi f)^2"),
+        (("NONE", "NONE"), (12, 13), S**2 * RECEPTANCE * 1e3 / 1e3, "m/s^2 by its type, acceleration"),
+        (("NONE", "N"), (11, 13), S * RECEPTANCE * 1e3, "m/s by its type, velocity"),
+        (("g", "NONE"), (12, 9), S**2 * RECEPTANCE / 9.80665 / 1e3, "N by its type, reaction force"),
+        (("m", "N"), (12, 13), RECEPTANCE, "its label says m, its type acceleration; the label counts"),
+    ],
+)
+def test_units_by_types_of_a_universal_file(
+    tmp_path: Path, labels: tuple[str, str], types: tuple[int, int], values: np.ndarray, words: str
+) -> None:
+    """Without labels values are in the file's units, here mm and mN (dataset 164)."""
+    file = universal(
+        tmp_path,
+        pyuff.prepare_164(
+            units_code=5, units_description="mm", temp_mode=1, length=1e3, force=1e3, temp=1.0, temp_offset=0.0
+        ),
+        dataset(
+            x=LINES, data=values, ordinate_axis_units_lab=labels[0], orddenom_axis_units_lab=labels[1],
+            ordinate_spec_data_type=types[0], orddenom_spec_data_type=types[1],
+        ),
+    )  # fmt: skip
+    found = read_response(file)
+    receptance = found.converted(dict.fromkeys(found.names, "m/N"))
+    np.testing.assert_allclose(receptance[found.names[0]], RECEPTANCE, rtol=1e-5)  # frequencies are E13.5
+    assert any(words in note for note in receptance.notes)
+
+
 # --- what is asked for on the command line -------------------------------------------------------------------------
 
 

@@ -345,15 +345,15 @@ def test_mat_to_csv(mat: Path, tmp_path: Path) -> None:
     ("columns", "message"),
     [
         ([("t", "time", "s"), ("qq", "x", "m")], "no variable 'qq'; did you mean 'q'?"),
-        ([("t", "time", "s"), ("position", "x", "m")], "no variable 'position'; there is t, q, n, k"),
+        ([("t", "time", "s"), ("position", "x", "m")], "no variable 'position'; there is t, q, n, short"),
         ([("t", "time", "s"), ("short", "x", "m")], "'short' has 3 values, 't' has 4"),
         ([("t", "time", "s"), ("bad", "x", "m")], "'bad' is not finite at element 3"),
-        ([("t", "time", "s"), ("text", "x", "m")], "'text' is no numbers; a vector of real numbers is needed"),
-        ([("t", "time", "s"), ("z", "x", "m")], "'z' is complex128 of shape (4,); a vector"),
-        ([("t", "time", "s"), ("k", "x", "m")], "'k' is float64 of shape (); a vector"),
-        ([("t", "time", "s"), ("rec", "x", "m")], "'rec' is no numbers"),
-        ([("t", "time", "s"), ("rec.po", "x", "m")], "no field 'po' in 'rec'; did you mean 'pos'?"),
-        ([("t", "time", "s"), ("q.x", "x", "m")], "'q' is no structure"),
+        ([("t", "time", "s"), ("text", "x", "m")], "'text' (text); a vector of real numbers is needed"),
+        ([("t", "time", "s"), ("z", "x", "m")], "'z' (complex128 of shape (4,)); a vector"),
+        ([("t", "time", "s"), ("k", "x", "m")], "'k' is a single number; a vector"),
+        ([("t", "time", "s"), ("rec", "x", "m")], "no variable 'rec'; did you mean 'rec.pos'?"),
+        ([("t", "time", "s"), ("rec.po", "x", "m")], "no variable 'rec.po'; did you mean 'rec.pos'?"),
+        ([("t", "time", "s"), ("q.x", "x", "m")], "no variable 'q.x'; there is t, q"),
         ([("back", "time", "s"), ("q", "x", "m")], "time must increase"),
         ([("t", "time", "m"), ("q", "x", "m")], "one of a time is expected"),
         ([("t", "time", "s"), ("q", "x", "furlong")], "unknown unit 'furlong'"),
@@ -377,7 +377,7 @@ def test_mat_files_that_are_refused(
     [
         (b"no mat file at all", "is no MAT file that can be read"),
         (b"", "is no MAT file that can be read"),
-        (b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + b"\x89HDF", "version 7.3 (HDF5); save it with -v7"),
+        (b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + b"\x89HDF", "version 7.3, and what follows is no HDF5"),
     ],
 )
 def test_files_that_are_no_mat_files(tmp_path: Path, content: bytes, message: str) -> None:

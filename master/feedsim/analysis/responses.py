@@ -119,16 +119,18 @@ def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[
             f"--overlay {text}: holds none of the responses shown, but {', '.join(read.names)}. Say which it is: "
             f"FILE:NAME, such as {text[: at if at > 0 else None]}:{known[0]}; shown are {', '.join(known)}"
         )
-    overlays, warnings = [], []
+    overlays: list[Overlay] = []
+    warnings: list[str] = []
     for name in mine:
         alone = read.select([name])
         wanted = unit_of(name)
         if alone.unit(name):
             alone = alone.converted({name: wanted})
+            warnings += alone.notes
         elif wanted != "1":
             warnings.append(f"--overlay {text}: {name} has no unit in the file; it is taken to be in {wanted}")
         overlays.append(Overlay(name, Path(text[: at if at > 0 else None]), alone))
-    return overlays, warnings
+    return overlays, list(dict.fromkeys([*read.notes, *warnings]))
 
 
 def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figure]:

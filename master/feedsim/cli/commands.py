@@ -264,7 +264,7 @@ def _words(parameter: Parameter, option: Option) -> tuple[list[str], dict[str, A
         if option.many:
             words["nargs"] = "+" if needed else "*"
         elif not needed:
-            words["nargs"] = "?"
+            words |= {"nargs": "?", "default": None}  # argparse would take the mark for the value
         return [parameter.name], words
     words |= {"dest": parameter.name, "required": needed or (parameter.name == "out" and not option.default)}
     if not option.value and not option.choices:
@@ -305,7 +305,7 @@ def _text(text: str) -> str:
 def arguments(command: Command, options: Namespace) -> dict[str, Any]:
     """Parameter -> value for the job, of what was typed."""
     typed = vars(options)
-    result = {parameter.name: typed[parameter.name] for parameter in command.options if parameter.name in typed}
+    result = {p.name: typed[p.name] for p in command.options if typed.get(p.name) is not None}
     if "out" not in result and (place := command.default_out(options)) is not None:
         result["out"] = place
     return result

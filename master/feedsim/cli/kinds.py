@@ -128,10 +128,7 @@ INPUT_KINDS = (
     Kind("an SSP file", ("run", "check"), _ends(".ssp")),
     Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
     Kind("a table of modes, which a machine file names", (), _modes),
-    Kind("a record", _RECORDS, _table),
-    Kind(
-        "a record", ("identify friction", "tools convert", "identify drive", "replay", "identify modes"), _ends(".mat")
-    ),
+    Kind("a record", _RECORDS, lambda path: _table(path) or _ends(".mat")(path)),
     Kind("a capture of a control", ("identify drive", "replay", "identify friction", "tools convert"), _capture),
 )
 

@@ -19,12 +19,54 @@ _OTHERS = (
     (stat.S_ISSOCK, "a socket"),
     (lambda _: True, "a device"),
 )
+_INSTRUMENT = (
+    "a file that its instrument's own program reads",
+    ("export the test as text or CSV, with angle and deviation (or radius), or both positions"),
+)
+_ANSYS = "a file of ANSYS that is not read", "jobname.full of a modal analysis is (kind: ansys)"
+_NASTRAN = (
+    "a file of Nastran that is not read",
+    ("convert its matrices to Matrix Market (kind: matrices), or make a table of modes"),
+)
+_ABAQUS = (
+    "a file of Abaqus that is not read",
+    ("write the matrices with *MATRIX GENERATE and convert them to Matrix Market (kind: matrices)"),
+)
+_RECORDER = "a recorder's file that is not read", "export the signals there as CSV, with a header of names and units"
+# Ending of files that nothing here reads -> what they are, and what to do.
+UNREAD = {
+    **dict.fromkeys((".b5r", ".b20", ".b5s", ".bbx", ".kgm", ".acc"), _INSTRUMENT),
+    **dict.fromkeys((".rst", ".rth", ".rfrq", ".emat", ".esav", ".db", ".dbb", ".cdb", ".mechdb"), _ANSYS),
+    **dict.fromkeys((".op2", ".op4", ".pch", ".f06", ".bdf", ".nas"), _NASTRAN),
+    **dict.fromkeys((".odb", ".cae"), _ABAQUS),
+    **dict.fromkeys((".frd", ".rout"), (
+        "a result of CalculiX", "store the matrices with *FREQUENCY, SOLVER=MATRIXSTORAGE (kind: calculix)"
+    )),
+    **dict.fromkeys((".svdx", ".svd", ".tcscopex"), (
+        "a project of TwinCAT Scope", "export its data there as CSV, with the header and a time for every channel"
+    )),
+    **dict.fromkeys((".tdms", ".mf4", ".mdf", ".dxd", ".d7d"), _RECORDER),
+    **dict.fromkeys((".slx", ".mdl", ".mldatx", ".fig"), (
+        "a file that only MATLAB reads", "save the signals there as vectors: save('record.mat', 't', 'x', '-v7')"
+    )),
+    **dict.fromkeys((".mph", ".mnf"), (
+        "a model that is not read", "export mass and stiffness there as Matrix Market (kind: matrices)"
+    )),
+}  # fmt: skip
 _OPENING = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_BINARY", "O_CLOEXEC", "O_NONBLOCK", "O_NOCTTY"))
+
+
+def refuse_unread(path: Path) -> None:
+    """InputError with what to do: a file of a kind that nothing here reads, by its ending."""
+    if path.suffix.lower() in UNREAD and path.is_file():
+        what, advice = UNREAD[path.suffix.lower()]
+        raise InputError(f"{path} is {what}; {advice}")
 
 
 @contextmanager
 def opened(path: Path, *, pipes: bool = False) -> Iterator[BufferedReader]:
     """A file to be read piece by piece. pipes, errors: as of content(), without its limit."""
+    refuse_unread(path)
     try:
         number = os.open(path, _OPENING)
         with os.fdopen(number, "rb") as file:

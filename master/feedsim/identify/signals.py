@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from feedsim import units
-from feedsim.errors import InputError, few
+from feedsim.errors import InputError
 from feedsim.files.columns import DIMENSIONS, DRIVING, Columns, Signal, resulting, target_of
 from feedsim.files.spellings import is_rms, known_unit
 from feedsim.findings import Note
@@ -85,8 +85,9 @@ def _mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> 
         signal = _time(recording, mapping) if role == "time" else mapping.signal(role)
         if signal is None:
             continue
+        signal = signal.model_copy(update={"column": recording.named(signal.column)})
         if signal.column not in recording.names:
-            missing = f"{recording.header} has no column {signal.column!r}; there is {few(recording.names, 20)}"
+            missing = f"{recording.header} has no column {signal.column!r}; there is {recording.there}"
             faults.append(f"{mapping.where(role)}: {missing}")
             continue
         try:
@@ -104,8 +105,9 @@ def _time(recording: Recording, mapping: Columns) -> Signal | None:
         return None
     if clock.column is not None:
         # What has no unit is s, as everywhere in traces; but a counter is nothing before its factor.
-        unit = clock.unit or (None if clock.factor or recording.units.get(clock.column) else "s")
-        return Signal(column=clock.column, unit=unit, factor=clock.factor)
+        named = recording.named(clock.column)
+        unit = clock.unit or (None if clock.factor or recording.units.get(named) else "s")
+        return Signal(column=named, unit=unit, factor=clock.factor)
     named_time = _named_time(recording, mapping.axis or "")
     return Signal(column=named_time, unit=clock.unit or (None if recording.units[named_time] else "s"))
 
@@ -139,8 +141,8 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
         known = f" known are {', '.join(names.values())};" if names else ""
         raise InputError(
             f"{recording.header}: no column is called like a {' nor a '.join(missing)} of "
-            f"{f'axis {axis}' if axis else 'a drive trace'};{known} there is {few(recording.names, 20)}; name the "
-            f"columns in a mapping file: {'; '.join(_line(part.split()[0], recording) for part in missing)}"
+            f"{f'axis {axis}' if axis else 'a drive trace'};{known} there is {recording.there}; name the "
+            f"columns in a mapping file: {_lines(recording, [part.split()[0] for part in missing], names.values())}"
         )
     names["time"] = _named_time(recording, axis)
     faults: list[str] = []
@@ -229,7 +231,7 @@ def _named_time(recording: Recording, axis: str) -> str:
     if known_unit(recording.units[first]) and units.unit(recording.units[first] or "1").dimension == "time":
         return first
     raise InputError(
-        f"{recording.header}: no column of time; there is {few(recording.names, 20)}; name it in a mapping file: "
+        f"{recording.header}: no column of time; there is {recording.there}; name it in a mapping file: "
         "time: {column: ..., unit: s}, or give time: {interval: 2 ms} where there is none"
     )
 
@@ -267,3 +269,16 @@ def _line(role: str, recording: Recording, column: str = "...") -> str:
     return (
         f"{role}: {{column: {name}}}" if reported else f"{role}: {{column: {name}, unit: {_EXAMPLE.get(role, 'N.m')}}}"
     )
+
+
+def _lines(recording: Recording, roles: Sequence[str], known: Collection[str]) -> str:
+    """The lines of a mapping file for roles whose columns are not known by their names.
+
+    Columns without names of their own, such as data(:,2), stand in them in the order that they mostly have.
+    """
+    nameless = [name for name in recording.names if "(" in name and name not in known]
+    if nameless:
+        timed = any(name.lower() in ("time", "t", "zeit") for name in recording.names)
+        roles = [role for role in DIMENSIONS if role in roles or (role == "time" and not timed)]
+    columns = [*nameless[: len(roles)], *["..."] * len(roles)]
+    return "; ".join(_line(role, recording, column) for role, column in zip(roles, columns, strict=False))

@@ -402,10 +402,6 @@ class _Asked:
     def _read(self, path: Path, side: _Side) -> Series:
         if side.mapping is not None:
             return _read_record(path, side.mapping, self.axis, self.machine)
-        if path.suffix.lower() == ".mat":
-            raise InputError(
-                f"{path}: a MAT file needs a mapping of its columns: {spelt('columns')} or {spelt('reference_columns')}"
-            )
         return read_series(path, time=side.time)
 
 

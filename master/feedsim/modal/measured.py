@@ -6,8 +6,10 @@ position is differentiated twice, a speed once.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from math import pi
 from pathlib import Path
 
@@ -17,14 +19,16 @@ from feedsim import units
 from feedsim.errors import InputError
 from feedsim.modal.estimate import estimated
 from feedsim.trace import Recording, read_recording
-from feedsim.trace.response import Complexes
+from feedsim.trace.response import Complexes, FrequencyResponse
 from feedsim.trace.response_files import read_response
 from feedsim.trace.trace import Array
 
 # Units of a channel -> how often it is differentiated in time to be an acceleration.
 OUTPUTS = {"rad": 2, "m": 2, "rad/s": 1, "m/s": 1, "rad/s^2": 0, "m/s^2": 0}
+ACCELERATIONS = ("rad/s^2", "m/s^2")
 INPUTS = ("N.m", "A")
 EVEN_INTERVAL_SHARE = 1e-3  # of an interval: by how much sampling may be uneven
+OUTSIDE_BRACKETS = r"(?![^()]*\))"  # those within are of a name, data(:,2)
 COHERENT = 0.5  # least coherence of a line of a file that is used
 
 
@@ -38,10 +42,9 @@ class Channel:
     @classmethod
     def of(cls, text: str, option: str) -> Channel:
         """ "NAME:UNIT" or "NAME"; several runs "NAME,NAME:UNIT". InputError: nothing is named."""
-        name, colon, unit = text.rpartition(":")
-        if not colon:
-            name, unit = text, ""
-        names = tuple(part.strip() for part in name.split(",") if part.strip())
+        *ahead, last = re.split(rf":{OUTSIDE_BRACKETS}", text)
+        name, unit = (":".join(ahead), last) if ahead else (text, "")
+        names = tuple(part.strip() for part in re.split(rf",{OUTSIDE_BRACKETS}", name) if part.strip())
         if not names:
             raise InputError(f"{option} {text!r}: NAME or NAME:UNIT is needed, such as n_act:rpm")
         return cls(names, unit.strip())
@@ -131,22 +134,22 @@ def from_responses(path: Path, outputs: Mapping[str, Channel], input_unit: str =
     relative: dict[str, Array] = {}
     linear: dict[str, bool] = {}
     inputs: set[str] = set()
+    notes = list(response.notes)
     kept = np.ones(len(response), dtype=np.bool_)
-    s = 2j * pi * np.asarray(response.frequency)
     for name, channel in outputs.items():
         if len(channel.names) != 1 or channel.names[0] not in response:
             raise InputError(f"{path}: no response {', '.join(channel.names)!r}; there is {', '.join(response.names)}")
         own = channel.names[0]
         unit = channel.unit or response.unit(own)
-        for output, order in OUTPUTS.items():
-            for input_ in INPUTS:
-                try:
-                    factor = float(units.factor(unit, f"({output})/({input_})"))
-                except InputError:
-                    continue
-                inputs.add(input_)
-                values[name] = response[own] * factor * s**order
-                linear[name] = output.startswith("m")
+        alone = FrequencyResponse(response.frequency, {own: response[own]}, {own: unit})
+        for output, input_ in product(ACCELERATIONS, INPUTS):
+            try:
+                in_unit = alone.converted({own: f"({output})/({input_})"})
+            except InputError:
+                continue
+            inputs.add(input_)
+            values[name], linear[name] = in_unit[own], output.startswith("m")
+            notes += in_unit.notes
         if name not in values:
             raise InputError(
                 f"{path}: response {own!r} is in {unit or 'no unit'}; an angle or a position, its speed or "
@@ -161,7 +164,7 @@ def from_responses(path: Path, outputs: Mapping[str, Channel], input_unit: str =
         np.asarray(response.frequency)[kept],
         {name: value[kept] for name, value in values.items()},
         {name: values[kept] for name, values in relative.items()},
-        inputs.pop(), linear, "as in the file, its coherence as scatter",
+        inputs.pop(), linear, "as in the file, its coherence as scatter", notes,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim import errors
+from feedsim.scenario.structure.matrices import SI, UnitSystem
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -57,6 +58,7 @@ class Assembly:
         labels: (N,) what a degree of freedom is, such as "bed B1[3] ux".
         geometry: None where only matrices are known.
         pose: axis -> position [m]; empty where it is not known.
+        units: that the file gives its numbers in; None of a structure without such a choice.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Assembly:
     labels: tuple[str, ...]
     geometry: Geometry | None
     pose: Mapping[str, float]
+    units: UnitSystem | None = SI
 
 
 def translating_mass(assembly: Assembly) -> Floats:

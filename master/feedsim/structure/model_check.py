@@ -7,12 +7,13 @@ only the solution can show stays with it: how many rigid modes there are, and ne
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from feedsim import units
 from feedsim.errors import InputError
 from feedsim.structure.assembly import (
     DEGREES,
@@ -162,7 +163,9 @@ def _ports(assembly: Assembly) -> tuple[list[str], list[str]]:
 LEAST_MASS, MOST_MASS = 20.0, 1e6  # [kg] a test bench, a portal machine
 LEAST_SIZE, MOST_SIZE = 0.05, 100.0  # [m]
 LEAST_FREQUENCY, MOST_FREQUENCY = 1.0, 2000.0  # [Hz] of the lowest elastic mode
-MASS_UNITS = {"tonnes": ("t", 1000.0), "grams": ("g", 1e-3)}
+# Units of files -> in words, the likely ones first.
+MASS_UNITS = {"t": "tonnes", "kg": "kilograms", "g": "grams"}
+LENGTH_UNITS = {"mm": "millimetres", "m": "metres", "cm": "centimetres"}
 
 
 def unit_warnings(assembly: Assembly) -> list[str]:
@@ -172,23 +175,31 @@ def unit_warnings(assembly: Assembly) -> list[str]:
     if np.any(masses) and not LEAST_MASS <= np.max(masses) <= MOST_MASS:
         mass = float(np.max(masses))
         text = f"the model's mass is {mass:.4g} kg; a machine has {LEAST_MASS:g} kg to {MOST_MASS:g} kg"
-        fitting = [
-            f"{mass:.4g} looks like {name}, units: {{mass: {unit}}}"
-            for name, (unit, factor) in MASS_UNITS.items()
-            if LEAST_MASS <= mass * factor <= MOST_MASS
-        ]
-        warnings.append("; ".join([text, *fitting]))
+        stated_mass = assembly.units.mass if assembly.units else ""
+        warnings.append(text + _unit_hint("mass", mass, stated_mass, MASS_UNITS, LEAST_MASS, MOST_MASS))
     geometry = assembly.geometry
     if geometry is not None and len(geometry.nodes) > 1:
         size = float(np.max(np.ptp(geometry.nodes, axis=0)))
         if not LEAST_SIZE <= size <= MOST_SIZE:
             text = f"the model measures {size:.4g} m; a machine measures {LEAST_SIZE:g} m to {MOST_SIZE:g} m"
-            if LEAST_SIZE <= size / 1000 <= MOST_SIZE:
-                text += f"; {size:.4g} looks like millimetres, units: {{length: mm}}"
-            elif LEAST_SIZE <= size * 1000 <= MOST_SIZE:
-                text += "; was it converted from millimetres twice?"
-            warnings.append(text)
+            stated = assembly.units.length if assembly.units else ""
+            hint = _unit_hint("length", size, stated, LENGTH_UNITS, LEAST_SIZE, MOST_SIZE)
+            if not hint and LEAST_SIZE <= size * 1000 <= MOST_SIZE:
+                hint = "; was it converted from millimetres twice?"
+            warnings.append(text + hint)
     return warnings
+
+
+def _unit_hint(key: str, value: float, stated: str, names: Mapping[str, str], least: float, most: float) -> str:
+    """What the file's own number may be, where that is usual: another unit than the stated one. value: in SI."""
+    si = "kg" if key == "mass" else "m"
+    own = units.convert(value, si, stated) if stated else 0.0
+    fitting = [
+        f"; {own:.4g} looks like {name}, units: {{{key}: {unit}}}"
+        for unit, name in names.items()
+        if unit != stated and least <= units.convert(own, unit, si) <= most
+    ]
+    return fitting[0] if fitting else ""
 
 
 def frequency_warnings(omega: float) -> list[str]:

@@ -1,29 +1,30 @@
 """A recorded file as it is: the columns of a CSV file, the variables of a MAT file or the signals of a control's
 capture, read when they are asked for.
 
-MAT files are those of version 4 to 7; a field inside a structure is "structure.field". Captures: capture.py.
+MAT files and what their columns are called: mat_columns.py. Captures: capture.py.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.trace import capture, sinumerik_xml
 from feedsim.trace.capture_axes import CaptureAxis
-from feedsim.trace.cells import Table, read_table
+from feedsim.trace.cells import TIME_NAMES, Table, read_table
 from feedsim.trace.csv import write_csv
-from feedsim.trace.mat import Other, Value, flat, read_mat
+from feedsim.trace.mat_columns import MAT, read_columns
+from feedsim.trace.mat_columns import named as named_so
 from feedsim.trace.scopes import read_scope
 from feedsim.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
-
-MAT = ".mat"
-REAL = "fiu"  # kinds of numpy's types
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +34,13 @@ class Recording:
     Attributes:
         path: the file.
         names: its columns: of a CSV file without their units, of a MAT file its vectors, rows and columns alike.
-        units: column -> unit as the header has it; "" where it shows none, as always in MAT files.
+        units: column -> unit as the header has it; "" where it shows none, as mostly in MAT files.
         scalars: numbers that stand beside the columns (MAT).
         axes: of a capture, whose columns are called NAME|number of the axis; empty for other files.
         marks: what the control did, and when (capture).
         notes: what a reader of the file should know.
         remarks: lines ahead of the header (CSV).
+        unread: what the file holds besides, in words (MAT).
     """
 
     path: Path
@@ -49,8 +51,11 @@ class Recording:
     marks: tuple[capture.Mark, ...] = ()
     notes: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    unread: Mapping[str, str] = field(default_factory=dict)
     _table: Table | None = None  # of a CSV file
-    _variables: Mapping[str, Value] = field(default_factory=dict)  # of a MAT file or a capture
+    _columns: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)  # of all other files
+    _spellings: Mapping[str, str] = field(default_factory=dict)  # other ways to write a name (MAT)
+    _rows: NDArray[np.bool_] | None = None  # that are read (MAT)
 
     def read(self, names: Iterable[str]) -> dict[str, Array]:
         """Values of columns, all of one length.
@@ -62,13 +67,46 @@ class Recording:
         if self._table is not None:
             read = self._table.values(map(self._table.index, wanted)).values()
             return {name: recorded(column)[0] for name, column in zip(wanted, read, strict=True)}
-        values = {name: _vector(self.path, self._variables, name) for name in wanted}
+        values = {name: self._vector(name) for name in wanted}
         for name in wanted[1:]:
             if values[name].size != values[wanted[0]].size:
                 raise InputError(
                     f"{self.path}: {name!r} has {values[name].size} values, {wanted[0]!r} has {values[wanted[0]].size}"
                 )
         return values
+
+    def _vector(self, name: str) -> Array:
+        """InputError: no such column, a number that is not finite or too large."""
+        values = self._columns.get(self.named(name))
+        if values is None:
+            other = self.unread.get(name)
+            if name not in self.scalars and other is None:
+                raise InputError(f"{self.path}: no variable {name!r}{suggest(name, self.names)}")
+            what = other or f"{name!r} is a single number"
+            raise InputError(f"{self.path}: {what}; a vector of real numbers is needed")
+        if self._rows is not None and len(values) == len(self._rows):
+            values = values[self._rows]
+        numbers = values.astype(np.float64)
+        if not np.all(np.isfinite(numbers)):
+            row = int(np.argmin(np.isfinite(numbers))) + 1
+            raise InputError(f"{self.path}: {name!r} is not finite at element {row}")
+        numbers, wrong = recorded(numbers)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InputError(
+                f"{self.path}: {name!r} is {numbers[row]:g} at element {row + 1}; allowed: up to {MAX_MAGNITUDE:g}"
+            )
+        return numbers
+
+    def named(self, name: str) -> str:
+        """The name of a column in any of its spellings, such as signals(2).values; as it is where there is none."""
+        return named_so(name, self._columns, self._spellings)
+
+    @property
+    def there(self) -> str:
+        """What the file holds, for messages."""
+        unread = f"; not read: {few([*self.unread.values()], 5)}" if self.unread else ""
+        return f"{few(self.names, 20)}{unread}"
 
     def scalar(self, name: str) -> float:
         """A number of the file. InputError: there is none of that name."""
@@ -78,6 +116,14 @@ class Recording:
             raise InputError(f"{self.path}: variable {name!r} is a vector; a factor must be one number")
         hint = "; a CSV file has none, write the number itself" if self._table else suggest(name, self.scalars)
         raise InputError(f"{self.path}: no variable {name!r}{hint}")
+
+    def beside(self, time: str) -> list[tuple[str, str, str]]:
+        """Columns as long as that of the time: name, the same as a CSV file may have it, unit."""
+        there = [
+            name for name in self.names
+            if name != time and (not self._columns or len(self._columns[name]) == len(self._columns[time]))
+        ]  # fmt: skip
+        return [(name, re.sub(r"\[(.*?)\]", r"(\1)", name), self.units[name]) for name in there]
 
     @property
     def control(self) -> str:
@@ -105,21 +151,21 @@ class Recording:
 def read_recording(path: str | Path) -> Recording:
     """Look into a CSV file, a MAT file (shown by its ending .mat) or a control's capture (.json).
 
-    Raises InputError: what read_csv() and read_capture() refuse; a MAT file that is not there or is none, one of
-    version 7.3, which is HDF5, or one without a vector of real numbers.
+    Raises InputError: what read_csv() and read_capture() refuse; a MAT file that is not there or is none, or one
+    without a vector of real numbers.
     """
     path = Path(path)
     if path.suffix.lower() == capture.SUFFIX:
         result = capture.read_capture(path)
         return Recording(
-            path, tuple(result.columns), result.units, axes=result.axes, marks=result.marks, _variables=result.columns
+            path, tuple(result.columns), result.units, axes=result.axes, marks=result.marks, _columns=result.columns
         )
     if path.suffix.lower() == MAT:
         return _read_mat(path)
     signals = sinumerik_xml.read_signals(path) if path.suffix.lower() == sinumerik_xml.SUFFIX else read_scope(path)
     if signals is not None:
         _check(path, signals.columns)
-        return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _variables=signals.columns)
+        return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _columns=signals.columns)
     table = read_table(path, remarks_ahead=True)
     taken = f"{path}: the header is taken to be line {table.header_line}; the lines ahead of it are not read"
     notes = (taken,) if table.remarks else ()
@@ -141,35 +187,26 @@ def _check(path: Path, columns: Mapping[str, Array]) -> None:
 
 
 def _read_mat(path: Path) -> Recording:
-    variables = _load(path)
-    vectors: list[str] = []
-    scalars: dict[str, float] = {}
-    others: list[str] = []
-    for name, value in flat(variables):
-        if isinstance(value, Other):
-            others.append(
-                "an object such as a table or timetable, which only MATLAB reads: save its columns as vectors"
-                if value.opaque
-                else f"{name!r} ({value.what})"
-            )
-        elif value.dtype.kind in REAL and value.ndim == 1 and value.size > 1:
-            vectors.append(name)
-        elif value.dtype.kind in REAL and value.size == 1:
-            scalars[name] = float(value.item())
-        else:
-            others.append(f"{name!r} ({value.dtype} of shape {value.shape})")
-    if not vectors:
-        there = f"; there is {', '.join(others)}" if others else ""
-        raise InputError(f"{path}: no variable is a vector of real numbers{there}")
-    return Recording(path, tuple(vectors), dict.fromkeys(vectors, ""), scalars, _variables=variables)
+    """A MAT file; of rows at one instant, as simulators write them at events, the last one counts."""
+    mat = read_columns(path)
+    rows, notes = None, tuple(mat.notes)
+    time = mat.columns.get("time", np.zeros(0))
+    if len(time) > 1 and bool(np.any(again := np.diff(time) == 0)) and mat.units["time"]:
+        rows = np.append(~again, True)
+        count = int(again.sum())
+        notes = (*notes, f"{path}: {count} of {len(time)} rows are left out: of rows at one instant the last counts")
+    return Recording(
+        path, tuple(mat.columns), mat.units, mat.scalars, notes=notes, unread=mat.others,
+        _columns=mat.columns, _spellings=mat.spellings, _rows=rows,
+    )  # fmt: skip
 
 
 def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
     """Write columns of a recording as a CSV trace and return the trace.
 
     columns  (variable, new name, unit); the first must be the time (name "time", any unit of time). Values whose unit
-             the file shows are converted to that unit; others are taken to be in it. A variable inside a structure of
-             a MAT file is "structure.field". Empty: all columns, as the file calls them.
+             the file shows are converted to that unit; others are taken to be in it. Variables of a MAT file are
+             called as MATLAB writes them: structure.field, data(:,2). Empty: all columns, as the file calls them.
 
     Raises InputError: what read_recording() refuses, a variable that is missing (with those there are), no vector of
     real finite numbers, or of another length than the time. OutputError: `out` cannot be written.
@@ -185,12 +222,13 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
     recording = read_recording(path)
     if not columns:
         if recording.units.get("time") != "s":
+            first = next((name for name in recording.names if name.lower() in TIME_NAMES), recording.names[0])
+            text = f"{first}=time:s"
             raise InputError(
-                f"{path}: which column is the time? --column t=time:s, and one for each other column; there are "
-                f"{', '.join(sorted(recording.names))}"
+                f"{path}: which column is the time? --column {quote(text)}, and one "
+                f"for each other column; there are {recording.there}"
             )
-        columns = [("time", "time", "s")]
-        columns += [(name, name, recording.units[name]) for name in recording.names if name != "time"]
+        columns = [("time", "time", "s"), *recording.beside("time")]
     read = recording.read(variable for variable, _, _ in columns)
     scales = {variable: _scale(recording, variable, unit) for variable, _, unit in columns}
     read = {name: values if scales[name] == 1 else values * scales[name] for name, values in read.items()}
@@ -206,7 +244,7 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
 
 def _scale(recording: Recording, variable: str, unit: str) -> float:
     """From the file's unit to `unit`; 1 where the file has none that is known. InputError: of another dimension."""
-    known = recording.units.get(variable, "")
+    known = recording.units.get(recording.named(variable), "")
     if not known or known == unit:
         return 1.0
     try:
@@ -217,35 +255,3 @@ def _scale(recording: Recording, variable: str, unit: str) -> float:
         return float(units.factor(known, unit))
     except InputError as error:
         raise InputError(f"{recording.path}: column {variable!r}: {error}") from None
-
-
-def _load(path: Path) -> dict[str, Value]:
-    return {name: value for name, value in read_mat(path).items() if name and not name.startswith("__")}
-
-
-def _vector(path: Path, variables: Mapping[str, Value], variable: str) -> Array:
-    names = [variable] if variable in variables else variable.split(".")
-    value = variables.get(names[0])
-    if value is None:
-        raise InputError(f"{path}: no variable {names[0]!r}{suggest(names[0], variables)}")
-    for depth, name in enumerate(names[1:], start=1):
-        if not isinstance(value, dict):
-            raise InputError(f"{path}: {'.'.join(names[:depth])!r} is no structure")
-        if name not in value:
-            raise InputError(f"{path}: no field {name!r} in {'.'.join(names[:depth])!r}{suggest(name, value)}")
-        value = value[name]
-    if isinstance(value, (dict, Other)):
-        raise InputError(f"{path}: {variable!r} is no numbers; a vector of real numbers is needed")
-    if value.dtype.kind not in REAL or value.ndim != 1:
-        kind = f"{value.dtype} of shape {value.shape}"
-        raise InputError(f"{path}: {variable!r} is {kind}; a vector of real numbers is needed")
-    numbers = value.astype(np.float64)
-    if not np.all(np.isfinite(numbers)):
-        raise InputError(f"{path}: {variable!r} is not finite at element {int(np.argmin(np.isfinite(numbers))) + 1}")
-    numbers, wrong = recorded(numbers)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(
-            f"{path}: {variable!r} is {numbers[row]:g} at element {row + 1}; allowed: up to {MAX_MAGNITUDE:g}"
-        )
-    return numbers

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -13,10 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedsim import units as quantities
 from feedsim.errors import InputError
+from feedsim.findings import Note
 from feedsim.trace.trace import Array, Columns, check_name, check_unit, matching
 
 Complexes = NDArray[np.complex128]
 
+STANDARD_GRAVITY = 9.80665  # m/s^2: the unit g of accelerometers
+_GRAVITY = re.compile(r"(?<![A-Za-z])[gG](?:_?n|'s)?(?![A-Za-z_^0-9])")
 FREQUENCY_ROUNDING = 1e-9  # of a frequency: quotients of times carry it
 
 
@@ -29,6 +35,7 @@ class FrequencyResponse(Columns[Complexes]):
         columns: name -> (N,) complex values. Names are output/input, such as "Z.n_a/Z.M_a".
         units: name -> unit, such as "(rad/s)/(N.m)"; "" where none is known.
         coherence: name -> (N,) from 0 to 1; only for what was measured.
+        notes: what became of the values on their way from a file.
 
     Arrays are copied and made read-only.
 
@@ -42,6 +49,7 @@ class FrequencyResponse(Columns[Complexes]):
     columns: Mapping[str, Complexes]
     units: Mapping[str, str] = field(default_factory=dict)
     coherence: Mapping[str, Array] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     kind = "frequency response"
 
     def __repr__(self) -> str:
@@ -92,23 +100,81 @@ class FrequencyResponse(Columns[Complexes]):
             {name: self.columns[name] for name in kept},
             {name: self.units[name] for name in kept},
             {name: self.coherence[name] for name in kept if name in self.coherence},
+            self.notes,
         )
 
     def converted(self, units: Mapping[str, str]) -> FrequencyResponse:
-        """With the columns named in `units` in that unit.
+        """With the columns named in `units` in that unit, integrated or differentiated in time where that leads to it.
+
+        An accelerance is divided by -(2 pi f)^2 to be a receptance, for example, and a dynamic stiffness is taken as
+        its reciprocal; a note has it.
 
         Raises:
             InputError: no such column, one without a known unit, or a unit of another dimension.
         """
-        columns = dict(self.columns)
+        columns, notes = dict(self.columns), list(self.notes)
         for name, wanted in units.items():
             if not (given := self.unit(name)):
                 raise InputError(f"frequency response {name!r} has no unit; it cannot be converted to {wanted}")
             try:
-                columns[name] = self[name] * float(quantities.factor(given, wanted))
+                way = _way(given, wanted)
             except InputError as error:
                 raise InputError(f"frequency response {name!r}: {error}") from None
-        return FrequencyResponse(self.frequency, columns, {**self.units, **units}, self.coherence)
+            values = self[name]
+            if way.reciprocal:
+                if not np.all(values):
+                    raise InputError(f"frequency response {name!r}, in {given}: has no reciprocal, as a value is 0")
+                values = 1 / values
+            columns[name] = values * way.factor / (2j * math.pi * self.frequency) ** way.order
+            if words := way.words():
+                notes.append(Note(f"{name} is in {given}: {words} to be in {wanted}"))
+        return FrequencyResponse(self.frequency, columns, {**self.units, **units}, self.coherence, tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """From one unit of a response to another: reciprocal, factor, division by (j 2 pi f)^order. gravity: the unit g is
+    that of an acceleration."""
+
+    reciprocal: bool
+    factor: float
+    order: int
+    gravity: bool
+
+    def words(self) -> str:
+        by = {1: "j 2 pi f", 2: "-(2 pi f)^2"}.get(abs(self.order))
+        return ", ".join(
+            text
+            for text, is_so in (
+                (f"g is taken as {STANDARD_GRAVITY} m/s^2", self.gravity),
+                ("the reciprocal is taken", self.reciprocal),
+                (f"{'divided' if self.order > 0 else 'multiplied'} by {by}", self.order),
+            )
+            if is_so
+        )
+
+
+def _way(given: str, wanted: str) -> _Way:
+    """A plain number is converted to plain numbers alone. InputError: there is no way."""
+    problems = []
+    plain = quantities.unit(wanted).dimension == quantities.unit("1").dimension
+    for gravity in (False, True):
+        text = _GRAVITY.sub("(m/s^2)", given) if gravity else given
+        for reciprocal in (False,) if plain else (False, True):
+            for order in (0,) if plain else (0, 1, 2, -1, -2):
+                per = f"(1/({text}))" if reciprocal else f"({text})"
+                try:
+                    factor = quantities.factor(f"{per}*s^{order}" if order else per, wanted)
+                except InputError as error:
+                    problems.append(error)
+                    continue
+                return _Way(reciprocal, float(factor) * (STANDARD_GRAVITY if gravity else 1), order, gravity)
+    raise problems[0]
+
+
+def without_zero(path: Path, frequency: Array) -> tuple[str, ...]:
+    """The note on a first line at 0 Hz, which no response has; none where there is no such line."""
+    return (Note(f"{path}: the line at 0 Hz is left out"),) if frequency.size and frequency[0] == 0 else ()
 
 
 def quotient_unit(output: str, input: str) -> str:

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from feedsim import units
 from feedsim.errors import InputError
 from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import quoted, shortest
 from feedsim.trace.files import written_whole
-from feedsim.trace.response import Complexes, FrequencyResponse
+from feedsim.trace.response import Complexes, FrequencyResponse, without_zero
 from feedsim.trace.sinumerik_xml import SUFFIX, read_response_xml
 from feedsim.trace.trace import Array
 from feedsim.trace.uff import read_response_uff
@@ -37,7 +38,8 @@ COLUMN_PARTS = {
 }
 _PART = {word: part for part, words in COLUMN_PARTS.items() for word in words}
 _COLUMN_NAME = re.compile(rf"(?:(.*?)[\s_.:]+)?({'|'.join(sorted(_PART, key=len, reverse=True))})", re.IGNORECASE)
-_DECIBELS = re.compile(r"dB(?:\s+re\s+(.+))?")
+_DECIBELS = re.compile(r"dB(?:\s*re\s+(.+)|\s*\(re\s+(.+)\))?")
+_REFERENCE = re.compile(rf"({units.NUMBER})\s*(?=[^\W\d_]|\()(.+)")  # "1 um/N", "1e-6 m/N"
 
 
 def write_response(path: str | Path, response: FrequencyResponse) -> None:
@@ -98,6 +100,7 @@ def read_overlay(text: str) -> FrequencyResponse:
         {name: response[source]},
         {name: response.unit(source)},
         {name: response.coherence[source]} if source in response.coherence else {},
+        response.notes,
     )
 
 
@@ -131,14 +134,14 @@ def read_response_csv(path: str | Path, *, columns: Mapping[str, Sequence[str]] 
     kept = hertz > 0 if hertz[0] == 0 else np.ones(hertz.size, dtype=np.bool_)
     if not kept.any():
         raise InputError(f"{path}: no row above 0 Hz")
-    responses, units, coherence = {}, {}, {}
+    responses, unit_texts, coherence = {}, {}, {}
     for name, parts in indexes.items():
-        response, units[name] = _values(table, parts, values)
+        response, unit_texts[name] = _values(table, parts, values)
         responses[name] = response[kept]
         if "coherence" in parts:
             coherence[name] = values[parts["coherence"]][kept]
     try:
-        return FrequencyResponse(hertz[kept], responses, units, coherence)
+        return FrequencyResponse(hertz[kept], responses, unit_texts, coherence, without_zero(path, hertz))
     except InputError as error:
         raise InputError(f"{table.head}: {error}") from None
 
@@ -197,7 +200,10 @@ def _values(table: Table, parts: Mapping[str, int], values: Mapping[int, Array])
         return values[parts["re"]] + 1j * values[parts["im"]], given[0]
     magnitude, unit = values[parts["magnitude"]], table.units[parts["magnitude"]]
     if decibels := _DECIBELS.fullmatch(unit):
-        magnitude, unit = 10 ** (magnitude / 20), decibels[1] or ""
+        unit, size = decibels[1] or decibels[2] or "", 1.0
+        if reference := _REFERENCE.fullmatch(unit):
+            size, unit = units.finite(reference[1]), reference[2]
+        magnitude = size * 10 ** (magnitude / 20)
     elif np.any(magnitude < 0):
         line = table.lines[int(np.argmax(magnitude < 0))]
         raise InputError(

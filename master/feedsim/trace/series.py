@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.trace.cells import TIME_NAMES, Decimal, Table, decimal_mark, fits, read_table, round_unit
+from feedsim.trace.mat_columns import MAT, named, read_columns
 from feedsim.trace.trace import Array, TimeColumns, Trace
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
@@ -69,7 +70,7 @@ def as_series(trace: Trace | Series) -> Series:
 
 
 def read_series(path: str | Path, *, time: str | None = None) -> Series:
-    """Read the CSV file of any simulator; layout, separators and decimal marks as `read_csv`.
+    """Read the CSV or MAT file of any simulator; layout, separators and decimal marks as `read_csv`.
 
     time   name of the time column, or NAME:UNIT where there is no column of that whole name and the header does not
            show the unit (default s); default "time" or "t" in any case, else a first column whose unit is a time
@@ -78,6 +79,8 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     of the time that is not the header's.
     """
     path = Path(path)
+    if path.suffix.lower() == MAT:
+        return _of_mat(path, time)
     table = read_table(path, _heads, as_numbers=True)
     time_unit = None
     if time is not None and time not in table.names:
@@ -115,6 +118,40 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     skipped = tuple(table.names[i] for i, values in read.items() if values is None and table.names[i] not in broken)
     of_columns = {name: table.units[table.names.index(name)] for name in columns}
     return Series(seconds, columns, of_columns, skipped, broken)
+
+
+def _of_mat(path: Path, time: str | None) -> Series:
+    """The columns of a MAT file that are as long as its time."""
+    mat = read_columns(path)
+    name, unit = time or "", ""
+    if time is not None and named(time, mat.columns, mat.spellings) not in mat.columns:
+        name, _, unit = time.rpartition(":")
+    at = named(name, mat.columns, mat.spellings)
+    if time is None:
+        at = next((name for name in mat.columns if name.lower() in TIME_NAMES), "")
+    if at not in mat.columns:
+        first = next(iter(mat.columns))
+        problem = f"no column {time!r}" if time else "which column is the time? It is called time or t, or name it"
+        raise InputError(
+            f"{path}: {problem}, for example {first}:s, or map all columns of a drive's record; there is "
+            f"{few([*mat.columns], 20)}"
+        )
+    known = mat.units[at]
+    if unit and known and units.factor(unit, "s") != units.factor(known, "s"):
+        raise InputError(f"{path}: the time {at!r} is in {known}, not {unit}")
+    seconds = mat.columns[at].astype(np.float64) * float(units.factor(unit or known or "s", "s"))
+    if (wrong := np.flatnonzero(~np.isfinite(seconds))).size:
+        raise InputError(f"{path}: the time {at!r} is {seconds[wrong[0]]} at element {int(wrong[0]) + 1}")
+    columns = {
+        name: values.astype(np.float64, copy=False)
+        for name, values in mat.columns.items()
+        if len(values) == len(seconds) and name != at
+    }
+    skipped = tuple(name for name in mat.columns if name != at and name not in columns)
+    try:
+        return Series(seconds, columns, {name: mat.units[name] for name in columns}, skipped)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _heads(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

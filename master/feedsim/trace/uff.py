@@ -7,7 +7,8 @@ Functions are called as their header has it, response over reference: "12:+Z/7:+
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,14 @@ from numpy.typing import NDArray
 from feedsim import units
 from feedsim.errors import InputError, no_such_file
 from feedsim.extras import need
-from feedsim.trace.response import FrequencyResponse, quotient_unit
+from feedsim.findings import Note
+from feedsim.trace.response import FrequencyResponse, quotient_unit, without_zero
 
 Floats = NDArray[np.float64]
 
 DATASET = 58
 RESPONSE, COHERENCE = 4, 6  # function types
+ACCELERATION = 12  # specific data type
 FUNCTIONS = {
     0: "general function", 1: "time response", 2: "auto spectrum", 3: "cross spectrum", 5: "transmissibility",
     9: "power spectral density", 12: "spectrum",
@@ -33,13 +36,20 @@ DIRECTION_CODES |= {-code: text.replace("+", "-") for code, text in DIRECTION_CO
 # Frequencies of functions that go together agree up to the digits of the file, 13.5E.
 FREQUENCY_TOLERANCE = 1e-4
 NONE = ("", "NONE")
+UNIT_SYSTEM = 164  # dataset of units: factors from SI to those of the file
+# Specific data type of an axis -> its unit along a direction, and about one, in SI.
+TYPE_UNITS = {
+    8: ("m", "rad"), 11: ("m/s", "rad/s"), 12: ("m/s^2", "rad/s^2"), 9: ("N", "N.m"), 13: ("N", "N.m"),
+}  # fmt: skip
+TYPE_NAMES = {8: "displacement", 11: "velocity", 12: "acceleration", 9: "reaction force", 13: "excitation force"}
+ROTATIONS = (4, 5, 6)  # codes of directions
 
 
 def read_response_uff(path: str | Path) -> FrequencyResponse:
     """All frequency response functions of a universal file that share their frequencies.
 
-    A first line at 0 Hz is left out. Units are those of the axis labels (numerator/denominator), "" where there are
-    none.
+    A first line at 0 Hz is left out. Units are those of the axis labels (numerator/denominator); where one is missing,
+    that of the axis' type in SI, by the file's dataset 164 where it has one; else "".
 
     Raises:
         InputError: no universal file, no frequency response in it, a function that cannot be read, two of one name,
@@ -66,22 +76,67 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
     first = next(iter(functions))
     frequency = _frequencies(path, first, functions[first])
     kept = slice(1 if frequency[0] == 0 else 0, None)
-    columns, units, coherence = {}, {}, {}
+    columns, unit_texts, coherence, notes = {}, {}, {}, list(without_zero(path, frequency))
     for name, entry in functions.items():
         _check_same(path, name, _frequencies(path, name, entry), frequency)
-        columns[name] = np.asarray(entry["data"], dtype=np.complex128)[kept]
-        units[name] = quotient_unit(_label(entry, "ordinate"), _label(entry, "orddenom"))
+        over, under = (_Axis.of(entry, axis, end) for axis, end in (("ordinate", "rsp"), ("orddenom", "ref")))
+        columns[name] = np.asarray(entry["data"], dtype=np.complex128)[kept] * (over.factor / under.factor)
+        unit_texts[name] = quotient_unit(over.unit, under.unit)
+        notes += [Note(f"{path}: function {name!r}: {words}") for axis in (over, under) for words in axis.notes]
         if other := coherences.get(name):
             _check_same(path, f"coherence of {name}", _frequencies(path, name, other), frequency)
             coherence[name] = np.clip(np.real(other["data"])[kept], 0, 1)
     try:
-        return FrequencyResponse(frequency[kept], columns, units, coherence)
+        return FrequencyResponse(frequency[kept], columns, unit_texts, coherence, tuple(notes))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
+@dataclass(frozen=True)
+class _Axis:
+    """Unit of the ordinate or of its denominator, what its values are multiplied with, and notes."""
+
+    unit: str
+    factor: float = 1.0
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, function: Mapping[str, Any], axis: str, end: str) -> _Axis:
+        label, kind = _label(function, axis), int(function.get(f"{axis}_spec_data_type") or UNKNOWN_TYPE)
+        if kind not in TYPE_UNITS:
+            return cls(label)
+        turns = abs(int(function[f"{end}_dir"])) in ROTATIONS
+        unit = TYPE_UNITS[kind][turns]
+        if label:
+            return cls(label, notes=_contradiction(label, kind, unit))
+        length, force = function["unit_factors"]
+        scale = {"N": force, "N.m": force * length}.get(unit, 1.0 if turns else length)
+        return cls(unit, 1 / scale, (f"no label of its unit; {unit} by its type, {TYPE_NAMES[kind]}",))
+
+
+def _contradiction(label: str, kind: int, unit: str) -> tuple[str, ...]:
+    """The note on a label whose unit is not of the axis' type; g is that of an acceleration."""
+    try:
+        same = units.unit(label).dimension == units.unit(unit).dimension
+    except InputError:
+        return ()
+    if same or (kind == ACCELERATION and label in ("g", "G")):
+        return ()
+    return (f"its label says {label}, its type {TYPE_NAMES[kind]}; the label counts",)
+
+
+def _unit_factors(path: Path, sets: Sequence[Mapping[str, Any]]) -> tuple[float, float]:
+    """Length and force of 1 m and 1 N in the file's units; 1 without a dataset 164."""
+    factors = [(float(entry["length"]), float(entry["force"])) for entry in sets]
+    if any(not (math.isfinite(value) and value > 0) for pair in factors for value in pair):
+        raise InputError(f"{path}: dataset 164 has factors of units that are no numbers above 0")
+    if len(set(factors)) > 1:
+        raise InputError(f"{path}: {len(factors)} datasets 164 give different units; give a file with one")
+    return factors[0] if factors else (1.0, 1.0)
+
+
 def _sets(path: Path) -> list[Mapping[str, Any]]:
-    """Functions of the file; other datasets are left alone."""
+    """Functions of the file, with the "unit_factors" of the file; other datasets are left alone."""
     pyuff = need("pyuff", "a universal file")
     if not path.is_file():
         raise InputError(no_such_file(path))
@@ -93,15 +148,16 @@ def _sets(path: Path) -> list[Mapping[str, Any]]:
     if DATASET not in kinds:
         there = f"; there is {', '.join(str(kind) for kind in dict.fromkeys(kinds))}" if kinds else ""
         raise InputError(f"{path}: no dataset 58 (function at nodal degrees of freedom){there}")
-    result = []
+    read: dict[int, list[Mapping[str, Any]]] = {DATASET: [], UNIT_SYSTEM: []}
     for i, kind in enumerate(kinds):
-        if kind != DATASET:
+        if kind not in read:
             continue
         try:
-            result.append(file.read_sets(i))
+            read[kind].append(file.read_sets(i))
         except Exception as error:
-            raise InputError(f"{path}: dataset {i + 1} (of type 58) cannot be read: {error}") from None
-    return result
+            raise InputError(f"{path}: dataset {i + 1} (of type {kind}) cannot be read: {error}") from None
+    factors = _unit_factors(path, read[UNIT_SYSTEM])
+    return [{**function, "unit_factors": factors} for function in read[DATASET]]
 
 
 def _frequencies(path: Path, name: str, function: Mapping[str, Any]) -> Floats:

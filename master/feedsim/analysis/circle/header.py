@@ -26,8 +26,6 @@ LABELS = {
                      "vorschub", "bahnvorschub", "bahngeschwindigkeit", "vorschubgeschwindigkeit", "avance",
                      "vitesse d'avance")),
 }  # fmt: skip
-# Files of instruments that only their own programs read.
-OWN_FORMATS = (".b5r", ".b20", ".b5s", ".bbx", ".kgm", ".acc")
 _LINE = re.compile(
     r"""^["'\s#;,%*]*(?P<label>[^\W\d][^:=;,\t\[(\d"]*?)\s*       # a label,
         (?:[\[(](?P<before>[^\])]*)[\])])?["'\s]*[:=;,\t\s]\s*["']?  # its unit in brackets, a separator,
@@ -36,15 +34,6 @@ _LINE = re.compile(
     """,
     re.VERBOSE,
 )
-
-
-def own_format(path: Path) -> None:
-    """InputError: a file that only its instrument's program reads."""
-    if path.suffix.lower() in OWN_FORMATS:
-        raise InputError(
-            f"{path}: files {path.suffix} are read by their instrument's own program, and how they are built is not "
-            "public; export the test as text or CSV, with angle and deviation (or radius), or both positions"
-        )
 
 
 def header_values(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:

@@ -18,7 +18,7 @@ import numpy as np
 from feedsim import units
 from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_feed, unusual_radius
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
-from feedsim.analysis.circle.header import Told, own_format
+from feedsim.analysis.circle.header import Told
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
@@ -96,7 +96,6 @@ def read_circle(
     radii: list[float] = []
     headers = Told(radius, feed)
     for file in files:
-        own_format(file)
         recording = read_recording(file)
         headers.add(file, recording.remarks)
         radius = headers.radius

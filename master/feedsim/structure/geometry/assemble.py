@@ -61,6 +61,7 @@ class Assembler:
             labels=mesh.labels,
             geometry=_geometry(mesh, positions),
             pose=pose,
+            units=None,
         )
 
 

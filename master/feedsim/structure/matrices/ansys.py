@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.files import regular
 from feedsim.scenario.structure.matrices import AnsysStructure
 from feedsim.structure.assembly import DEGREES, counted
 from feedsim.structure.matrices.raw import FREEDOM_NAMES, Raw, from_triangle
@@ -32,6 +33,7 @@ def read(structure: AnsysStructure) -> Raw:
             (constraint equations, lumped or unsymmetric matrices, degrees of freedom other than displacements).
     """
     file = structure.full
+    regular.refuse_unread(file)
     module = _reader()
     try:
         with warnings.catch_warnings():

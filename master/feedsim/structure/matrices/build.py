@@ -89,6 +89,7 @@ def build(structure: FiniteElements, system: UnitSystem, raw: Raw, name: str) ->
         labels=tuple(labels[i] for i in kept),
         geometry=_geometry(raw.points, raw, kept, length) if raw.points else None,
         pose=dict(structure.pose),
+        units=system,
     )
     return Imported(assembly, tuple(notes))
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,8 @@ from feedsim.structure.assembly import Integers
 from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw, from_triangle
 from feedsim.structure.matrices.tables import read_points
 
+# Types of elements that CalculiX makes solids of: beams, shells, plane and axisymmetric ones, membranes, trusses.
+_EXPANDED = re.compile(r"B2|B3|S[0-9]|CP[SE]|CAX|M3D|T[23]D")
 ABSENT = (
     "CalculiX has eliminated it: leave the row out if the node is held there (*BOUNDARY), name the node it depends on "
     "if it is tied (*EQUATION, *TIE, *RIGID BODY)"
@@ -32,7 +35,7 @@ def read(structure: CalculixStructure) -> Raw:
     Raises:
         InputError: a file is not readable, or the files are not of one model.
     """
-    nodes, directions = _dofs(structure.dofs)
+    nodes, directions = _dofs(structure.dofs, structure.mesh)
     mass = _matrix(structure.mass, len(nodes), structure.dofs)
     stiffness = _matrix(structure.stiffness, len(nodes), structure.dofs)
     points = None
@@ -43,12 +46,12 @@ def read(structure: CalculixStructure) -> Raw:
     return Raw(mass, stiffness, nodes, directions, np.zeros(len(nodes), dtype=bool), ABSENT, points)
 
 
-def _dofs(file: Path) -> tuple[tuple[str, ...], Integers]:
-    """Node and direction of each row: lines such as 12.3 for node 12, uz."""
+def _dofs(file: Path, mesh: Path | None) -> tuple[tuple[str, ...], Integers]:
+    """Node and direction of each row: lines such as 12.3 for node 12, uz. mesh: for the message on a repeated row."""
     nodes, directions, seen = [], [], set[tuple[str, str]]()
     try:
-        lines = file.read_text(encoding="ascii").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = regular.content(file).decode("ascii").splitlines()
+    except (InputError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: cannot be read: {error}") from error
     for line, text in enumerate(lines, start=1):
         if not text.strip():
@@ -57,7 +60,9 @@ def _dofs(file: Path) -> tuple[tuple[str, ...], Integers]:
         if not (node.isdecimal() and point and direction in ("1", "2", "3", "4", "5", "6")):
             raise InputError(f"{file}:{line}: {text.strip()!r}; node.direction is expected, such as 12.3")
         if (node, direction) in seen:
-            raise InputError(f"{file}:{line}: node {node} {FREEDOM_NAMES[int(direction) - 1]} occurs twice")
+            raise InputError(
+                f"{file}:{line}: node {node} {FREEDOM_NAMES[int(direction) - 1]} occurs twice. {_expanded(mesh)}"
+            )
         seen.add((node, direction))
         nodes.append(node)
         directions.append(int(direction) - 1)
@@ -66,14 +71,31 @@ def _dofs(file: Path) -> tuple[tuple[str, ...], Integers]:
     return tuple(nodes), np.array(directions, dtype=np.int64)
 
 
+def _expanded(mesh: Path | None) -> str:
+    """Why nodes occur several times, and what to do."""
+    types = [] if mesh is None else [options.get("TYPE", "").upper() for _, options in _elements(mesh)]
+    there = ", ".join(dict.fromkeys(name for name in types if _EXPANDED.match(name)))
+    shown = f" ({mesh} has {there})" if there else ""
+    return (
+        f"CalculiX expands beams, shells and other flat elements into solids{shown}, whose nodes share a number. "
+        "Use solid elements (C3D8, C3D20), or kind: matrices, where degrees of freedom are counted and not named"
+    )
+
+
+def _elements(mesh: Path) -> Iterator[tuple[str, dict[str, str]]]:
+    """Keyword and options of the cards *ELEMENT."""
+    for _, text in _cards(mesh):
+        if text.startswith("*") and (card := _options(text))[0] == "ELEMENT":
+            yield card
+
+
 def _matrix(file: Path, size: int, dofs: Path) -> sparse.csc_array:
     """One triangle as lines of row, column (from 1), value."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of an empty file, which is reported below
-            table = np.loadtxt(file, dtype=np.float64, ndmin=2, encoding="ascii")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error}") from error
+            with regular.opened(file) as stream:
+                table = np.loadtxt(stream, dtype=np.float64, ndmin=2, encoding="ascii")
     except ValueError as error:
         raise InputError(f"{file}: lines of row, column and value are expected: {error}") from error
     if table.size == 0 or table.shape[1] != 3:

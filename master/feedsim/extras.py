@@ -1,6 +1,6 @@
 """Packages that only some of the work needs: what is said where one is missing.
 
-A command says which extra it needs (:class:`feedsim.cli.options.Command`), and is not begun without; work that finds
+A command says which extra it needs (``@job(..., needs=...)``), and is not begun without; work that finds
 out later, such as drawing, calls :func:`ask` ahead of its imports. Whoever meets the person asks :func:`missing` what
 to say of an import that failed all the same. May use: errors.
 """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from feedsim.jobs.compensate import CompensateResult
+from feedsim.jobs.tune_feedforward import CompensateResult
 
 from feedsim import cosim, nc, scenario
 from feedsim.analysis import compensation_errors as module

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from feedsim.jobs.compensate import _open_of as open_values
+from feedsim.jobs.tune_feedforward import _open_of as open_values
 
 from feedsim import cosim, nc
 from feedsim.errors import InputError, SimulationError

@@ -37,7 +37,7 @@ static unsigned references[2] = {7, 8};
 static void tables_are_used_row_by_row(void) {
     double sent[3][2] = {{0, 10}, {0, 11}, {0, 12}}, got[2] = {0, 0};
     Notes setting = {.calls = 0}, getting = {.calls = 0};
-    Fault fault = {-1, -1};
+    Fault fault = {.cycle = -1, .operation = -1};
     Operation operations[] = {
         {.kind = EXCHANGE_due,
          .what = EXCHANGE_set_real,
@@ -94,7 +94,7 @@ static fmi2Status note_mark(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean
 
 static void a_mark_says_whose_call_it_is(void) {
     double a = 1, y = 0;
-    Fault mark = {-1, -1};
+    Fault mark = {.cycle = -1, .operation = -1, .looked_at = -1, .changed_by = -1};
     Seen first = {.mark = &mark}, second = {.mark = &mark};
     Operation operations[] = {
         {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
@@ -115,7 +115,7 @@ static void a_mark_says_whose_call_it_is(void) {
 static void failure_ends_the_loop(void) {
     double a = 1, y = 0;
     Notes notes = {.fail_at = 0.095};
-    Fault fault = {-1, -1};
+    Fault fault = {.cycle = -1, .operation = -1};
     Operation operations[] = {
         {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
         {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .s = 0.01, .h = 0.02},
@@ -200,7 +200,7 @@ static void energies_of_the_bond(void) {
 static void turns_are_worked_part_by_part(void) {
     double value[2] = {0, 5}, sent[2][2] = {{0, 6}, {0, 7}}, got = 0;
     Notes notes = {.fail_at = 2.5};
-    Fault fault = {-1, -1};
+    Fault fault = {.cycle = -1, .operation = -1};
     Operation operations[] = {
         {.kind = EXCHANGE_set_real,
          .count = 2,

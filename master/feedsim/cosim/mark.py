@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 SIZE = 4096
-_HEAD = 24  # bytes of cycle, operation, and how often anything was noted
+_HEAD = 40  # bytes of the numbers
 # in place of an operation: a call that `text` describes; code of our own, which takes its time
 DESCRIBED_CALL, OWN_CODE = -1, -2
 
@@ -23,8 +23,8 @@ class Mark:
     """A note in a file that two processes have in their memory.
 
     Attributes:
-        numbers: (3,) control cycle, operation in it (or DESCRIBED_CALL, or OWN_CODE), notes so far. The native loop
-            writes the first two itself (exchange_run_marked).
+        numbers: (5,) control cycle, operation in it (or DESCRIBED_CALL, or OWN_CODE), two of the native loop, notes so
+            far. The native loop writes the first four itself (exchange_run_marked).
     """
 
     def __init__(self, path: Path) -> None:
@@ -33,19 +33,19 @@ class Mark:
             path.write_bytes(bytes(SIZE))
         with path.open("r+b") as file:
             self._memory = mmap.mmap(file.fileno(), SIZE)
-        self.numbers = np.frombuffer(self._memory, dtype=np.int64, count=3)
+        self.numbers = np.frombuffer(self._memory, dtype=np.int64, count=5)
 
     def at(self, text: str, what: int = DESCRIBED_CALL) -> None:
         """Note what comes next."""
         content = text.encode("utf-8", "replace")[: SIZE - _HEAD - 1]
         self._memory[_HEAD : _HEAD + len(content) + 1] = content + b"\0"
         self.numbers[1] = what
-        self.numbers[2] += 1
+        self.numbers[4] += 1
 
     def back(self) -> None:
         """Note that the call has come back."""
         self.numbers[1] = OWN_CODE
-        self.numbers[2] += 1
+        self.numbers[4] += 1
 
     @property
     def text(self) -> str:
@@ -58,10 +58,14 @@ class Mark:
 
 
 class Watched:
-    """The mark of this process, and who needs to know which operations its numbers stand for."""
+    """The mark of this process, and who needs to know which operations its numbers stand for.
+
+    spent: whether another process is to do what comes next.
+    """
 
     def __init__(self) -> None:
         self.mark: Mark | None = None
+        self.spent = False
         self.process = os.getpid()
 
     def describe(self, T_c: float, operations: Sequence[tuple[str, str, float]]) -> None:

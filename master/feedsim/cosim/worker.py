@@ -163,7 +163,7 @@ class _Worker:
 
     def _where(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> str:
         """Which unit, in what, when; what a sentence begins with."""
-        cycle, operation, _ = self._mark.state()
+        cycle, operation, *_ = self._mark.state()
         T_c, known = operations
         if operation == OWN_CODE:
             return f'the worker process, behind "{self._mark.text}",'

@@ -10,13 +10,15 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 SIZE = 4096
 _HEAD = 40  # bytes of the numbers
-# in place of an operation: a call that `text` describes; code of our own, which takes its time
-DESCRIBED_CALL, OWN_CODE = -1, -2
+# in place of an operation: a call that `text` describes; code of our own, which takes its time; a process that cannot
+# go on, as `text` says
+DESCRIBED_CALL, OWN_CODE, SPOILED = -1, -2, -3
 
 
 class Mark:
@@ -27,12 +29,19 @@ class Mark:
             far. The native loop writes the first four itself (exchange_run_marked).
     """
 
-    def __init__(self, path: Path) -> None:
-        """path: the file, SIZE bytes long; it is made where it is missing."""
+    def __init__(self, path: Path, closed: bool = False) -> None:
+        """path: the file, SIZE bytes long; it is made where it is missing. closed: leave no descriptor open by which
+        another program could write into it; in a process that does nothing beside."""
+        self.path = path
         if not path.exists():
             path.write_bytes(bytes(SIZE))
         with path.open("r+b") as file:
-            self._memory = mmap.mmap(file.fileno(), SIZE)
+            own = os.dup(file.fileno())
+            os.close(own)
+            self._memory = mmap.mmap(file.fileno(), SIZE)  # keeps a copy of the descriptor, with the lowest free number
+        if closed:
+            with Path(os.devnull).open("r+b") as nothing:
+                os.dup2(nothing.fileno(), own, inheritable=False)
         self.numbers = np.frombuffer(self._memory, dtype=np.int64, count=5)
 
     def at(self, text: str, what: int = DESCRIBED_CALL) -> None:
@@ -71,6 +80,9 @@ class Watched:
     def describe(self, T_c: float, operations: Sequence[tuple[str, str, float]]) -> None:
         """Say what the operations of a cycle are: unit, what it is at, when in the cycle [s]."""
 
+    def deliver(self, result: Any) -> None:
+        """Hand over what was asked for, ahead of the units' last calls, in which one may end the process."""
+
 
 _here: Watched | None = None
 
@@ -84,6 +96,12 @@ def watch(here: Watched | None) -> None:
     """Have this process watched."""
     global _here
     _here = here
+
+
+def deliver(result: Any) -> None:
+    """Hand over a result with `notes` or `warnings` to a process that watches, where there is one."""
+    if _here is not None:
+        _here.deliver(result)
 
 
 @contextmanager

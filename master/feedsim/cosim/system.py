@@ -261,7 +261,8 @@ class System(Closing):
 
     @property
     def warnings(self) -> list[str]:
-        ahead = [warning for part in self._open if isinstance(part, Archive) for warning in part.warnings]
+        archives = dict.fromkeys(unit.archive for unit in self.instances.values())
+        ahead = [warning for archive in archives for warning in archive.warnings]
         ahead += (warning for role in self.roles.values() for warning in role.warnings)
         return [*ahead, *(warning for unit in self.instances.values() for warning in unit.warnings)]
 

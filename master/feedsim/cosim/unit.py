@@ -138,6 +138,7 @@ class Unit:
                 self.note_status(error)
                 self._warn(f"fmi2SetDebugLogging failed: {self.said(error)}")
         self._component = self._fmu.component
+        self._last_text = ""  # what it says of its making explains no later fault
         self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:

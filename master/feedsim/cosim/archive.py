@@ -235,7 +235,7 @@ def _read_description(path: Path, directory: Path) -> tuple[Any, list[str]]:
         raise InputError(f"{what}: it is of FMI {description.fmiVersion}")
     if description.coSimulation is None:
         raise InputError(f"{path}: has no co-simulation interface")
-    identifier = str(description.coSimulation.modelIdentifier)
+    identifier = str(description.coSimulation.modelIdentifier or "")
     if not _IDENTIFIER.fullmatch(identifier):
         raise InputError(f"{what}: its modelIdentifier {identifier[:80]!r} is no C identifier")
     return description, problems

@@ -34,7 +34,7 @@ _CALL = re.compile(r"^fmi2[A-Za-z]+: ")
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)  # fmi2Status
 _STATUSES = ("ok", "warning", "discard", "error", "fatal", "pending")
 MAX_WARNINGS = 20  # of a unit that are shown
-MAX_TEXT = 4000  # bytes of a unit's message
+MAX_TEXT = 1000  # bytes of a unit's message
 
 _STATUS, _ADDRESS, _COUNT, _TIME = ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double
 _VALUES = ctypes.CFUNCTYPE(_STATUS, _ADDRESS, _ADDRESS, _COUNT, _ADDRESS)
@@ -151,19 +151,20 @@ class Unit:
             self._messages.append(text)
 
     def _warn(self, text: str) -> None:
+        said = f"{self.name}: {text}"
+        if said in self.warnings:
+            return
         if len(self.warnings) < MAX_WARNINGS:
-            self.warnings.append(f"{self.name}: {text}")
+            self.warnings.append(said)
         elif len(self.warnings) == MAX_WARNINGS:
             self.warnings.append(f"{self.name}: more warnings, which are not shown")
 
     def warn_of_arithmetic(self) -> None:
-        """Once, that it has left the processor's settings changed."""
-        text = (
+        """That it has left the processor's settings changed."""
+        self._warn(
             "it changes how its process computes (rounding, denormal numbers or traps: fesetround, MXCSR), which "
             "changes what other units compute; this is put back after each of its calls"
         )
-        if f"{self.name}: {text}" not in self.warnings:
-            self._warn(text)
 
     @contextmanager
     def calls(self, action: str, where: str = "") -> Iterator[None]:

@@ -134,10 +134,13 @@ class _Worker:
                 return self._lost(result, self._how(operations, garbled=isinstance(error, GarbledError)))
             if message is not None:
                 kind, content = message
-                if kind == "end":
+                if kind in ("end", "error"):
+                    content, spent = content
+                    if spent:
+                        self.end()
+                    if kind == "error":
+                        raise content
                     return result if content is None else replace(result, **{_notes(result): content})
-                if kind == "error":
-                    raise content
                 if kind == "result":
                     result = content
                 elif kind == "operations":
@@ -263,6 +266,10 @@ def serve(asked: str, answers: str, mark: str, token: str) -> None:
     noted = Mark(Path(mark), closed=True)
     here = _Served(noted, replies)
     limits = {name: resource.getrlimit(getattr(resource, name)) for name in _LIMITS if hasattr(resource, name)}
+
+    def lowered() -> list[str]:
+        return [name for name in limits if resource.getrlimit(getattr(resource, name)) != limits[name]]
+
     watch(here)
     waiting: list[Any] = []
     arrived = threading.Semaphore(0)
@@ -277,7 +284,7 @@ def serve(asked: str, answers: str, mark: str, token: str) -> None:
             arrived.release()
 
     threading.Thread(target=receive, daemon=True).start()
-    while not here.spent:
+    while True:
         arrived.acquire()
         (folder, environment), function, given, named, rows, progress = waiting.pop(0)
         os.chdir(folder)
@@ -286,21 +293,22 @@ def serve(asked: str, answers: str, mark: str, token: str) -> None:
         more |= {"progress": here.progress} if progress else {}
         here.delivered = False
         try:
+            answer: tuple[str, Any]
             try:
                 result = function(*given, **named, **more)
+                answer = ("end", getattr(result, _notes(result)) if here.delivered else None)
                 if not here.delivered:
                     here.deliver(result)
-                    result = None
-                replies.send(("end", None if result is None else getattr(result, _notes(result))))
             except FeedsimError as error:
-                replies.send(("error", error))
+                answer = ("error", error)
             except (MemoryError, OSError):
                 raise
             except Exception:
-                replies.send(("error", RuntimeError(f"in the worker:\n{traceback.format_exc()}")))
+                answer = ("error", RuntimeError(f"in the worker:\n{traceback.format_exc()}"))
+            kind, content = answer
+            replies.send((kind, (content, here.spent or bool(lowered()))))
         except (MemoryError, OSError) as error:  # what a unit has taken, or closed, is not there to say it with
-            lowered = [name for name in limits if resource.getrlimit(getattr(resource, name)) != limits[name]]
-            why = f"{', '.join(lowered)} of it was lowered" if lowered else f"{error or type(error).__name__}"
+            why = f"{', '.join(lowered())} of it was lowered" if lowered() else f"{error or type(error).__name__}"
             noted.at(f"the process of other makers' units lacks memory or descriptors: {why}", SPOILED)
             os._exit(1)
 

@@ -53,8 +53,8 @@ ORDER = [
     "installation",
 ]
 SOLE_USERS = {
-    "fmpy": {"cosim/archive.py", "cosim/unit.py"},
-    "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
+    "fmpy": {"cosim/archive.py", "cosim/loose.py", "cosim/unit.py"},
+    "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py", "cosim/arithmetic.py"},
     "yaml": {"files", "identify/friction_file.py"},
     "matplotlib": set(),
     "PIL": {"report/machine/animation.py"},

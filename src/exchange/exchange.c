@@ -1,5 +1,7 @@
 #include "exchange.h"
 
+#include <fenv.h>
+
 #include "fmi2FunctionTypes.h"
 #include "vectors.h"
 
@@ -66,7 +68,59 @@ static inline void work_out(const Operation *o) {
     }
 }
 
+/* --- how the processor computes: rounding, denormal numbers, traps; not the flags of past operations */
+
+#if defined(__GNUC__) && defined(__x86_64__)
+static ALWAYS_INLINE uint64_t settings(void) {
+    uint32_t sse;
+    uint16_t x87;
+    __asm__ volatile("stmxcsr %0\n\tfnstcw %1" : "=m"(sse), "=m"(x87));
+    return (uint64_t)x87 << 32 | (sse & 0xffc0u);
+}
+
+static void put_back(uint64_t kept) {
+    const uint32_t sse = (uint32_t)kept;
+    const uint16_t x87 = (uint16_t)(kept >> 32);
+    __asm__ volatile("fnclex\n\tldmxcsr %0\n\tfldcw %1"
+                     :
+                     : "m"(sse), "m"(x87)
+                     : "memory"); /* what is pending would trap */
+}
+#elif defined(__GNUC__) && defined(__aarch64__)
+static ALWAYS_INLINE uint64_t settings(void) {
+    uint64_t control;
+    __asm__ volatile("mrs %0, fpcr" : "=r"(control));
+    return control;
+}
+
+static void put_back(uint64_t kept) {
+    __asm__ volatile("msr fpcr, %0" : : "r"(kept) : "memory");
+}
+#else
+static ALWAYS_INLINE uint64_t settings(void) {
+    return (uint64_t)fegetround();
+}
+
+static void put_back(uint64_t kept) {
+    fesetround((int)kept);
+}
+#endif
+
 /* --- any operation */
+
+static fmi2Status make_finite(const Operation *o) {
+    double *y = o->y, *count = o->a;
+    int missing = 0;
+    for (int32_t i = 0; i < o->count; i++) {
+        if (!isfinite(y[i])) {
+            y[i] = 0;
+            missing = 1;
+        }
+    }
+    count[0] = missing ? count[0] + 1 : 0;
+    count[1] += missing;
+    return count[0] > o->s ? fmi2Error : fmi2OK;
+}
 
 static fmi2Status execute(const Operation *o, int64_t kind, address y, double t) {
     const size_t n = (size_t)o->count;
@@ -87,6 +141,8 @@ static fmi2Status execute(const Operation *o, int64_t kind, address y, double t)
         return ((fmi2GetFMUstateTYPE *)o->call)(o->component, y);
     case EXCHANGE_set_state:
         return ((fmi2SetFMUstateTYPE *)o->call)(o->component, *(fmi2FMUstate *)y);
+    case EXCHANGE_finite:
+        return make_finite(o);
     case EXCHANGE_copy:
         vector_copy(n, y, o->a);
         break;
@@ -121,18 +177,35 @@ static ALWAYS_INLINE void note(Fault *mark, int64_t cycle, int64_t operation) {
     }
 }
 
+/* Behind a call; without a mark nothing is left of it either. */
+static ALWAYS_INLINE void look_after(Fault *mark, uint64_t kept, int64_t operation) {
+    if (mark && settings() != kept) {
+        put_back(kept);
+        if (mark->changed_by < 0 && operation > mark->looked_at) {
+            mark->changed_by = operation;
+        }
+    }
+}
+
+/* FMI has no other status that goes on. */
+static ALWAYS_INLINE int failed(fmi2Status status) {
+    return (unsigned)status > fmi2Warning;
+}
+
 /* One cycle, from operation *at on; where it ends, the closing one or the one that failed.
  *
  * Operations mostly come as turns of a unit: values and slopes set, a step, values and slopes got. Comparisons with
  * what a turn has next mostly come out the same, which a processor foresees better than where a switch leads. */
-static ALWAYS_INLINE fmi2Status work(Operation **at, int64_t k, double t, const Operation operations[], Fault *mark) {
+static ALWAYS_INLINE fmi2Status work(Operation **at, int64_t k, double t, const Operation operations[], Fault *mark,
+                                     uint64_t kept) {
     Operation *o = *at;
     fmi2Status status = fmi2OK;
 #define PART(part, argument)                                                                                           \
     if (o->kind == EXCHANGE_##part) {                                                                                  \
         note(mark, k, o - operations);                                                                                 \
         status = part(o, argument);                                                                                    \
-        if (status > fmi2Warning)                                                                                      \
+        look_after(mark, kept, o - operations);                                                                        \
+        if (failed(status))                                                                                            \
             break;                                                                                                     \
         o++;                                                                                                           \
     }
@@ -153,7 +226,8 @@ static ALWAYS_INLINE fmi2Status work(Operation **at, int64_t k, double t, const 
         }
         note(mark, k, o - operations);
         status = work_rest(o, k, t);
-        if (status > fmi2Warning) {
+        look_after(mark, kept, o - operations);
+        if (failed(status)) {
             break;
         }
         o++;
@@ -184,12 +258,14 @@ static int64_t first_due(const Operation operations[], int64_t count) {
 static ALWAYS_INLINE int run(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault,
                              Fault *mark) {
     const int64_t head = count_head(operations);
+    const uint64_t kept = mark ? settings() : 0;
     int64_t due = begin;
     for (int64_t k = begin; k < end; k++) {
         Operation *at = k < due ? operations + head : operations;
-        const fmi2Status status = work(&at, k, (double)k * T_c, operations, mark);
-        if (status > fmi2Warning) {
-            *fault = (Fault){k, at - operations};
+        const fmi2Status status = work(&at, k, (double)k * T_c, operations, mark, kept);
+        if (failed(status)) {
+            fault->cycle = k;
+            fault->operation = at - operations;
             return (int)status;
         }
         if (k >= due) {

@@ -12,12 +12,15 @@
 #include <stdint.h>
 
 /* To be counted up when an operation comes to mean something else though the tables below stay. */
-#define EXCHANGE_VERSION 4
+#define EXCHANGE_VERSION 5
 
 /* The operations. FMI calls take values (slopes) from y or leave them there:
  *   set_real, set_slopes, get_real, get_slopes, get_boolean (int)   count variables by their references
  *   get_state, set_state                                            y holds one fmi2FMUstate; the first get fills it
  *   do_step                                                         from k T_c + s, over h
+ *   finite                                                          entries of y that are not finite become 0; a counts
+ *                                                                   how often there were any, in a row and in all, and
+ *                                                                   more than s in a row are an error
  * Vectors have `count` entries, y may be one of the operands:
  *   copy     y = a
  *   line     y = a + s b
@@ -34,6 +37,7 @@
     K(get_boolean)                                                                                                     \
     K(get_state)                                                                                                       \
     K(set_state)                                                                                                       \
+    K(finite)                                                                                                          \
     K(copy)                                                                                                            \
     K(line)                                                                                                            \
     K(rate)                                                                                                            \
@@ -89,10 +93,16 @@ typedef struct Bond {
     EXCHANGE_BOND(EXCHANGE_FIELD)
 } Bond;
 
-/* Where the loop ended early. */
+/* Where the loop ended early, or, of a mark, whose call it is.
+ *
+ * A loop with a mark looks after each call whether the processor computes as before (rounding, denormal numbers, traps)
+ * and puts that back where it does not: changed_by is the first operation behind `looked_at` with such a call, else it
+ * is left alone. */
 typedef struct Fault {
     int64_t cycle;
     int64_t operation; /* index in the list */
+    int64_t looked_at;
+    int64_t changed_by;
 } Fault;
 
 #ifdef _WIN32

@@ -178,6 +178,12 @@ def test_entries_that_tell_a_smaller_size(friction: dict[str, bytes], tmp_path: 
         (["resources/a."], "ends in a dot or a space, 'a.'"),
         (["resources/a /b"], "ends in a dot or a space, 'a '"),
         (["resources/.../b"], "ends in a dot or a space"),
+        (["resources\\..\\..\\evil"], "leads out"),
+        (["\\\\server\\evil"], "leads out"),
+        (["C:\\evil"], "leads out"),
+        (["resources\\a", "resources/a"], "is there twice"),
+        (["resources\\a", "resources/A"], "only in case"),
+        (["resources\\\\a"], "has a part that is empty or '.'"),
     ],
 )
 def test_names_that_no_disk_takes(friction: dict[str, bytes], tmp_path: Path, names: list[str], words: str) -> None:
@@ -189,6 +195,14 @@ def test_names_that_every_disk_takes(friction: dict[str, bytes], tmp_path: Path)
     names = ["a b.csv", ".hidden", "a..b", "console.txt", "com10", "auxiliary/x", "X/a", "X/b", "stra\u00dfe", "empty/"]
     with Archive(write(tmp_path / "x.fmu", friction | {f"resources/{name}": b"" for name in names})) as archive:
         assert sum(path.is_file() for path in (archive.directory / "resources").rglob("*")) >= len(names) - 1
+
+
+def test_backslashes_separate(friction: dict[str, bytes], tmp_path: Path) -> None:
+    """Throughout, folders as entries of their own included."""
+    written = {name.replace("/", "\\"): content for name, content in friction.items()} | {"resources\\empty\\": b""}
+    with Archive(write(tmp_path / "x.fmu", written)) as archive:
+        Unit(archive, "friction").close()
+        assert (archive.directory / of_host(friction)).is_file()
 
 
 def test_a_method_of_another_kind(friction: dict[str, bytes], tmp_path: Path) -> None:

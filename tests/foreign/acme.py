@@ -84,15 +84,13 @@ MAPPED_DRIVE = {
 MAPPED_FRICTION = {"inputs": {"n_fr": "Speed"}, "outputs": {"M_fr": "Torque"}}
 
 
-def compiled(folder: Path) -> dict[str, bytes]:
-    """The libraries of the two units by name."""
-    found = {}
-    for name in ("drive", "friction"):
-        library = folder / f"{name}.so"
-        command = [*toolchain.find_compiler(), "-std=c99", "-O1", "-fPIC", "-shared", f"-I{HEADERS}"]
-        subprocess.run([*command, str(HERE / f"{name}.c"), "-o", str(library), "-lm"], check=True)
-        found[name] = library.read_bytes()
-    return found
+def compiled(folder: Path, name: str, *macros: str) -> bytes:
+    """The library of drive.c, friction.c or faulty.c; macros: such as "HABIT=1" (shell.h)."""
+    library = folder / f"{name}.so"
+    command = [*toolchain.find_compiler(), "-std=gnu99", "-O1", "-fPIC", "-shared", f"-I{HEADERS}"]
+    command += [f"-D{macro}" for macro in macros]
+    subprocess.run([*command, str(HERE / f"{name}.c"), "-o", str(library), "-lm"], check=True)
+    return library.read_bytes()
 
 
 def archive(
@@ -106,8 +104,11 @@ def archive(
     units: Mapping[str, Mapping[str, str]] = UNITS,
     version: str = "2.0",
     platform: str | None = None,
+    edit: Callable[[ET.Element], object] | None = None,
+    separator: str = "/",
 ) -> Path:
-    """An archive of the unit `name`; flags: attributes of its co-simulation element."""
+    """An archive of the unit `name`; flags: attributes of its co-simulation element; edit: of its description;
+    separator: in the names of its entries."""
     identity = {"fmiVersion": version, "modelName": f"acme {name}", "guid": f"{{acme-{name}}}"}
     root = ET.Element("fmiModelDescription", identity)
     ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **(flags or {})})
@@ -134,10 +135,12 @@ def archive(
         entries = ET.SubElement(structure, kind)
         for index in outputs:
             ET.SubElement(entries, "Unknown", {"index": index})
+    if edit is not None:
+        edit(root)
     suffix = ".dll" if "win" in (platform or folders()[0]) else ".so"
     with zipfile.ZipFile(path, "w") as package:
         package.writestr("modelDescription.xml", ET.tostring(root, encoding="utf-8", xml_declaration=True))
-        package.writestr(f"binaries/{platform or folders()[0]}/{name}{suffix}", library)
+        package.writestr(separator.join(("binaries", platform or folders()[0], f"{name}{suffix}")), library)
     return path
 
 

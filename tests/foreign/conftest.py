@@ -19,5 +19,5 @@ class Libraries:
 
 @pytest.fixture(scope="session")
 def libraries(tmp_path_factory: pytest.TempPathFactory) -> Libraries:
-    found = acme.compiled(tmp_path_factory.mktemp("acme"))
-    return Libraries(**found)
+    folder = tmp_path_factory.mktemp("acme")
+    return Libraries(acme.compiled(folder, "drive"), acme.compiled(folder, "friction"))

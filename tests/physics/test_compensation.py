@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from feedsim.jobs.tune_feedforward import CompensateResult
 
 from feedsim import cosim, nc, scenario
 from feedsim.analysis import compensation_errors as module
@@ -19,6 +18,7 @@ from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.findings import severity
+from feedsim.jobs.tune_feedforward import CompensateResult
 from feedsim.linear.drive import LinearDrive
 from feedsim.report.compensate.report import rows_of
 from feedsim.scenario import Axis, Machine, Scenario

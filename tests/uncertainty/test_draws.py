@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from feedsim.jobs.tune_feedforward import _open_of as open_values
 
 from feedsim import cosim, nc
 from feedsim.errors import InputError, SimulationError
+from feedsim.jobs.tune_feedforward import _open_of as open_values
 from feedsim.scenario import Friction, GmsFriction, load
 from feedsim.scenario.load import read_friction
 from feedsim.uncertainty import cloud_of, interval, of_run, share_of, torque_scale

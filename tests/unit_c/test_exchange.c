@@ -1,4 +1,6 @@
 /* The native cycle loop (src/exchange) with FMI functions of a unit that only notes what it is called with. */
+#include <fenv.h>
+
 #include "check.h"
 #include "exchange.h"
 #include "fmi2FunctionTypes.h"
@@ -37,7 +39,7 @@ static unsigned references[2] = {7, 8};
 static void tables_are_used_row_by_row(void) {
     double sent[3][2] = {{0, 10}, {0, 11}, {0, 12}}, got[2] = {0, 0};
     Notes setting = {.calls = 0}, getting = {.calls = 0};
-    Fault fault = {-1, -1};
+    Fault fault = {.cycle = -1, .operation = -1};
     Operation operations[] = {
         {.kind = EXCHANGE_due,
          .what = EXCHANGE_set_real,
@@ -94,7 +96,7 @@ static fmi2Status note_mark(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean
 
 static void a_mark_says_whose_call_it_is(void) {
     double a = 1, y = 0;
-    Fault mark = {-1, -1};
+    Fault mark = {.cycle = -1, .operation = -1, .looked_at = -1, .changed_by = -1};
     Seen first = {.mark = &mark}, second = {.mark = &mark};
     Operation operations[] = {
         {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
@@ -115,7 +117,7 @@ static void a_mark_says_whose_call_it_is(void) {
 static void failure_ends_the_loop(void) {
     double a = 1, y = 0;
     Notes notes = {.fail_at = 0.095};
-    Fault fault = {-1, -1};
+    Fault fault = {.cycle = -1, .operation = -1};
     Operation operations[] = {
         {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
         {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .s = 0.01, .h = 0.02},
@@ -200,7 +202,7 @@ static void energies_of_the_bond(void) {
 static void turns_are_worked_part_by_part(void) {
     double value[2] = {0, 5}, sent[2][2] = {{0, 6}, {0, 7}}, got = 0;
     Notes notes = {.fail_at = 2.5};
-    Fault fault = {-1, -1};
+    Fault fault = {.cycle = -1, .operation = -1};
     Operation operations[] = {
         {.kind = EXCHANGE_set_real,
          .count = 2,
@@ -240,8 +242,57 @@ static void turns_are_worked_part_by_part(void) {
     CHECK_EQUAL(notes.t[8], 2.5);
 }
 
+static fmi2Status change_rounding(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_return) {
+    (void)t, (void)h, (void)no_return;
+    fesetround(*(int *)c);
+    return fmi2OK;
+}
+
+static void a_loop_with_a_mark_puts_rounding_back(void) {
+    double one = 1, tiny = 1e-30, y[2] = {0, 0};
+    int up = FE_UPWARD, nearest = FE_TONEAREST;
+    Operation operations[] = {
+        {.kind = EXCHANGE_do_step, .call = (function)change_rounding, .component = &nearest},
+        {.kind = EXCHANGE_do_step, .call = (function)change_rounding, .component = &up},
+        {.kind = EXCHANGE_line, .count = 1, .y = &y[0], .a = &one, .b = &tiny, .s = 1},
+        {.kind = EXCHANGE_do_step, .call = (function)change_rounding, .component = &up},
+        {.kind = EXCHANGE_line, .count = 1, .y = &y[1], .a = &one, .b = &tiny, .s = 1},
+        {.kind = EXCHANGE_end},
+    };
+    Fault mark = {.looked_at = -1, .changed_by = -1};
+    CHECK(exchange_run_marked(operations, 1, 0, 2, &mark) == fmi2OK);
+    CHECK(mark.changed_by == 1 && fegetround() == FE_TONEAREST);
+    CHECK_EQUAL(y[0], 1);
+    CHECK_EQUAL(y[1], 1);
+    mark = (Fault){.looked_at = mark.changed_by, .changed_by = -1};
+    CHECK(exchange_run_marked(operations, 1, 2, 4, &mark) == fmi2OK);
+    CHECK(mark.changed_by == 3);
+    mark = (Fault){.looked_at = mark.changed_by, .changed_by = -1};
+    CHECK(exchange_run_marked(operations, 1, 4, 6, &mark) == fmi2OK);
+    CHECK(mark.changed_by == -1);
+}
+
+static void what_is_not_finite_becomes_zero_some_times_in_a_row(void) {
+    double given[3][2] = {{NAN, 1}, {2, 3}, {4, INFINITY}}, y[2], count[2] = {0, 0};
+    Fault fault = {.cycle = -1, .operation = -1};
+    Operation operations[] = {
+        {.kind = EXCHANGE_copy, .count = 2, .y = y},
+        {.kind = EXCHANGE_finite, .count = 2, .y = y, .a = count, .s = 2},
+        {.kind = EXCHANGE_end},
+    };
+    const double expected[3][4] = {{0, 1, 1, 1}, {2, 3, 0, 1}, {4, 0, 1, 2}}; /* y, in a row, in all */
+    for (int i = 0; i < 3; i++) {
+        operations[0].a = given[i];
+        CHECK(exchange_run(operations, 1, i, i + 1, &fault) == fmi2OK);
+        CHECK(y[0] == expected[i][0] && y[1] == expected[i][1]);
+        CHECK(count[0] == expected[i][2] && count[1] == expected[i][3]);
+    }
+    CHECK(exchange_run(operations, 1, 3, 9, &fault) == fmi2Error);
+    CHECK(fault.cycle == 4 && fault.operation == 1);
+}
+
 int main(void) {
-    CHECK_CONTAINS(exchange_interface(), "4: set_real set_slopes do_step");
+    CHECK_CONTAINS(exchange_interface(), "5: set_real set_slopes do_step");
     tables_are_used_row_by_row();
     a_mark_says_whose_call_it_is();
     failure_ends_the_loop();
@@ -249,5 +300,7 @@ int main(void) {
     arithmetic();
     energies_of_the_bond();
     turns_are_worked_part_by_part();
+    a_loop_with_a_mark_puts_rounding_back();
+    what_is_not_finite_becomes_zero_some_times_in_a_row();
     return CHECK_RESULT;
 }

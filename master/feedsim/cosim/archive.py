@@ -10,21 +10,24 @@ import sys
 import zipfile
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import IO, Any
 
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from feedsim.cosim import signals, untrusted
-from feedsim.cosim.mark import calling
+from feedsim import units
+from feedsim.cosim import loose, signals, untrusted
+from feedsim.cosim.arithmetic import restored
+from feedsim.cosim.mark import calling, watched
 from feedsim.cosim.unpacked import STORE, Content, check_there
 from feedsim.errors import InputError
 from feedsim.owned import Closing
 
 _DESCRIPTION = "modelDescription.xml"
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # units of FMI 2.0
+MAX_PROBLEMS, MAX_PROBLEM = 3, 200  # of a description that are shown; characters of one
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SUFFIXES = {"windows": ".dll", "darwin": ".dylib"}  # elsewhere .so
 _FMI_2 = {"windows": "win", "darwin": "darwin", "linux": "linux"}
@@ -57,6 +60,8 @@ class Archive(Closing):
         directory: where it is unpacked to; only to be read.
         variables: by name.
         platforms: the folders in its binaries/, for this platform and others.
+        problems: what FMI 2.0 does not allow of its description, which is read all the same.
+        fatal: whether its library can be used no more.
     """
 
     def __init__(self, path: Path, allowance: untrusted.Allowance | None = None) -> None:
@@ -71,6 +76,14 @@ class Archive(Closing):
         self._content: Content | None = STORE.take(path, allowance, partial(_unpack, path, allowance))
         self.directory, self.description = self._content.directory, self._content.description
         self.variables, self.platforms = self._content.variables, self._content.platforms
+        self.problems = self._content.problems
+        self.fatal = False
+
+    def note_fatal(self) -> None:
+        """An instance has returned fmi2Fatal: of none may anything be called any more."""
+        self.fatal = True
+        if (here := watched()) is not None:
+            here.spent = True
 
     def part(self, prefix: str) -> Archive:
         """The same archive, of which only the variables `prefix`NAME are seen, as NAME. It is not to be closed."""
@@ -93,17 +106,41 @@ class Archive(Closing):
         if content is not None:
             STORE.give_back(content)
 
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know of it, a sentence each."""
+        if not self.problems:
+            return []
+        told = "; ".join(problem.strip()[:MAX_PROBLEM] for problem in self.problems[:MAX_PROBLEMS])
+        more = len(self.problems) - MAX_PROBLEMS
+        return [
+            f"{self.path.name}: its modelDescription.xml is not what FMI 2.0 demands, and was read as well as it can "
+            f"be: {told}{f'; {more} more like these' if more > 0 else ''}"
+        ]
+
+    def unknown_unit(self, name: str) -> str | None:
+        """Unit of variable `name` where neither the archive defines it nor its name is one that is known here."""
+        variable = self.variables[name]
+        written = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+        if not written or written in self.unit_definitions:
+            return None
+        try:
+            units.unit(str(written))
+            return None
+        except InputError:
+            return str(written)
+
     def declared_unit(self, name: str) -> str | None:
-        """Unit of variable `name` as the archive declares it; None where it declares none."""
+        """Unit of variable `name` as the archive declares it; None where it declares none that is known."""
         variable = self.variables[name]
         declared = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
-        return str(declared) if declared else None
+        return str(declared) if declared and self.unknown_unit(name) is None else None
 
     def unit_of(self, name: str) -> str:
         """The same, "1" where it declares none."""
         return self.declared_unit(name) or "1"
 
-    @property
+    @cached_property
     def unit_definitions(self) -> dict[str, UnitDefinition]:
         result = {}
         for unit_definition in self.description.unitDefinitions:
@@ -143,7 +180,7 @@ class Archive(Closing):
         path = self.library()
         before = Path.cwd()
         try:
-            with calling(f"{self.path}: loading its library"):
+            with restored(), calling(f"{self.path}: loading its library"):
                 return FMU2Slave(
                     guid=self.guid, unzipDirectory=str(self.directory), libraryPath=str(path),
                     modelIdentifier=self.description.coSimulation.modelIdentifier,
@@ -173,29 +210,35 @@ def _unpack(path: Path, allowance: untrusted.Allowance, file: IO[bytes], content
             untrusted.copy(package, entry, content.directory / entry.filename)
     parts = [name.split("/") for name in zip_infos if name.startswith("binaries/")]
     content.platforms = tuple(sorted({part[1] for part in parts if len(part) > 2}))
-    content.description = _read_description(path, content.directory)
+    content.description, content.problems = _read_description(path, content.directory)
     content.variables = {model_variable.name: model_variable for model_variable in content.description.modelVariables}
 
 
-def _read_description(path: Path, directory: Path) -> Any:
+def _read_description(path: Path, directory: Path) -> tuple[Any, list[str]]:
+    """What FMPy reads, and what FMI 2.0 does not allow of it."""
     what = f"{path}: not a usable FMI 2.0 archive"
     file = directory / _DESCRIPTION
     if (size := file.stat().st_size) > untrusted.LARGEST_DOCUMENT:
         raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
     untrusted.refuse_document_type(file.read_bytes(), f"{path}: {_DESCRIPTION}")
-    try:
-        with signals.held():  # FMPy's validation has a bare `except:`
+    problems: list[str] = []
+    with signals.held():  # FMPy's validation has a bare `except:`
+        try:
             description = read_model_description(str(directory))
-    except Exception as error:
-        raise InputError(f"{what}: {error}") from error
+        except Exception as error:
+            problems = getattr(error, "problems", None) or [f"{error or type(error).__name__}"]
+            try:
+                description = loose.read(file)
+            except Exception:
+                raise InputError(f"{what}: {error}") from error
     if description.fmiVersion != "2.0":
         raise InputError(f"{what}: it is of FMI {description.fmiVersion}")
     if description.coSimulation is None:
         raise InputError(f"{path}: has no co-simulation interface")
-    identifier = str(description.coSimulation.modelIdentifier)
+    identifier = str(description.coSimulation.modelIdentifier or "")
     if not _IDENTIFIER.fullmatch(identifier):
         raise InputError(f"{what}: its modelIdentifier {identifier[:80]!r} is no C identifier")
-    return description
+    return description, problems
 
 
 def folders() -> tuple[str, ...]:

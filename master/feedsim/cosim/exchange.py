@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import fields
@@ -24,10 +25,10 @@ from feedsim.findings import Note
 from feedsim.installation import mend
 
 # src/exchange/exchange.h, word for word.
-VERSION = 4
+VERSION = 5
 OPERATION_CODES = (
     "set_real", "set_slopes", "do_step", "get_real", "get_slopes", "get_boolean", "get_state", "set_state",
-    "copy", "line", "rate", "bond", "due", "end",
+    "finite", "copy", "line", "rate", "bond", "due", "end",
 )  # fmt: skip
 FIELDS = (
     ("int32_t", "kind"), ("int32_t", "count"),
@@ -50,7 +51,7 @@ Native = ctypes.CDLL  # the loaded library
 
 
 class _Fault(ctypes.Structure):
-    _fields_ = (("cycle", ctypes.c_int64), ("operation", ctypes.c_int64))
+    _fields_ = tuple((name, ctypes.c_int64) for name in ("cycle", "operation", "looked_at", "changed_by"))
 
 
 # By SHA-256 of the file: each study lays out a copy of its own, and what is loaded stays until the process ends.
@@ -112,6 +113,8 @@ class Exchange(Executor):
         super().__init__(operations, T_c)
         self._native = native
         self._bonds: list[NDArray[np.uintp]] = []  # as the operations point to them
+        self._fault = _Fault()
+        self._looked_at = -1  # the last operation whose unit was found to change how the process computes
         self._table = np.zeros(len(self._operations) + 1, dtype=_OPERATION)
         self._table["kind"] = OPERATION_CODES.index("end")
         for at, operation in enumerate(self._operations):
@@ -121,7 +124,7 @@ class Exchange(Executor):
         row["kind"], row["count"], row["s"], row["h"] = OPERATION_CODES.index(o.kind), o.count, o.s, o.h
         for name in ("references", "orders", "y", "a", "b"):
             row[name] = getattr(o, name).ctypes.data
-        if o.unit is not None:
+        if o.unit is not None and o.kind != "finite":
             row["call"], row["component"] = o.unit.address(o.kind), o.unit.component
         if o.bond is not None:
             self._bonds.append(np.array([getattr(o.bond, name).ctypes.data for name in BOND], dtype=np.uintp))
@@ -133,11 +136,19 @@ class Exchange(Executor):
 
     def run(self, begin: int, end: int) -> None:
         mark = self.mark
-        fault = _Fault() if mark is None else _Fault.from_address(mark.numbers.ctypes.data)
-        run = self._native.exchange_run if mark is None else self._native.exchange_run_marked
-        if run(self._table.ctypes.data, self._T_c, begin, end, ctypes.byref(fault)):
+        fault = self._fault if mark is None else _Fault.from_address(mark.numbers.ctypes.data)
+        # Windows has no process of its own for other makers' units: there all are looked after.
+        run = self._native.exchange_run if mark is None and os.name == "posix" else self._native.exchange_run_marked
+        fault.looked_at, fault.changed_by = self._looked_at, -1
+        status = run(self._table.ctypes.data, self._T_c, begin, end, ctypes.byref(fault))
+        if fault.changed_by >= 0:
+            self._looked_at = fault.changed_by
+            unit = self._operations[fault.changed_by].unit
+            assert unit is not None
+            unit.warn_of_arithmetic()
+        if status:
             self.done = fault.cycle
-            self._fail(fault.operation)
+            self._fail(fault.operation, status)
         self.done = end
         if mark is not None:
             mark.back()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +20,7 @@ from feedsim.cosim.binaries import any_foreign, fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.loads import LOAD_TAKEN_UP
 from feedsim.cosim.loop import Loop, Progress, Setpoints
+from feedsim.cosim.mark import deliver
 from feedsim.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
@@ -157,7 +158,8 @@ def _measured(
         units[reference] = _unit(system, axis, inject)
         trace = Trace((kept + np.arange(periods * rows, dtype=np.float64)) * cycles.T_c, columns, units)
         unsettled = _unsettled(trace, rows, periods)
-        return Measurement(
+        doubts = (*_doubts(trace, axis, friction, offset_speed, unsettled), *notes)
+        done = Measurement(
             trace=trace,
             axis=axis,
             reference=reference,
@@ -166,8 +168,10 @@ def _measured(
             unsettled=unsettled,
             wall_time=wall_time,
             units=system.archives,
-            warnings=(*system.warnings, *_doubts(trace, axis, friction, offset_speed, unsettled), *notes),
+            warnings=(*system.warnings, *doubts),
         )
+        deliver(done)
+    return replace(done, warnings=(*system.warnings, *doubts))  # with what units have said at their end
 
 
 def usual_rms(machine: Machine, axis: str, inject: str) -> float:

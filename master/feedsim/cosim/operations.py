@@ -8,15 +8,19 @@ executors work it, to the same bits: the native loop (:mod:`~feedsim.cosim.excha
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.cosim import arithmetic
 from feedsim.cosim.mark import watched
-from feedsim.cosim.unit import OK, WARNING, Floats, Log, Port, Unit, exchanging
+from feedsim.cosim.unit import ERROR, OK, WARNING, Floats, Log, Port, Unit, exchanging, not_finite
+from feedsim.errors import SimulationError
+
+MAX_WITHOUT_SLOPE = 10  # exchange steps in a row that a unit may give slopes that are not finite
 
 # An operation in cycle k, which begins at t [s]; it returns the unit's fmi2Status.
 Act = Callable[[int, float], int]
@@ -64,7 +68,8 @@ class Operation:
             that are due, from the top again after the last.
         a, b: operands of the arithmetic; s: its number, or when in the cycle a step of h begins [s].
         references, orders: of the variables that a call exchanges.
-        about: what the unit is at, for messages.
+        about: what the unit is at, for messages. hint: what to do where it fails.
+        names: of the signals that a call exchanges.
     """
 
     kind: str
@@ -78,6 +83,8 @@ class Operation:
     references: NDArray[Any] = field(default_factory=_none)
     orders: NDArray[Any] = field(default_factory=_none)
     about: str = ""
+    hint: str = ""
+    names: tuple[str, ...] = ()
     when: When | None = None
 
     def __post_init__(self) -> None:
@@ -111,8 +118,18 @@ def get_real(port: Port) -> list[Operation]:
     return [_exchange("get_real", port), *_converted("get_real", port)]
 
 
-def get_slopes(port: Port) -> list[Operation]:
-    return [_exchange("get_slopes", port), *_converted("get_slopes", port)]
+def get_slopes(port: Port, hint: str = "", without: Floats | None = None) -> list[Operation]:
+    """Find the port's slopes.
+
+    Args:
+        hint: what to do where there are none.
+        without: (2,) how often they were not finite: in a row, in all. They count as 0 then, MAX_WITHOUT_SLOPE times in
+            a row; a unit that finds them by differences has none before its second step. None: they are finite.
+    """
+    got = [replace(_exchange("get_slopes", port), hint=hint)]
+    if without is not None:
+        got.append(replace(got[0], kind="finite", a=without, s=MAX_WITHOUT_SLOPE))
+    return [*got, *_converted("get_slopes", port)]
 
 
 def _sent(kind: str, port: Port, table: Floats | None, when: When | None) -> list[Operation]:
@@ -162,7 +179,10 @@ def _exchange(kind: str, port: Port, table: Floats | None = None, when: When | N
     y, about = port.own_slopes if kind.endswith("slopes") else port.own_values, exchanging(kind, port.names)
     if table is not None:
         y, when = np.ascontiguousarray(table, dtype=np.float64), when or When()
-    return Operation(kind, y, unit=port.unit, references=port.references, orders=port.orders, about=about, when=when)
+    unit, references, orders, names = port.unit, port.references, port.orders, port.names
+    return Operation(
+        kind, y, unit=unit, references=references, orders=orders, about=about, names=names, when=when
+    )  # fmt: skip
 
 
 # --- arithmetic on vectors with an entry per axis; y may be one of the operands
@@ -221,25 +241,59 @@ class Executor:
         """
         raise NotImplementedError
 
-    def _fail(self, at: int) -> NoReturn:
-        """Raise for the operation `at`, which has failed in the cycle after those done."""
+    def _fail(self, at: int, status: int) -> NoReturn:
+        """Raise for the operation `at`, which has failed with a status in the cycle after those done."""
         failed = self._operations[at]
         assert failed.unit is not None, f"operation {at}, {failed.kind}, is none that can fail"
-        begin = self.done * self._T_c
-        t = kept = begin
-        if failed.kind == "do_step":
-            t = begin + failed.s
-        else:  # where the unit stands: at the end of its last step, if it has taken one in this cycle
-            for operation in self._operations[:at]:
-                if operation.unit is not failed.unit:
-                    continue
-                if operation.kind == "do_step":
-                    t = begin + operation.s + operation.h
-                elif operation.kind == "get_state":
-                    kept = t
-                elif operation.kind == "set_state":
-                    t = kept
-        failed.unit.fail(failed.about, t)
+        stands = self._stands(failed.unit, at)
+        if failed.kind == "finite":
+            raise SimulationError(
+                f"{failed.unit.known_as}, t = {stands:.9g} s: {failed.about}: not finite {MAX_WITHOUT_SLOPE + 1} times "
+                f"in a row; {failed.hint}"
+            )
+        if giver := self._giver(at):
+            failed.unit.note_status(status)
+            i, fault = giver
+            unit = self._operations[i].unit
+            assert unit is not None
+            raise SimulationError(
+                f"{unit.known_as}, t = {self._stands(unit, at):.9g} s: gives {fault}; unit {failed.unit.name} gets it: "
+                f"{failed.about} failed: {failed.unit.said(status)}"
+            )
+        failed.unit.fail(failed.about, status, self._begin + failed.s if failed.kind == "do_step" else stands,
+                         failed.hint)  # fmt: skip
+
+    @property
+    def _begin(self) -> float:
+        """Of the cycle after those done [s]."""
+        return self.done * self._T_c
+
+    def _stands(self, unit: Unit, at: int) -> float:
+        """Where a unit stands at the operation `at` of that cycle: at the end of its last step, if it has taken one."""
+        t = kept = self._begin
+        for operation in self._operations[:at]:
+            if operation.unit is not unit:
+                continue
+            if operation.kind == "do_step":
+                t = self._begin + operation.s + operation.h
+            elif operation.kind == "get_state":
+                kept = t
+            elif operation.kind == "set_state":
+                t = kept
+        return t
+
+    def _giver(self, at: int) -> tuple[int, str] | None:
+        """The first of the calls up to the operation `at` that has given what is not finite, and what.
+
+        Who refuses it, or cannot go on with it, is not who gave it. Of the cycle before is what comes behind `at`.
+        """
+        count = len(self._operations)
+        for i in ((at + 1 + k) % count for k in range(count - 1)):
+            operation = self._operations[i]
+            found = operation.kind in ("get_real", "get_slopes") and operation.when is None
+            if found and (fault := not_finite(operation.names, operation.y)):
+                return i, f"slope of {fault}" if operation.kind == "get_slopes" else fault
+        return None
 
 
 class Interpreter(Executor):
@@ -251,13 +305,17 @@ class Interpreter(Executor):
 
     def run(self, begin: int, end: int) -> None:
         noted = None if self.mark is None else self.mark.numbers
+        own = arithmetic.settings()
         for k in range(begin, end):
             t = k * self._T_c
             for at, act in enumerate(self._acts):
                 if noted is not None:
                     noted[0], noted[1] = k, at
-                if act(k, t) > WARNING:
-                    self._fail(at)
+                status = act(k, t)
+                if noted is not None and arithmetic.restore(own) and (unit := self._operations[at].unit) is not None:
+                    unit.warn_of_arithmetic()
+                if not OK <= status <= WARNING:
+                    self._fail(at, status)
             self.done = k + 1
         if self.mark is not None:
             self.mark.back()
@@ -265,6 +323,8 @@ class Interpreter(Executor):
 
 def _call(o: Operation) -> Act:
     assert o.unit is not None
+    if o.kind == "finite":
+        return _finite(o)
     call, y = o.unit.call(o.kind), o.y.ctypes.data
     if o.kind == "do_step":
         return lambda _, t: call(t + o.s, o.h, True)
@@ -277,6 +337,17 @@ def _call(o: Operation) -> Act:
     if o.when:
         return _due(o, lambda row: exchange(y + row * o.y.strides[0]))
     return lambda *_: exchange(y)
+
+
+def _finite(o: Operation) -> Act:
+    def act(*_: float) -> int:
+        missing = ~np.isfinite(o.y)
+        o.y[missing] = 0.0
+        o.a[0] = o.a[0] + 1 if missing.any() else 0
+        o.a[1] += missing.any()
+        return ERROR if o.a[0] > o.s else OK
+
+    return act
 
 
 def _arithmetic(o: Operation) -> Act:

@@ -106,7 +106,11 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
     bare = [name for name, alias in signals.items() if role.signals[name].unit not in (BOOLEAN, "1")
             and archive.declared_unit(alias.name) is None]  # fmt: skip
     if bare:
-        listed = ", ".join(f"{signals[name].name} ({role.signals[name].unit})" for name in bare)
+        listed = ", ".join(
+            f"{signals[name].name} ({role.signals[name].unit}"
+            + (f", not {written!r}, which it does not define" if (written := archive.unknown_unit(signals[name].name))
+               else "") + ")" for name in bare
+        )  # fmt: skip
         warnings.append(f"{where}: modelDescription.xml gives no unit for {listed}: taken to be in SI units")
     parameters: dict[str, Parameter] = {}
     for name, given in unit.parameters.items():
@@ -167,16 +171,26 @@ def _converted(archive: Archive, name: str, unit: str) -> Alias:
         except InputError as error:
             raise InputError(f"is in {declared}, which modelDescription.xml does not define: {error}") from None
     wanted = units.unit(unit)
-    try:
-        given = units.unit(definition.text)
-    except InputError:  # base units of which no quantity here is made
-        given = None
+    given = _unit(definition.text)
     if given is None or given.dimension != wanted.dimension:
+        by_name = _unit(declared)
+        if by_name is not None and by_name.dimension == wanted.dimension and any(
+            (angle := _unit(f"{definition.text}{rad}")) is not None and angle.dimension == wanted.dimension
+            for rad in (".rad", "/rad")
+        ):  # exporters leave the radian out of what defines a unit  # fmt: skip
+            return Alias(name, unit, float(units.factor(declared, unit)))
         what = "" if given is None else f", {units.article(given.kind)}"
         raise InputError(
             f"is in {declared} ({definition.text}){what}; {units.article(wanted.kind)} is expected, such as {unit}"
         )
     return Alias(name, unit, definition.factor, definition.offset)
+
+
+def _unit(text: str) -> units.Unit | None:
+    try:
+        return units.unit(text)
+    except InputError:  # base units of which no quantity here is made
+        return None
 
 
 def start_value(archive: Archive, name: str, given: Parameter, driven: Mapping[str, str]) -> Parameter:
@@ -213,7 +227,7 @@ def _typed(archive: Archive, variable: Any, given: Parameter) -> Parameter:
                 raise InputError(f"cannot be that: {error}") from None
         return float(given)
     if kind == "Enumeration" and isinstance(given, str):
-        items = {item.name: int(item.value) for item in variable.declaredType.items}
+        items = {item.name: int(item.value) for item in getattr(variable.declaredType, "items", ())}
         if given in items:
             return items[given]
         raise InputError(f"is no {given!r}{did_you_mean(given, list(items))}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from feedsim.cosim.binaries import any_foreign, fmus_directory
@@ -14,6 +14,7 @@ from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.loads import Acting, Loads, Work, acting
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
+from feedsim.cosim.mark import deliver
 from feedsim.cosim.poses import Crossings, crossings_of, grid_of
 from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
 from feedsim.cosim.schedule import Cycle
@@ -175,7 +176,7 @@ def _run(
         wall_time = time.perf_counter() - begun - recording.sinking
         grid = grid_of(system)
         fine = None if at_full_rate is None else at_full_rate.trace()
-        return Run(
+        done = Run(
             scenario=scenario,
             program=program,
             trace=recording.trace(),
@@ -195,6 +196,8 @@ def _run(
             else log(fine, scenario.logging, ideal_axes(scenario), scratch),
             native=library is not None,
         )
+        deliver(done)
+    return replace(done, notes=(*system.warnings, *cycle.warnings))  # with what units have said at their end
 
 
 def _energies(cycle: Cycle) -> dict[str, float]:

@@ -12,9 +12,10 @@ import numpy as np
 
 from feedsim import variables
 from feedsim.cosim import operations as op
+from feedsim.cosim.mark import watched
 from feedsim.cosim.operations import Bond, Operation
 from feedsim.cosim.roles import RoleUnit, check_step
-from feedsim.cosim.system import System
+from feedsim.cosim.system import Contact, Control, System
 from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError
 from feedsim.scenario.coupling import SCHEMES, Scheme
@@ -36,7 +37,6 @@ class Cycle:
     """What happens in a control cycle of a :class:`System`, as a list of operations.
 
     Attributes:
-        warnings: what a user should know of it, a sentence each.
         bond: plant and friction: the energies that they exchange.
     """
 
@@ -58,7 +58,19 @@ class Cycle:
             n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated=buffer(),
         )  # fmt: skip
 
-        self.warnings = self._check()
+        self._warnings = self._check()
+        self._without_slope: dict[str, Floats] = {}  # unit -> how often its slopes were not finite
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know of it, a sentence each."""
+        missing = [
+            f"{unit}: gave a slope that is not finite at {count[1]:.0f} of its steps; there the exchange took its "
+            "output as constant over the next step"
+            for unit, count in self._without_slope.items()
+            if count[1]
+        ]
+        return (*self._warnings, *missing)
 
     def _check(self) -> tuple[str, ...]:
         """What a user should know of how other makers' units are exchanged, a sentence each.
@@ -128,7 +140,7 @@ class Cycle:
             yield op.do_step(control.unit, 0.0, self.cycle)
             yield from op.get_real(control.torque)
             if self.scheme.torque_ramp and control.role.gives_slopes:  # of another drive, M_a is constant
-                yield from op.get_slopes(control.torque)
+                yield from self._slopes(control, "torque_ramp")
 
     def _coupled(self) -> list[Unit]:
         return [self.system.plant, *(contact.unit for contact in self.system.contacts)]
@@ -171,4 +183,13 @@ class Cycle:
             yield op.do_step(contact.unit, start, self.step)
             yield from op.get_real(contact.torque)
             if scheme.friction_ramp and gives:
-                yield from op.get_slopes(contact.torque)
+                yield from self._slopes(contact, "friction_ramp")
+
+    def _slopes(self, part: Control | Contact, ramp: str) -> list[Operation]:
+        """Of the torque that a part gives, by a scheme with such a ramp."""
+        without = [scheme.name for scheme in SCHEMES.values() if not getattr(scheme, ramp) and scheme.passes == 1]
+        hint = f"coupling.scheme {' or '.join(without)} needs no slope of it"
+        if not part.role.foreign and watched() is None:  # of those that come along all are finite
+            return op.get_slopes(part.torque, hint)
+        counts = self._without_slope.setdefault(part.unit.known_as, np.zeros(2))
+        return op.get_slopes(part.torque, hint, counts)

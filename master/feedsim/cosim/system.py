@@ -152,6 +152,7 @@ class System(Closing):
         role = self.roles.get(name)
         kind = Unexecuted if self.only_shipped and not is_shipped(archive) else Unit
         unit = kind(archive, name, role.signals if role is not None and role.foreign else None)
+        unit.role = "" if role is None else f"{role.role.name} of {role.axis}"
         self._open.append(unit)
         return unit
 
@@ -226,8 +227,11 @@ class System(Closing):
         self._exit_initialisation()
 
     def _enter_initialisation(self, stop: float) -> None:
+        # Later than the last step's end by half a cycle, whatever the rounding of that is: units may compare to the
+        # last bit, with a time that they sum up themselves.
+        later = stop + 0.5 * self.machine.cycles.T_c
         for unit in self.instances.values():
-            unit.enter_initialisation(0.0, stop)
+            unit.enter_initialisation(0.0, later)
             unit.check_parameters()
 
     def _exit_initialisation(self) -> None:
@@ -257,10 +261,15 @@ class System(Closing):
 
     @property
     def warnings(self) -> list[str]:
-        ahead = [warning for role in self.roles.values() for warning in role.warnings]
+        archives = dict.fromkeys(unit.archive for unit in self.instances.values())
+        ahead = [warning for archive in archives for warning in archive.warnings]
+        ahead += (warning for role in self.roles.values() for warning in role.warnings)
         return [*ahead, *(warning for unit in self.instances.values() for warning in unit.warnings)]
 
     def close(self) -> None:
+        for part in self._open:
+            if isinstance(part, Unit):
+                part.terminate()
         for part in reversed(self._open):
             part.close()
         self._open.clear()

@@ -11,16 +11,19 @@ import copy
 import ctypes
 import re
 import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NoReturn, Self
 
 import numpy as np
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from numpy.typing import NDArray
 
 from feedsim.cosim.archive import Archive
+from feedsim.cosim.arithmetic import restored
 from feedsim.cosim.mark import calling
 from feedsim.errors import InputError, SimulationError
 
@@ -28,7 +31,10 @@ Floats = NDArray[np.float64]
 
 # Compiled ahead: what a signal raises inside a callback is lost, so callbacks are kept short.
 _CALL = re.compile(r"^fmi2[A-Za-z]+: ")
-OK, WARNING = 0, 1  # fmi2Status; 2 discard, 3 error, 4 fatal
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)  # fmi2Status
+_STATUSES = ("ok", "warning", "discard", "error", "fatal", "pending")
+MAX_WARNINGS = 20  # of a unit that are shown
+MAX_TEXT = 1000  # bytes of a unit's message
 
 _STATUS, _ADDRESS, _COUNT, _TIME = ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double
 _VALUES = ctypes.CFUNCTYPE(_STATUS, _ADDRESS, _ADDRESS, _COUNT, _ADDRESS)
@@ -47,6 +53,29 @@ _CALLS = {
     "set_state": ("fmi2SetFMUstate", _STATE),
     "free_state": ("fmi2FreeFMUstate", _STATE),
 }
+
+
+def status_name(status: int) -> str:
+    """For messages, such as "status discard"."""
+    return f"status {_STATUSES[status]}" if 0 <= status < len(_STATUSES) else f"status {status}, which FMI has not"
+
+
+def plain(text: bytes | None) -> str:
+    """What a unit has passed as a text, be it NULL, no UTF-8, or without an end in sight."""
+    return (text or b"")[:MAX_TEXT].decode("utf-8", errors="replace").strip()
+
+
+@dataclass
+class _Stand:
+    """Where an instance stands, by whatever signals it is known.
+
+    may_terminate: it has been initialised, and nothing has happened behind which FMI 2.0 forbids fmi2Terminate.
+    may_free: likewise fmi2FreeInstance, and all else.
+    """
+
+    time: float = 0.0
+    may_terminate: bool = False
+    may_free: bool = True
 
 
 @dataclass(frozen=True)
@@ -80,9 +109,11 @@ class Unit:
         self.archive = archive
         self.signals = signals
         self.name = name
+        self.role = ""  # what it is in the machine, such as "friction of Z"
         self.warnings: list[str] = []
         self._messages: list[str] = []
-        self._time = 0.0
+        self._last_text = ""
+        self._stand = _Stand()
         self._fmu = archive.slave(name)
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
@@ -94,43 +125,100 @@ class Unit:
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
         callbacks.freeMemory = defaultCallbacks.freeMemory
         try:
-            with calling(f"unit {name} ({archive.path}): fmi2Instantiate"):
+            with self.calls("fmi2Instantiate", f" ({archive.path})"):
                 self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
-            known = {category.name for category in archive.description.logCategories or ()}
-            if wanted := [name for name in ("logStatusWarning", "logStatusError") if name in known]:
-                self._fmu.setDebugLogging(True, wanted)
         except Exception as error:
-            raise InputError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
+            raise InputError(f"unit {name}: cannot be instantiated: {self._words() or error}") from error
+        known = {category.name for category in archive.description.logCategories or ()}
+        if wanted := [name for name in ("logStatusWarning", "logStatusError") if name in known]:
+            try:
+                with self.calls("fmi2SetDebugLogging"):
+                    self._fmu.setDebugLogging(True, wanted)
+            except FMICallException as error:  # it goes on with fewer messages
+                self.note_status(error)
+                self._warn(f"fmi2SetDebugLogging failed: {self.said(error)}")
         self._component = self._fmu.component
+        self._last_text = ""  # what it says of its making explains no later fault
         self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        text = message.decode("utf-8", errors="replace").replace("%%", "%").replace("##", "#")
+        text = plain(message).replace("%%", "%").replace("##", "#")
         text = _CALL.sub("", text)  # which call it was says nothing to the master's user
+        self._last_text = text or self._last_text
         if status == WARNING:
-            self.warnings.append(f"{self.name}: {text}")
-        elif status > WARNING:
+            self._warn(text or "a warning without a message")
+        elif status > WARNING and text and len(self._messages) < MAX_WARNINGS:
             self._messages.append(text)
 
-    def _said(self) -> str:
+    def _warn(self, text: str) -> None:
+        said = f"{self.name}: {text}"
+        if said in self.warnings:
+            return
+        if len(self.warnings) < MAX_WARNINGS:
+            self.warnings.append(said)
+        elif len(self.warnings) == MAX_WARNINGS:
+            self.warnings.append(f"{self.name}: more warnings, which are not shown")
+
+    def warn_of_arithmetic(self) -> None:
+        """That it has left the processor's settings changed."""
+        self._warn(
+            "it changes how its process computes (rounding, denormal numbers or traps: fesetround, MXCSR), which "
+            "changes what other units compute; this is put back after each of its calls"
+        )
+
+    @contextmanager
+    def calls(self, action: str, where: str = "") -> Iterator[None]:
+        """A block that calls the unit; `where` stands behind its name in messages."""
+        with restored(self.warn_of_arithmetic), calling(f"unit {self.name}{where}: {action}"):
+            yield
+
+    def _words(self) -> str:
+        """What it has said since that is no warning."""
         said = "; ".join(self._messages)
         self._messages.clear()
         return said
 
-    def fail(self, action: str, t: float | None = None) -> NoReturn:
-        """Raise for a call that returned an error, at t [s]; without it where the unit stands."""
+    def said(self, error: int | Exception | None) -> str:
+        """The same for a message about a call that has failed with a status, or an exception that has one."""
+        status = getattr(error, "status", None) if isinstance(error, Exception) else error
+        last = f"no message (its last was: {self._last_text})" if self._last_text else "no message"
+        return f"{self._words() or last}{'' if status is None else f' ({status_name(status)})'}"
+
+    def note_status(self, error: int | Exception) -> None:
+        """What FMI 2.0.4, section 4.2.4, still allows behind the status of a call."""
+        status = getattr(error, "status", None) if isinstance(error, Exception) else error
+        if status is not None and status not in (OK, WARNING, DISCARD):
+            self._stand.may_terminate = False
+        if status == FATAL:
+            self.archive.note_fatal()
+        if status == PENDING:  # a step goes on beside this program
+            self._stand.may_free = False
+
+    def fail(self, action: str, error: int | Exception, t: float | None = None, hint: str = "") -> NoReturn:
+        """Raise for a call that failed with a status, or an exception that has one, at t [s]; without it where the
+        unit stands. hint: what to do."""
         if t is not None:
-            self._time = t
-        said = self._said() or "no message"
-        raise SimulationError(f"unit {self.name}, t = {self._time:.9g} s: {action} failed: {said}")
+            self._stand.time = t
+        self.note_status(error)
+        raise SimulationError(f"{self.where}: {action} failed: {self.said(error)}{hint and f'; {hint}'}")
+
+    @property
+    def where(self) -> str:
+        """What a message about it begins with."""
+        return f"unit {self.name}, t = {self._stand.time:.9g} s"
+
+    @property
+    def known_as(self) -> str:
+        """Its name, and what it is in the machine."""
+        return f"unit {self.name}{self.role and f' ({self.role})'}"
 
     def _checked(self, action: str, call: Any, *arguments: Any) -> None:
         """A call of fmpy's own wrapper: it raises without the unit's words, which belong into the message."""
         try:
-            with calling(f"unit {self.name}, t = {self._time:.9g} s: {action}"):
+            with self.calls(action, f", t = {self._stand.time:.9g} s"):
                 call(*arguments)
-        except Exception:
-            self.fail(action)
+        except Exception as error:
+            self.fail(action, error)
 
     @property
     def library(self) -> ctypes.CDLL:
@@ -169,35 +257,37 @@ class Unit:
             groups.setdefault(setter, []).append((name, variable.valueReference, of_type(value)))
         for setter, group in groups.items():
             try:
-                with calling(f"unit {self.name}: setting {', '.join(name for name, _, _ in group)}"):
+                with self.calls(f"setting {', '.join(name for name, _, _ in group)}"):
                     setter([reference for _, reference, _ in group], [value for _, _, value in group])
-            except Exception:
-                self._said()
+            except Exception as error:
+                self.note_status(error)
+                self._words()
                 self._set_one_by_one(setter, group)
 
     def _set_one_by_one(self, setter: Any, group: Iterable[tuple[str, int, Any]]) -> None:
         """Set start values one by one: name, reference, value. InputError names the one that is refused."""
         for name, reference, value in group:
             try:
-                setter([reference], [value])
-            except Exception:
-                raise InputError(
-                    f"unit {self.name} refuses {name} = {value!r}: {self._said() or 'no message'}"
-                ) from None
+                with self.calls(f"setting {name}"):
+                    setter([reference], [value])
+            except Exception as error:
+                self.note_status(error)
+                raise InputError(f"unit {self.name} refuses {name} = {value!r}: {self.said(error)}") from None
 
     def reset(self) -> None:
         """Back to where it was instantiated: all variables have the archive's start values."""
-        self._time = 0.0
+        self._stand.time, self._stand.may_terminate = 0.0, False
         self.warnings.clear()
         self._checked("fmi2Reset", self._fmu.reset)
 
     def enter_initialisation(self, start: float, stop: float) -> None:
-        self._time = start
+        self._stand.time = start
         self._checked("fmi2SetupExperiment", self._fmu.setupExperiment, None, start, stop)
         self._checked("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)
 
     def exit_initialisation(self) -> None:
         self._checked("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
+        self._stand.may_terminate = True
 
     def check_parameters(self) -> None:
         """In initialisation mode: let the unit judge its parameters together, by asking for an initial value.
@@ -207,10 +297,11 @@ class Unit:
         """
         reals = [v for v in self.archive.variables.values() if v.causality == "output" and v.type == "Real"]
         try:
-            with calling(f"unit {self.name}: judging its parameters"):
+            with self.calls("judging its parameters"):
                 self._fmu.getReal([reals[0].valueReference])
-        except Exception:
-            raise InputError(f"unit {self.name} refuses its parameters: {self._said() or 'no message'}") from None
+        except Exception as error:
+            self.note_status(error)
+            raise InputError(f"unit {self.name} refuses its parameters: {self.said(error)}") from None
 
     def value(self, name: str) -> float:
         """A Real or Integer variable as it is now; for what is read once, ports and logs are faster.
@@ -221,10 +312,10 @@ class Unit:
         reference = self.references([name]).tolist()
         kind = self.archive.variables[name].type
         try:
-            with calling(f"unit {self.name}: reading {name}"):
+            with self.calls(f"reading {name}"):
                 values = self._fmu.getInteger(reference) if kind == "Integer" else self._fmu.getReal(reference)
-        except Exception:
-            self.fail(f"reading {name}")
+        except Exception as error:
+            self.fail(f"reading {name}", error)
         return float(values[0])
 
     def part(self, signals: Mapping[str, Alias]) -> Self:
@@ -233,14 +324,28 @@ class Unit:
         part.signals = signals
         return part
 
+    def terminate(self) -> None:
+        """End its simulation, where FMI 2.0 allows that; never raises. A warning says where it fails."""
+        if self._component is None or self.archive.fatal or not self._stand.may_terminate:
+            return
+        self._stand.may_terminate = False
+        try:
+            with self.calls("fmi2Terminate"):
+                self._fmu.terminate()
+        except Exception as error:
+            self.note_status(error)
+            self.warnings.append(f"{self.name}: fmi2Terminate, after the last step, failed: {self.said(error)}")
+
     def close(self) -> None:
         """Free the instance; never raises, so that it can stand in a `finally`."""
-        if self._component is not None:
-            if self.kept_state[0]:
-                self.call("free_state")(self.kept_state.ctypes.data)
-            with calling(f"unit {self.name}: fmi2FreeInstance"):
-                self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
-            self._component = None
+        if self._component is not None and self._stand.may_free and not self.archive.fatal:
+            with suppress(OSError):  # how Windows shows a crash
+                if self.kept_state[0]:
+                    with self.calls("fmi2FreeFMUstate"):
+                        self.call("free_state")(self.kept_state.ctypes.data)
+                with self.calls("fmi2FreeInstance"):
+                    self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
+        self._component = None
 
     def alias(self, name: str) -> Alias:
         """The variable that stands for a signal; where the unit has no signals, the one of that name."""
@@ -271,6 +376,7 @@ class Unexecuted(Unit):
         """InputError: the archive has no library for this platform."""
         self.archive, self.name, self.signals = archive, name, signals
         self._component = None
+        self.role = ""
         archive.library()
         self.warnings = [
             f"{name}: not checked: what {archive.path} itself says of its parameters, and whether it can be loaded; "
@@ -295,6 +401,15 @@ class Unexecuted(Unit):
     def value(self, name: str) -> float:
         self.references([name])
         return 0.0
+
+
+def not_finite(names: Sequence[str], values: Floats) -> str:
+    """Which of the values are none that can be passed on, for messages; empty where all are finite."""
+    return ", ".join(
+        f"{name} = {value:g}, which is not finite"
+        for name, value in zip(names, values.flat, strict=False)
+        if not np.isfinite(value)
+    )
 
 
 def exchanging(operation: str, names: Sequence[str]) -> str:
@@ -370,17 +485,19 @@ class Port:
     def get(self) -> None:
         """Find the values now."""
         self._exchange("get_real")
+        if fault := not_finite(self.names, self.own_values):
+            raise SimulationError(f"{self.unit.known_as}: gives {fault}")
         if self.converts:
             self.values[:] = [
                 alias.to_signal(value) for alias, value in zip(self.aliases, self.own_values, strict=True)
             ]
 
     def _exchange(self, operation: str) -> None:
-        at, count = self.references.ctypes.data, self.references.size
-        with calling(f"unit {self.unit.name}: {exchanging(operation, self.names)}"):
+        at, count, action = self.references.ctypes.data, self.references.size, exchanging(operation, self.names)
+        with self.unit.calls(action):
             status = self.unit.call(operation)(at, count, self.own_values.ctypes.data)
-        if status > WARNING:
-            self.unit.fail(exchanging(operation, self.names))
+        if status not in (OK, WARNING):
+            self.unit.fail(action, status)
 
 
 class Log:

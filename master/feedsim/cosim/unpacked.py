@@ -39,6 +39,7 @@ class Content:
         size: bytes of what is unpacked.
         files: what is unpacked, and the size of each.
         description: what the archive says of itself: modelDescription.xml, as FMPy reads it.
+        problems: what of it FMI 2.0 does not allow.
         variables: of the description, by name; not to be changed.
         platforms: the folders in its binaries/, for this platform and others.
         library: the loaded shared library, whatever the room that loads it takes for one; None as long as it is not
@@ -51,6 +52,7 @@ class Content:
         self.size = 0
         self.files: dict[Path, int] = {}
         self.description: Any = None
+        self.problems: list[str] = []
         self.variables: Mapping[str, Any] = {}
         self.platforms: tuple[str, ...] = ()
         self.library: Any = None

@@ -50,7 +50,7 @@ class Allowance:
 
 
 def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
-    """Files in a zip archive by name.
+    """Files in a zip archive by name; backslashes in names, which some programs on Windows write, separate as / does.
 
     Raises:
         InputError: lists entries that do not belong into one: names that lead out of it, occur twice, are none that
@@ -59,7 +59,9 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
     """
     if (count := len(package.infolist())) > MOST_ENTRIES:
         raise InputError(f"{where}: cannot be trusted: it has {count} entries; allowed: up to {MOST_ENTRIES}")
-    zip_infos = [entry for entry in package.infolist() if not entry.is_dir()]
+    for entry in package.infolist():
+        entry.filename = entry.filename.replace("\\", "/")
+    zip_infos = [entry for entry in package.infolist() if not entry.filename.endswith("/")]
     names: dict[str, str] = {}  # as a disk compares them -> as the first of the entries has it
     for entry in zip_infos:
         names.setdefault(_folded(entry.filename), entry.filename)

@@ -5,6 +5,10 @@ notes in shared memory whose call it is in (mark.py); this process watches, and 
 worker serves one call after the other, so that a study starts it once. Where all programs are the shipped ones there is
 none. Windows has no such worker: there the call is made in this process.
 
+Such a unit may also write into descriptors, close them, or lower what its process may take. The pipes between the two
+have numbers out of reach, and what arrives is checked (channel.py). A result is handed over before the units are ended,
+so that one that crashes there takes nothing along.
+
 Start reading at call(); serve() is what the worker does.
 """
 
@@ -12,7 +16,6 @@ from __future__ import annotations
 
 import atexit
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -21,11 +24,12 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from multiprocessing.connection import Connection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from feedsim.cosim.mark import DESCRIBED_CALL, OWN_CODE, Mark, Watched, watch, watched
+from feedsim.cosim.channel import TOKEN, GarbledError, Receiver, Sender
+from feedsim.cosim.mark import DESCRIBED_CALL, OWN_CODE, SPOILED, Mark, Watched, watch, watched
 from feedsim.errors import FeedsimError, SimulationError
 from feedsim.owned import TemporaryFolder, remove_orphans
 
@@ -34,6 +38,7 @@ T = TypeVar("T")
 AVAILABLE = os.name == "posix"
 LOOK = 0.05  # s between two looks at a worker that says nothing
 TOLD_EVERY = 0.1  # s between two reports of progress
+MAX_DESCRIPTOR = 1 << 16
 DYING = 5.0  # s for a worker to end that is asked to
 _SERVE = "import sys; from feedsim.cosim.worker import serve; serve(*sys.argv[1:])"
 _local = threading.local()  # a worker for each thread that needs one
@@ -77,7 +82,8 @@ class _Worker:
         self._mark = Mark(self._folder.path / "mark")
         their_end, ours = os.pipe()
         our_end, theirs = os.pipe()
-        words = [sys.executable, "-c", _SERVE, str(their_end), str(theirs), str(self._folder.path / "mark")]
+        token = os.urandom(TOKEN)
+        words = [sys.executable, "-c", _SERVE, str(their_end), str(theirs), str(self._mark.path), token.hex()]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
         # In a session of its own: a Ctrl-C is for us, and we end it.
         self._process = subprocess.Popen(
@@ -85,14 +91,15 @@ class _Worker:
         )
         os.close(their_end)
         os.close(theirs)
-        self._to, self._from = Connection(ours, readable=False), Connection(our_end, writable=False)
+        self._to, self._from = Sender(ours, token), Receiver(our_end, token)
+        self._ended = False
         self._owner = os.getpid()
         _all.append(self)
 
     @property
     def alive(self) -> bool:
         """Whether it can be asked for something more."""
-        return self._owner == os.getpid() and not self._to.closed and self._process.poll() is None
+        return self._owner == os.getpid() and not self._ended and self._process.poll() is None
 
     def call(
         self, function: Callable[..., Any], given: Sequence[Any], named: Mapping[str, Any], limit: float,
@@ -106,64 +113,87 @@ class _Worker:
             return self._watch(limit, sink, progress)
         except FeedsimError:
             raise
+        except OSError as error:
+            self.end()
+            raise SimulationError(f"the worker process of other makers' units cannot be asked: {error}") from error
         except BaseException:  # interrupted: the call may never come back
             self.end()
             raise
 
     def _watch(self, limit: float, sink: Callable[[Any], None] | None, progress: Any) -> Any:
+        """What the call returns. A worker that ends after it has handed that over leaves a note in it."""
         operations: tuple[float, Sequence[tuple[str, str, float]]] = (0.0, ())
         state, since = self._mark.state(), time.monotonic()
+        result: Any = None
         while True:
-            if self._from.poll(LOOK):
-                try:
-                    kind, content = self._from.recv()
-                except (EOFError, OSError, pickle.UnpicklingError):
-                    self._lost(operations)
+            try:
+                message = self._from.receive(LOOK)
+                if message is None and self._process.poll() is not None and self._from.receive(0.0) is None:
+                    raise EOFError
+            except (EOFError, OSError, GarbledError) as error:
+                return self._lost(result, self._how(operations, garbled=isinstance(error, GarbledError)))
+            if message is not None:
+                kind, content = message
+                if kind in ("end", "error"):
+                    content, spent = content
+                    if spent:
+                        self.end()
+                    if kind == "error":
+                        raise content
+                    return result if content is None else replace(result, **{_notes(result): content})
                 if kind == "result":
-                    return content
-                if kind == "error":
-                    raise content
-                if kind == "operations":
+                    result = content
+                elif kind == "operations":
                     operations = content
                 elif kind == "rows" and sink is not None:
                     sink(content)
                 elif kind == "progress" and progress is not None:
                     progress(*content)
-            elif self._process.poll() is not None and not self._from.poll(0):
-                self._lost(operations)
-            if (now := self._mark.state()) != state:
+            now = (*self._mark.state(), self._from.begun)
+            if now != state or message is not None:
                 state, since = now, time.monotonic()
-            elif state[1] != OWN_CODE and time.monotonic() - since > limit:
-                where = self._where(operations)
-                self.end()
-                raise SimulationError(
-                    f"{where} does not come back within {limit:g} s; it has been ended. coupling.call_limit allows a "
-                    "longer call"
+            elif (state[1] != OWN_CODE or self._from.begun) and time.monotonic() - since > limit:
+                return self._lost(
+                    result,
+                    f"{self._where(operations)} does not come back within {limit:g} s; it has been ended. "
+                    "coupling.call_limit allows a longer call",
                 )
 
-    def _lost(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> None:
-        """Raise for a worker that has ended by itself."""
+    def _lost(self, result: Any, how: str) -> Any:
+        """Of a worker that serves no more: the result, if it has one, with a note; else raise."""
+        self.end()
+        if result is None:
+            raise SimulationError(how)
+        said = f"{how}; that was behind the last step, the result is whole"
+        return replace(result, **{_notes(result): (*getattr(result, _notes(result)), said)})
+
+    def _how(self, operations: tuple[float, Sequence[tuple[str, str, float]]], garbled: bool) -> str:
+        """Who, in what, when, and how the worker has ended, or is to end."""
+        fault = (
+            "; the fault is in that unit's own program: its maker needs this message, and a debugger shows where it "
+            "stops"
+        )
+        if garbled:
+            return f"{self._where(operations)} has written into descriptors that are not its own{fault}"
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(DYING)
         code, where = self._process.poll(), self._where(operations)
-        self.end()
-        if code is not None and code < 0:
+        if self._mark.state()[1] == SPOILED:
+            return f"{self._mark.text}{fault}"
+        if code is None:
+            return f"{where} has closed descriptors that are not its own{fault}"
+        if code < 0:
             name = (
                 signal.Signals(-code).name
                 if -code in {int(signals) for signals in signal.Signals}
                 else f"signal {-code}"
             )
-            how = f"was ended by {name} ({signal.strsignal(-code) or 'unknown'})"
-        else:
-            how = f"ended the process by itself, with exit status {code}"
-        raise SimulationError(
-            f"{where} {how}; the fault is in that unit's own program: its maker needs this message, and a debugger "
-            "shows where it stops"
-        )
+            return f"{where} was ended by {name} ({signal.strsignal(-code) or 'unknown'}){fault}"
+        return f"{where} ended the process by itself, with exit status {code}{fault}"
 
     def _where(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> str:
         """Which unit, in what, when; what a sentence begins with."""
-        cycle, operation, _ = self._mark.state()
+        cycle, operation, *_ = self._mark.state()
         T_c, known = operations
         if operation == OWN_CODE:
             return f'the worker process, behind "{self._mark.text}",'
@@ -174,17 +204,23 @@ class _Worker:
 
     def end(self) -> None:
         """End it, and remove what it leaves behind."""
-        if self._owner != os.getpid():
+        if self._owner != os.getpid() or self._ended:
             return
+        self._ended = True
         with suppress(OSError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         for end in (self._to, self._from):
-            end.close()
+            os.close(end.descriptor)
         self._folder.close()
         remove_orphans()
         with suppress(ValueError):
             _all.remove(self)
+
+
+def _notes(result: Any) -> str:
+    """Where a result has what there is to say of it."""
+    return "notes" if hasattr(result, "notes") else "warnings"
 
 
 @atexit.register
@@ -197,14 +233,19 @@ def _end_all() -> None:
 
 
 class _Served(Watched):
-    def __init__(self, mark: Mark, answers: Connection) -> None:
+    def __init__(self, mark: Mark, answers: Sender) -> None:
         super().__init__()
         self.mark = mark
         self._answers = answers
         self._told = 0.0
+        self.delivered = False
 
     def describe(self, T_c: float, operations: Sequence[tuple[str, str, float]]) -> None:
         self._answers.send(("operations", (T_c, list(operations))))
+
+    def deliver(self, result: Any) -> None:
+        self._answers.send(("result", result))
+        self.delivered = True
 
     def rows(self, part: Any) -> None:
         self._answers.send(("rows", part))
@@ -215,11 +256,20 @@ class _Served(Watched):
             self._answers.send(("progress", (done, total)))
 
 
-def serve(asked: str, answers: str, mark: str) -> None:
+def serve(asked: str, answers: str, mark: str, token: str) -> None:
     """What a worker does: one call after the other, until nobody asks any more."""
+    import resource
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    questions, replies = Connection(int(asked), writable=False), Connection(int(answers), readable=False)
-    here = _Served(Mark(Path(mark)), replies)
+    questions = Receiver(_out_of_reach(int(asked)), bytes.fromhex(token))
+    replies = Sender(_out_of_reach(int(answers)), bytes.fromhex(token))
+    noted = Mark(Path(mark), closed=True)
+    here = _Served(noted, replies)
+    limits = {name: resource.getrlimit(getattr(resource, name)) for name in _LIMITS if hasattr(resource, name)}
+
+    def lowered() -> list[str]:
+        return [name for name in limits if resource.getrlimit(getattr(resource, name)) != limits[name]]
+
     watch(here)
     waiting: list[Any] = []
     arrived = threading.Semaphore(0)
@@ -228,8 +278,8 @@ def serve(asked: str, answers: str, mark: str) -> None:
         """Beside the calls: when the process that asks has gone, nobody is left who could end a call that hangs."""
         while True:
             try:
-                waiting.append(questions.recv())
-            except (EOFError, OSError):
+                waiting.append(questions.receive(None))
+            except (EOFError, OSError, GarbledError, MemoryError):
                 os._exit(0)
             arrived.release()
 
@@ -241,10 +291,38 @@ def serve(asked: str, answers: str, mark: str) -> None:
         os.environ.update(environment)
         more: dict[str, Any] = {"sink": here.rows} if rows else {}
         more |= {"progress": here.progress} if progress else {}
+        here.delivered = False
         try:
-            answer = ("result", function(*given, **named, **more))
-        except FeedsimError as error:
-            answer = ("error", error)
-        except Exception:
-            answer = ("error", RuntimeError(f"in the worker:\n{traceback.format_exc()}"))
-        replies.send(answer)
+            answer: tuple[str, Any]
+            try:
+                result = function(*given, **named, **more)
+                answer = ("end", getattr(result, _notes(result)) if here.delivered else None)
+                if not here.delivered:
+                    here.deliver(result)
+            except FeedsimError as error:
+                answer = ("error", error)
+            except (MemoryError, OSError):
+                raise
+            except Exception:
+                answer = ("error", RuntimeError(f"in the worker:\n{traceback.format_exc()}"))
+            kind, content = answer
+            replies.send((kind, (content, here.spent or bool(lowered()))))
+        except (MemoryError, OSError) as error:  # what a unit has taken, or closed, is not there to say it with
+            why = f"{', '.join(lowered())} of it was lowered" if lowered() else f"{error or type(error).__name__}"
+            noted.at(f"the process of other makers' units lacks memory or descriptors: {why}", SPOILED)
+            os._exit(1)
+
+
+_LIMITS = ("RLIMIT_AS", "RLIMIT_DATA", "RLIMIT_STACK", "RLIMIT_NOFILE", "RLIMIT_FSIZE", "RLIMIT_NPROC", "RLIMIT_CPU")
+
+
+def _out_of_reach(descriptor: int) -> int:
+    """The same with a number so high that programs that close or use all that they can think of do not come to it."""
+    import fcntl
+    import resource
+
+    most, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    least = min(most if most > 0 else MAX_DESCRIPTOR, MAX_DESCRIPTOR) - 64
+    high = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, max(least, 3))
+    os.close(descriptor)
+    return high

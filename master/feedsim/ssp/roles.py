@@ -4,8 +4,10 @@ components and, in the roles of drive and friction, of their variables. Anything
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
+from feedsim import units
 from feedsim.cosim import wiring
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of
@@ -133,19 +135,24 @@ def _drive(
                         f"{'.'.join(source)}")  # fmt: skip
         return
     driven[target] = source
-    (unit, bases), (given, others) = (_unit(archives[name], variable) for name, variable in (target, source))
+    (unit, dimensions), (given, others) = (_unit(archives[name], variable) for name, variable in (target, source))
     if None in (unit, given):
         return  # an end that declares none is in SI units, as the shipped units are
-    if unit != given and (bases is None or bases != others or link.unconverted):
-        kept = ", and the connection forbids to convert" if bases is not None and bases == others else ""
+    if unit != given and (not dimensions & others or link.unconverted):
+        kept = ", and the connection forbids to convert" if dimensions & others else ""
         problems.append(f"{where}: {'.'.join(target)} is in {unit}, but {'.'.join(source)} is in {given}{kept}")
 
 
-def _unit(archive: Archive, variable: str) -> tuple[str | None, Mapping[str, int] | None]:
-    """The unit of a variable, None where it declares none, and its base units, where the archive defines it."""
+def _unit(archive: Archive, variable: str) -> tuple[str | None, set[str]]:
+    """The unit of a variable, None where it declares none that is known, and its dimension as the archive defines it
+    and as its name has it: exporters leave out definitions, or radians in them."""
     unit = archive.declared_unit(variable)
-    definition = archive.unit_definitions.get(unit) if unit is not None else None
-    return unit, None if definition is None else definition.exponents
+    definition = archive.unit_definitions.get(unit or "")
+    dimensions = set()
+    for text in (unit, None if definition is None else definition.text):
+        with suppress(InputError):
+            dimensions |= {units.unit(text).dimension} if text is not None else set()
+    return unit, dimensions
 
 
 def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where: str) -> Roles:

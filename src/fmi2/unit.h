@@ -36,6 +36,8 @@ double unit_start_time(const Unit *unit);
 
 /* Directory of the unpacked resources, a UTF-8 path without closing separator; NULL where the importer gave none. */
 const char *unit_resources(const Unit *unit);
+/* The resource location as the importer gave it, also where it names no folder; NULL where it gave none. */
+const char *unit_location(const Unit *unit);
 /* Second half of the instantiation GUID (16 hexadecimal digits): FNV-1a 64 of the resource files the archive was packed
  * with. */
 const char *unit_resource_hash(const Unit *unit);

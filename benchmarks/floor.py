@@ -9,6 +9,7 @@ must leave the same bits, or it is no floor for this work.
 from __future__ import annotations
 
 import ctypes
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -27,19 +28,12 @@ from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import pack_whole
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Unit
+from feedsim_packager import build as packaging
 from feedsim_packager import compile, toolchain
 
 FLOOR = ROOT / "benchmarks" / "floor"
 ROUNDS = 9
-# What of a unit's folder is equations rather than FMI.
-EQUATIONS = {
-    "plant": ("modal.c",),
-    "controller": (
-        "biquad.c", "current.c", "delay.c", "drive.c", "lag.c", "measured_speed.c", "pmsm.c", "position.c",
-        "reference_model.c", "setpoint_ramp.c", "speed.c",
-    ),
-    "friction": ("contact.c", "lugre.c", "parameters.c", "tem.c", "../fmi2/table.c", "../fmi2/hash.c"),
-}  # fmt: skip
+UNITS = ("plant", "controller", "friction")
 CONTROLLER = ("M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "torque_limited", "voltage_limited")
 FRICTION = ("M_fr", "z", "c", "k", "lambda")
 FLAGS = ("torque_limited", "voltage_limited")  # Boolean: not among what one unit is asked for
@@ -49,24 +43,31 @@ TOOL = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 
 
 def build(directory: Path, extra: tuple[str, ...] = ()) -> ctypes.CDLL:
-    """Compile the units' equations and the loop around them into one library, with the units' compiler and flags."""
-    directory.mkdir(parents=True, exist_ok=True)
+    """Compile the units' own sources and the loop around their equations into one library, with the units' compiler and
+    flags. Each unit is whole, as the packager has it: which of its files are equations, the linker knows."""
     compiler = toolchain.find_compiler()
     command = [*compiler, *compile.FLAGS, *toolchain.whole_program(compiler, compile.host_target().suffix), *extra]
-    shared = [f"-I{ROOT / 'src' / 'fmi2'}", f"-I{ROOT / 'src' / 'fmi2' / 'standard'}", f"-I{FLOOR}"]
-    objects = []
-    for unit, names in (*EQUATIONS.items(), ("floor", ())):
-        folder = ROOT / "src" / f"{unit}_fmu"
-        for source in (
-            FLOOR / f"{unit}.c",
-            *([FLOOR / "machine.c"] if unit == "floor" else []),
-            *(folder / name for name in names),
-        ):
-            made = directory / f"{unit}-{source.stem}.o"
-            subprocess.run([*command, f"-I{folder}", *shared, "-c", str(source), "-o", str(made)], check=True)
-            objects.append(str(made))
+    shared = [f"-I{ROOT / 'src' / 'fmi2' / 'standard'}", f"-I{FLOOR}"]
+
+    def objects(name: str, files: Sequence[Path], *flags: str) -> list[Path]:
+        folder = directory / name
+        subprocess.run([*command, *flags, *shared, "-c", *map(str, files)], cwd=folder, check=True)
+        return sorted(folder.glob("*.o"))
+
+    shutil.rmtree(directory, ignore_errors=True)
+    (directory / "loop").mkdir(parents=True)
+    made = objects("loop", [FLOOR / "floor.c", FLOOR / "machine.c"])
+    for unit in UNITS:
+        loaded = packaging.load(packaging.unit_directory(unit), compiler)
+        folder = directory / unit
+        folder.mkdir()
+        for file, content in loaded.sources.items():
+            (folder / file).write_bytes(content)
+        made += objects(
+            unit, [*map(Path, loaded.c_files), FLOOR / f"{unit}.c"], "-I.", f"-DFMI2_FUNCTION_PREFIX={unit}_"
+        )
     library = directory / "floor.so"
-    subprocess.run([*command, "-shared", *objects, "-lm", "-o", str(library)], check=True)
+    subprocess.run([*command, "-shared", *map(str, made), "-lm", "-o", str(library)], check=True)
     return ctypes.CDLL(str(library))
 
 

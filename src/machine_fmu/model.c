@@ -329,6 +329,9 @@ static bool machine_step(Unit *unit, double t, double h) {
         show_inside(unit, machine, head->share);
     }
     take_end(unit, machine, head->cycle == first);
+    for (size_t i = 0; i < machine->axes; i++) {
+        controller_part.show_late(&machine->drives[i]); /* x_m: at the end of the last cycle */
+    }
     return true;
 }
 

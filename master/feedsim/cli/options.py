@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import inspect
-from argparse import ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,6 +104,13 @@ def folder(text: str) -> Path:
 
 
 FMUS = Option("--fmus", "DIR", "folder of the archives (default: $FEEDSIM_FMUS, else those that come along)", type=Path)
+TERMINALS = Option(
+    "--terminals",
+    "",
+    "with terminals and icons (default: yes; --no-terminals for importers with FMI Library 3, which refuses them)",
+    action=BooleanOptionalAction,
+    default=True,
+)
 QUIET_OPTION = Option("--quiet", "", "no progress bar and no summary")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FMUS, Command, Option, settings
+from feedsim.cli.options import FMUS, TERMINALS, Command, Option, settings
 from feedsim.cli.terminal import call, finish
 
 TEXT = """Pack structure, drives and friction of all axes, coupled at the control cycle, into one FMI 2.0 co-simulation
@@ -37,6 +37,7 @@ COMMAND = Command(
                type=Path),
         Option("--out", "MACHINE.fmu", "archive to write", type=Path, required=True),
         Option("--inputs", "", "leave the scenario's motion out: setpoints are inputs"),
+        TERMINALS,
         Option("--base", "MACHINE.fmu", "archive whose binaries are taken (default: machine.fmu in the folder of the "
                "archives)", type=Path),
         FMUS,

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.machine.figures import AT, POSITION
-from feedsim.cli.options import Command, Option, pairs
+from feedsim.cli.options import TERMINALS, Command, Option, pairs
 from feedsim.cli.terminal import call, finish
 
 
@@ -33,6 +33,7 @@ PACK = Command(
         Option("--out", "PLANT.fmu", "archive to write", type=Path, required=True),
         Option("--name", "NAME", "name of the machine in the archive (default: the machine's)"),
         Option("--note", "NOTE", "a remark that goes with the name (default: the machine's)"),
+        TERMINALS,
         Option("--base", "PLANT.fmu",
                "archive whose binaries are taken (default: plant.fmu in $FEEDSIM_FMUS, else in fmus/)", type=Path),
     ),

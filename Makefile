@@ -216,8 +216,9 @@ reference: $(VENV)/.dev $(VARIABLES) ## make the pinned reference CSVs anew, fro
 check-reference: fmus $(VENV)/.run ## compare all units and both scenarios, wired and as one unit, with the pinned reference CSVs
 	$(PY) tests/reference/check_reference.py --junit $(BUILD)/check-reference.xml
 
-bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tables in build/bench (seven minutes)
-	$(PY) benchmarks/all.py
+bench: fmus $(VENV)/.importers ## measure everything, other simulators too; writes docs/benchmarks and the pages' figures (seven minutes)
+	$(PY) benchmarks/all.py --images docs/images
+	$(PY) benchmarks/page.py
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py

@@ -26,8 +26,8 @@ from feedsim.scenario.coupling import SCHEMES
 sys.path.insert(0, str(ROOT / "tests"))
 from reference import monolithic
 
-SUBSTEPS = (1, 2, 3, 4, 6, 8)
-SHOWN = (1, 2, 4, 8)  # in the table
+SUBSTEPS: tuple[int, ...] = (1, 2, 3, 4, 6, 8)
+SHOWN: tuple[int, ...] = (1, 2, 4, 8)  # in the table
 DEFAULT = "extrapolated"
 STEP = 1.25e-6  # s, of the reference
 MOTIONS = {
@@ -37,6 +37,12 @@ MOTIONS = {
     "Z move": """
   - {kind: move, by: {Z: 100 mm}, feed: 5000 mm/min}
   - {kind: dwell, duration: 0.5 s}""",
+}
+SHORT_MOTIONS = {
+    "circle": """
+  - {kind: circle, plane: [X, Z], radius: 50 um, feed: 3 m/min, turns: 1}""",
+    "Z move": """
+  - {kind: move, by: {Z: 50 um}, feed: 3 m/min}""",
 }
 HELD_TORQUE = "parallel"  # its error does not vanish with the exchange step
 
@@ -81,7 +87,7 @@ class Case:
 
     def seconds_per_second(self, scheme: str, m: int) -> float:
         """Wall time of the cycle loop per simulated second, recording every millisecond."""
-        return self.run(scheme, m, "1 ms").wall_time / float(self.program.time[-1])
+        return self.run(scheme, m, "1 ms").cpu_time / float(self.program.time[-1])
 
 
 def cases(folder: Path) -> list[Case]:
@@ -172,7 +178,11 @@ def orders_table(orders: dict[str, dict[str, float]]) -> str:
 
 
 def main(words: Sequence[str] | None = None) -> int:
+    global SUBSTEPS, SHOWN, MOTIONS
     bench = arguments("accuracy", __doc__, words, rounds=7, images=True)
+    if bench.short:
+        SUBSTEPS = SHOWN = (1, 2)
+        MOTIONS = SHORT_MOTIONS
     with TemporaryDirectory(prefix="feedsim-bench-") as folder:
         driven = cases(Path(folder))
         errors: dict[str, dict[str, Error]] = {case.name: {} for case in driven}

@@ -13,12 +13,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from harness import ROOT, Contestant, Costs, arguments, digits, measure, table
+from harness import CIRCLE, ROOT, Contestant, Costs, arguments, digits, measure, table
 
 import fmpy
+import numpy as np
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.archive import Archive
+from feedsim.trace import Trace
 
 STEPS = 200_000
 ROUNDS = 5
@@ -42,14 +44,14 @@ def build(directory: Path) -> Path:
     return program
 
 
-def unit_cost(program: Path, name: str) -> tuple[float, float]:
+def unit_cost(program: Path, name: str, steps: int = STEPS) -> tuple[float, float]:
     """us per step of `name`: (doStep alone, with set, set slope and get around it)."""
     driven, amplitude, read, _ = CASES[name]
     with Archive(cosim.fmus_directory() / f"{name}.fmu") as archive:
         library = archive.directory / "binaries" / fmpy.platform / f"{name}{fmpy.sharedLibraryExtension}"
         variables = archive.variables
         command = [
-            str(program), str(library), name, archive.guid, (archive.directory / "resources").as_uri(), str(STEPS),
+            str(program), str(library), name, archive.guid, (archive.directory / "resources").as_uri(), str(steps),
             str(variables[driven].valueReference), str(amplitude), str(variables[read].valueReference),
         ]  # fmt: skip
         printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -60,21 +62,26 @@ def unit_cost(program: Path, name: str) -> tuple[float, float]:
 def main(given: Sequence[str] | None = None) -> int:
     bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS), more=_beside)
     program = build(ROOT / "build" / "bench")
-    circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["motions.0.direction=counterclockwise"])
+    circle = scenario.load(CIRCLE, bench.circle)
     planned = nc.plan(circle)
     simulated = float(planned.time[-1])
     cycles = simulated / circle.machine.cycles.T_c
+    traces: dict[str, Trace] = {}
     exchanged = Costs()  # filled while the units are measured
     left = dict.fromkeys(CASES, 0)
 
     def stepped(name: str) -> float:
-        alone, around = unit_cost(program, name)
+        alone, around = unit_cost(program, name, STEPS // 100 if bench.short else STEPS)
         exchanged.costs.setdefault(name, {})[left[name]] = around
         left[name] += 1
         return alone
 
     def looped(native: bool, fmus: Path | None = None) -> float:
-        return 1e6 * cosim.run(circle, program=planned, native=native, fmus=fmus).wall_time / cycles
+        run = cosim.run(circle, program=planned, native=native, fmus=fmus)
+        first = traces.setdefault("first", run.trace)
+        if different := [name for name in first if not np.array_equal(first[name], run.trace[name], equal_nan=True)]:
+            raise SystemExit(f"the loops have computed different things: {', '.join(different)}")
+        return 1e6 * run.cpu_time / cycles
 
     contestants = [Contestant(name, lambda name=name: stepped(name)) for name in CASES]  # type: ignore[misc]
     contestants += [Contestant(name, lambda native=native: looped(native)) for name, native in LOOPS.items()]  # type: ignore[misc]

@@ -188,6 +188,8 @@ def main(given: Sequence[str] | None = None) -> int:
         return 0
     bench = arguments("eigen", __doc__, given, only=tuple(MODELS), more=_options)
     wanted = {name: MODELS[name] for name in bench.only}
+    if bench.short:
+        wanted = {"box-3": ("box", 3)}
     if bench.given.model:
         kind, length = bench.given.model
         wanted = {f"{kind}-{length}": (kind, int(length))}

@@ -38,7 +38,7 @@ DURATION = 100.0  # s simulated
 def main(words: Sequence[str] | None = None) -> int:
     bench = arguments("foreign_units", __doc__, words, rounds=7)
     with tempfile.TemporaryDirectory() as scratch:
-        plan = scenario.load(_scenario(Path(scratch)))
+        plan = scenario.load(_scenario(Path(scratch), 1.0 if bench.short else DURATION))
         program = nc.plan(plan)
         cycles = round(program.duration / plan.machine.cycles.T_c)
         steps = 3 * cycles  # drive, structure, friction
@@ -69,7 +69,7 @@ def main(words: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _scenario(folder: Path) -> Path:
+def _scenario(folder: Path, duration: float) -> Path:
     library = folder / "friction.so"
     command = [*toolchain.find_compiler(), "-std=gnu99", "-O1", "-fPIC", "-shared", f"-I{acme.HEADERS}", "-DFAULT=0"]
     subprocess.run([*command, str(acme.HERE / "faulty.c"), "-o", str(library), "-lm"], check=True)
@@ -77,7 +77,7 @@ def _scenario(folder: Path) -> Path:
     friction = json.dumps({"fmu": "friction.fmu", **acme.MAPPED_FRICTION, "parameters": {"At": 1e9}})
     file = folder / "s.yaml"
     machine = ROOT / "scenarios" / "machines" / "emps"
-    file.write_text(PLAN.format(machine=machine, duration=DURATION, friction=friction), encoding="utf-8")
+    file.write_text(PLAN.format(machine=machine, duration=duration, friction=friction), encoding="utf-8")
     return file
 
 

@@ -188,6 +188,8 @@ def sizes(over: str) -> list[Size]:
 
 def main(words: Sequence[str] | None = None) -> int:
     bench = arguments("growth", __doc__, words, rounds=5, only=tuple(SERIES), images=True)
+    if bench.short:
+        SERIES.update(modes=(10, 20), axes=(1, 2))
     wanted = list(dict.fromkeys(size for over in bench.only for size in sizes(over)))
     with TemporaryDirectory(prefix="feedsim-bench-") as folder:
         found, costs = measured(wanted, Path(folder), bench.rounds)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import statistics
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -26,10 +27,38 @@ from provenance import ROOT, SETTINGS, Load, command, described, machine, versio
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 __all__ = [
-    "RESULTS", "ROOT", "SETTINGS", "Benchmark", "Contestant", "Costs", "Load", "arguments", "command", "described",
-    "digits", "machine", "measure", "progress", "table", "versions", "write_json", "write_text",
+    "CIRCLE",
+    "ONE_WAY",
+    "RESULTS",
+    "ROOT",
+    "SETTINGS",
+    "SHORT_CIRCLE",
+    "Benchmark",
+    "Contestant",
+    "Costs",
+    "Load",
+    "arguments",
+    "command",
+    "described",
+    "digits",
+    "machine",
+    "measure",
+    "progress",
+    "table",
+    "versions",
+    "write_json",
+    "write_text",
 ]  # fmt: skip
 RESULTS = ROOT / "build" / "bench"
+
+# What most contestants run, in one direction: the pinned reference is of that.
+CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
+ONE_WAY = "motions.0.direction=counterclockwise"
+# The same in some milliseconds, for --short.
+SHORT_CIRCLE = (
+    "motions=[{kind: circle, plane: [X, Z], radius: 50 um, feed: 3 m/min, turns: 1}, {kind: dwell, duration: 9 ms}]",
+    "evaluate=[]",
+)
 
 
 # --- options ---------------------------------------------------------------------------------------------------------
@@ -41,23 +70,37 @@ class Benchmark:
 
     Attributes:
         name: of its files. rounds: how often contestants run. only: the cases that are wanted, in their usual order.
+        short: to show in seconds that it works, on cases a fraction as long; the figures say nothing.
         folder: of <name>.md and <name>.json. images: folder of its plots.
         given: all options, those of its own among them. load: of the machine, looked at before the start.
     """
 
     name: str
     rounds: int
+    short: bool
     only: tuple[str, ...]
     folder: Path
     images: Path
     given: argparse.Namespace
     load: Load
 
-    def tell(self, text: str, results: Mapping[str, object]) -> None:
-        """Print `text` under what it depends on; leave it and `results` (Python's own types) in files."""
+    @property
+    def circle(self) -> tuple[str, ...]:
+        """Changes of the scenario CIRCLE."""
+        return SHORT_CIRCLE if self.short else (ONE_WAY,)
+
+    def tell(self, text: str, results: Mapping[str, object], quoted: Mapping[str, str] | None = None) -> None:
+        """Print `text` under what it depends on; leave it and `results` (Python's own types) in files.
+
+        quoted: figures that pages quote within sentences, by name.
+        """
         lines = [described(), *filter(None, [self.load.told()]), text.strip()]
         content = "\n\n".join(lines) + "\n"
-        write_json(self.name, results, self.folder, load=self.load, rounds=self.rounds, only=list(self.only))
+        tables = re.findall(r"^(?:\|.*\n)+", f"{text.strip()}\n", re.MULTILINE)
+        write_json(
+            self.name, results, self.folder, load=self.load, rounds=self.rounds, only=list(self.only),
+            pages={"short": self.short, "tables": tables, "quoted": dict(quoted or {})},
+        )  # fmt: skip
         write_text(self.folder / f"{self.name}.md", content)
         print(content, end="", flush=True)
 
@@ -82,7 +125,8 @@ def arguments(
     """
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     if rounds:
-        parser.add_argument("--rounds", type=_count, default=rounds, metavar="N", help=f"how often each runs: {rounds}")
+        parser.add_argument("--rounds", type=_count, metavar="N", help=f"how often each runs: {rounds}; 1 with --short")
+    parser.add_argument("--short", action="store_true", help="seconds, to see that it works; no figures to quote")
     if only:
         parser.add_argument("--only", nargs="+", choices=only, default=list(only), metavar="CASE", help=", ".join(only))
     folder = RESULTS.relative_to(ROOT)
@@ -95,9 +139,10 @@ def arguments(
         more(parser)
     options = parser.parse_args(given)
     wanted = tuple(case for case in only if case in options.only)
-    return Benchmark(
-        name, getattr(options, "rounds", 0), wanted, options.json, getattr(options, "images", RESULTS), options, Load()
-    )
+    if rounds:
+        rounds = options.rounds or (1 if options.short else rounds)
+    images_folder = getattr(options, "images", RESULTS)
+    return Benchmark(name, rounds, options.short, wanted, options.json, images_folder, options, Load())
 
 
 def _count(text: str) -> int:
@@ -238,8 +283,12 @@ def write_json(
     load: Load | None = None,
     rounds: int = 0,
     only: Sequence[str] = (),
+    pages: Mapping[str, object] | None = None,
 ) -> Path:
-    """Write `<name>.json` with `results` (Python's own types) and what they depend on; return its path."""
+    """Write `<name>.json` with `results` (Python's own types) and what they depend on; return its path.
+
+    pages: tables and figures as pages show them.
+    """
     content = {
         "benchmark": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -254,6 +303,7 @@ def write_json(
         "compiler flags": provenance.flags(),
         "environment": {key: os.environ[key] for key in SETTINGS if key in os.environ},
         "results": dict(results),
+        **(pages or {}),
     }
     return write_text(directory / f"{name}.json", json.dumps(content, indent=2, allow_nan=False) + "\n")
 

@@ -69,14 +69,11 @@ def simulated(way: Way) -> Result:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    bench = arguments(
-        "one_unit", __doc__, words, rounds=ROUNDS, only=(*NAMES,),
-        more=lambda parser: parser.add_argument("--short", action="store_true", help="a circle of 1 mm"),
-    )  # fmt: skip
+    bench = arguments("one_unit", __doc__, words, rounds=ROUNDS, only=(*NAMES,))
     rows, results = [], dict[str, object]()
     with TemporaryDirectory() as folder:
-        ways = prepared(Path(folder), SHORT if bench.given.short else CIRCLE)
-        for label in bench.only:
+        ways = prepared(Path(folder), SHORT if bench.short else CIRCLE)
+        for label in bench.only[: 1 if bench.short else None]:
             importer = NAMES[label]
             if reason := importer.missing():
                 print(f"{importer.label} left out: {reason}", file=sys.stderr)

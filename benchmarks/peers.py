@@ -17,15 +17,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from harness import ROOT, Contestant, Costs, arguments, digits, measure, progress, table
+from harness import CIRCLE, ONE_WAY, ROOT, SHORT_CIRCLE, Contestant, Costs, arguments, digits, measure, progress, table
 
 import numpy as np
 from peers_contestants import AXES, STEP, Outcome
 
 from feedsim import nc, scenario, ssp
 
-CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
-ONE_WAY = "motions.0.direction=counterclockwise"  # which the reference is of
 REFERENCE = ROOT / "tests" / "reference" / "system" / "xz_circle_ref.csv"
 ROUNDS = 5
 TIMEOUT = 300.0  # s, a process; the slowest takes 12 s on an idle machine
@@ -247,7 +245,7 @@ def _options(parser: argparse.ArgumentParser) -> None:
 
 def main(given: Sequence[str] | None = None) -> int:
     options = arguments("peers", __doc__, given, rounds=ROUNDS, only=[entry.key for entry in ENTRIES], more=_options)
-    overrides = options.given.overrides
+    overrides = [*options.given.overrides, *(SHORT_CIRCLE if options.short else ())]
     loaded = scenario.load(CIRCLE, [ONE_WAY, *overrides])
     cycles = round(float(nc.plan(loaded).time[-1]) / STEP)
     wanted = [entry for entry in ENTRIES if entry.key in (*options.only, NATIVE, "native-parallel")]

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness import ROOT, arguments, digits, table
+from harness import ONE_WAY, ROOT, arguments, digits, table
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from feedsim.cosim.one_unit import pack_whole
 from feedsim.cosim.unit import Unit
 
 STEPS = (1, 2, 5, 10)  # position cycles, of 1 ms
+SHORT_CIRCLE = (ONE_WAY, "motions.0.radius=1 mm", "evaluate=[]")
+SHORT_MOVE = ("motions.0.by.Z=1 mm", "evaluate=[]")
 Array = NDArray[np.float64]
 
 
@@ -111,8 +113,8 @@ def radius(found: Mapping[str, Array], run: cosim.Run, there: Array, rows: Array
 def main(given: Sequence[str] | None = None) -> int:
     bench = arguments("setpoints", __doc__, given)
     runs = {
-        "circle": _run("xz_circle", "motions.0.direction=counterclockwise"),
-        "move": _run("z_positioning"),
+        "circle": _run("xz_circle", *(SHORT_CIRCLE if bench.short else [ONE_WAY])),
+        "move": _run("z_positioning", *(SHORT_MOVE if bench.short else [])),
     }
     target = float(runs["move"].program.x_s["Z"][-1])
     machine = runs["circle"].scenario.machine

@@ -103,6 +103,7 @@ COMMANDS = {
         [*FEEDSIM, "frf", str(CIRCLE), "--no-measure", "--quiet", "--out"],
     ),
 }
+SHOWN_SHORT = ("python", "import", "version", "short")
 WRITING = ("run", "drawn", "frf")  # which take a folder for what they write
 FILES = {"circle": "X-Z circle", "short": "move of 1 mm"}  # whose parts are told
 
@@ -110,14 +111,15 @@ FILES = {"circle": "X-Z circle", "short": "move of 1 mm"}  # whose parts are tol
 def main(words: Sequence[str] | None = None) -> int:
     bench = arguments("startup", __doc__, words, rounds=7, only=(*COMMANDS, *FILES))
     results: dict[str, object] = {}
-    tables = []
+    tables: list[str] = []
+    chosen = [each for each in bench.only if not bench.short or each in SHOWN_SHORT]
     with TemporaryDirectory(prefix="feedsim-bench-") as folder:
         short = Path(folder) / "short.yaml"
         short.write_text(SHORT, encoding="utf-8")
         contestants = [
             Contestant(name, waited([sys.executable, *words, *([f"{folder}/{each}"] if each in WRITING else [])]))
             for each, (name, words) in COMMANDS.items()
-            if each in bench.only
+            if each in chosen
         ]
         if contestants:
             costs = measure(contestants, bench.rounds, title="start-up")
@@ -127,7 +129,7 @@ def main(words: Sequence[str] | None = None) -> int:
             ]
             tables.append(table(["command", "median", "shortest"], rows))
         for each, file in zip(FILES, (CIRCLE, short), strict=True):
-            if each in bench.only:
+            if each in chosen:
                 found = runs(file, min(bench.rounds, PROCESSES))
                 results[FILES[each]] = found
                 tables.append(parts_table(FILES[each], found))

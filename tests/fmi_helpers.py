@@ -65,7 +65,8 @@ class Instance:
     """An instance, freed at the end of a `with` block.
 
     `messages` is the list it logs into, `blocks` the memory it has allocated and not yet given back: pass your own
-    to see what a failing instantiation says and leaves. `resources=False` instantiates with resourceLocation NULL.
+    to see what a failing instantiation says and leaves. `resources` is the resourceLocation, False for NULL, True for
+    that of the unpacked archive.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class Instance:
         archive: Archive,
         messages: list[Message] | None = None,
         blocks: set[int] | None = None,
-        resources: bool = True,
+        resources: bool | str = True,
     ) -> None:
         self.archive = archive
         self.messages = [] if messages is None else messages
@@ -91,11 +92,12 @@ class Instance:
         callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(self._free)
         self._callbacks = callbacks  # ctypes needs them to stay alive
         self._references = {variable.name: variable.valueReference for variable in archive.description.modelVariables}
-        if resources:
+        if resources is True:
             self.fmu.instantiate(callbacks=callbacks)
         else:
+            location = resources.encode() if isinstance(resources, str) else None
             self.fmu.component = self.fmu.fmi2Instantiate(
-                b"unit", fmi2CoSimulation, archive.description.guid.encode(), None, byref(callbacks), False, False
+                b"unit", fmi2CoSimulation, archive.description.guid.encode(), location, byref(callbacks), False, False
             )
             if not self.fmu.component:
                 raise RuntimeError("failed to instantiate")

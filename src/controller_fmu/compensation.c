@@ -2,12 +2,6 @@
 
 #include <math.h>
 
-static const double AT_REST = 1e-4; /* rad/s: below it a setpoint stands, give or take what a spline leaves of a stop */
-
-static double moved(double n, double last) {
-    return fabs(n) > AT_REST ? (n > 0.0 ? 1.0 : -1.0) : last;
-}
-
 double pulse_amplitude(const FrictionPulse *p, double a) {
     const double *at = p->acceleration;
     if (!p->adaptation || (a >= at[0] && a <= at[1])) {
@@ -24,12 +18,14 @@ double pulse_amplitude(const FrictionPulse *p, double a) {
 
 double pulse_step(const FrictionPulse *p, PulseState *x, double n_ffw) {
     const double decay = p->T > 0.0 ? exp(-p->T_pos / p->T) : 0.0;
-    const double direction = moved(n_ffw, x->direction);
     x->value *= decay;
-    if (direction * x->direction < 0.0) {
-        const double a = fabs(n_ffw - x->n) * p->I_P / p->T_pos;
-        x->next = direction * pulse_amplitude(p, a) / p->I_P;
-        x->wait = p->wait;
+    const double back = reversal_step(&x->reversal, p->resolution, n_ffw * p->I_P * p->T_pos);
+    if (x->reversal.samples == 1) {
+        x->a = fabs(n_ffw - x->n) * p->I_P / p->T_pos;
+    }
+    if (back > 0.0) {
+        x->next = x->reversal.direction * pulse_amplitude(p, x->a) / p->I_P;
+        x->wait = p->wait - (double)(x->reversal.samples - 1) * p->T_pos;
     }
     if (fabs(x->next) > 0.0) {
         if (x->wait <= 1e-9 * p->T_pos) {
@@ -39,7 +35,6 @@ double pulse_step(const FrictionPulse *p, PulseState *x, double n_ffw) {
             x->wait -= p->T_pos;
         }
     }
-    x->direction = direction;
     x->n = n_ffw;
     return x->value;
 }
@@ -66,10 +61,9 @@ void torque_table_start(const TorqueTable *p, TorqueTableState *x, double *ring)
 
 void torque_table_step(const TorqueTable *p, TorqueTableState *x, double *ring, double n_ffw) {
     const double n = delay_step(&p->delay, ring, &x->newest, n_ffw);
-    const double direction = moved(n, x->direction), speed = fabs(n) * p->I_P;
-    x->way = direction * x->direction < 0.0 ? 0.0 : x->way;
-    x->direction = direction;
-    x->way += speed * p->T_pos;
+    const double speed = fabs(n) * p->I_P;
+    const double back = reversal_step(&x->reversal, p->resolution, n * p->I_P * p->T_pos);
+    x->way = back > 0.0 ? back : x->way + speed * p->T_pos;
     const double share = p->distance > 0.0 ? fmin(1.0, x->way / p->distance) : 1.0;
-    x->M = direction * torque_table_value(p, speed) * share;
+    x->M = x->reversal.direction * torque_table_value(p, speed) * share;
 }

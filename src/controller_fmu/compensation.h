@@ -1,6 +1,7 @@
 /* Friction compensations as controls have them, at the instants of T_pos; n is the speed feedforward n_ffw.
  *
- * Pulse on the speed setpoint (SINUMERIK: MD32500 to MD32570). Where n changes its sign, and T_dyn + delay later,
+ * Pulse on the speed setpoint (SINUMERIK: MD32500 to MD32570). Where n changes its sign, at a reversal (reversal.h),
+ * and T_dyn + delay later,
  *
  *   n_pulse = sign(n) dn/I_P exp(-t/T)
  *
@@ -16,7 +17,8 @@
  *
  *   M = s table(|n| I_P) min(1, x/distance),   n of T_dyn + T_sym + delay ago
  *
- * s is the sign of n, and at rest the last one; x the way since s changed. Linear between the points, held beyond.
+ * s is the direction of the motion, and at rest the last one; x the way since its reversal. Linear between the points,
+ * held beyond.
  *
  * Of real controls the order within a cycle, the exact shape of the pulse and the instant are not public: the instant
  * is the setting `delay`. Pure functions, no FMI. */
@@ -28,6 +30,7 @@
 
 #include "delay.h"
 #include "prefix.h"
+#include "reversal.h"
 
 #define pulse_amplitude PREFIXED(pulse_amplitude)
 #define pulse_step PREFIXED(pulse_step)
@@ -39,6 +42,7 @@
 
 typedef struct FrictionPulse {
     bool used, adaptation;
+    double resolution;      /* of a reversal [m] */
     double I_P;             /* lead [m/rad] */
     double T_pos;           /* cycle [s] */
     double amplitude, min;  /* [m/s] */
@@ -49,15 +53,17 @@ typedef struct FrictionPulse {
 
 /* All zero is a drive that has not moved yet. */
 typedef struct PulseState {
-    double n;         /* at the last instant [rad/s] */
-    double direction; /* in which it moved: -1, 0, 1 */
-    double value;     /* of the pulse [rad/s] */
-    double next;      /* size of the pulse that waits [rad/s]; 0: none */
-    double wait;      /* until it begins [s] */
+    double n; /* at the last instant [rad/s] */
+    double a; /* acceleration at the first sample of the other sign [m/s^2] */
+    ReversalState reversal;
+    double value; /* of the pulse [rad/s] */
+    double next;  /* size of the pulse that waits [rad/s]; 0: none */
+    double wait;  /* until it begins [s] */
 } PulseState;
 
 typedef struct TorqueTable {
-    int32_t points; /* 0: none */
+    int32_t points;    /* 0: none */
+    double resolution; /* of a reversal [m] */
     double I_P, T_pos;
     double speed[TABLE_POINTS];  /* rising [m/s] */
     double torque[TABLE_POINTS]; /* [N.m] */
@@ -66,8 +72,8 @@ typedef struct TorqueTable {
 } TorqueTable;
 
 typedef struct TorqueTableState {
-    double direction;
-    double way; /* since the direction changed [m] */
+    ReversalState reversal;
+    double way; /* since the last reversal [m] */
     double M;   /* [N.m], at the last instant */
     int32_t newest;
 } TorqueTableState;

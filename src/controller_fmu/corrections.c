@@ -2,16 +2,14 @@
 
 #include <math.h>
 
-static const double STANDSTILL = 1e-12; /* m: what rounding makes of a setpoint that stands */
-
 double corrections_step(const Corrections *p, CorrectionsState *x, double x_s) {
-    if (x->started && fabs(x_s - x->x_s) > STANDSTILL) {
-        x->direction = x_s > x->x_s ? 1.0 : -1.0;
+    if (x->started) {
+        reversal_step(&x->reversal, p->resolution, x_s - x->x_s);
     }
     x->x_s = x_s;
     x->started = 1;
-    const double remaining = x->direction - x->s;
-    x->s = fabs(remaining) <= p->change ? x->direction : x->s + (remaining > 0.0 ? p->change : -p->change);
+    const double direction = x->reversal.direction, remaining = direction - x->s;
+    x->s = fabs(remaining) <= p->change ? direction : x->s + (remaining > 0.0 ? p->change : -p->change);
     double corrected = x_s + 0.5 * x->s * p->backlash;
     if (p->leadscrew.used) {
         const double plus = points_value(&p->leadscrew, x_s);

@@ -120,7 +120,6 @@ void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInpu
         measuring_step(&p->measuring, &x->measuring, x->instant, &measured.x_a, &measured.n_a);
         in = &measured;
     }
-    x->x_m = in->x_a;
     if (in->release) {
         control(p, x, lines, in, n_a);
     } else {
@@ -131,4 +130,12 @@ void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInpu
     }
     ++x->instant;
     x->tick = x->tick + 1 < p->ticks ? x->tick + 1 : 0;
+}
+
+double drive_measured(const Drive *p, const DriveState *x, double x_a, double n_a) {
+    if (p->measuring.used) {
+        MeasuringState next = x->measuring;
+        measuring_step(&p->measuring, &next, x->instant, &x_a, &n_a);
+    }
+    return x_a;
 }

@@ -37,6 +37,7 @@
 
 #define drive_layout PREFIXED(drive_layout)
 #define drive_instant PREFIXED(drive_instant)
+#define drive_measured PREFIXED(drive_measured)
 
 #define FILTERS 4
 
@@ -97,7 +98,6 @@ typedef struct DriveState {
     CurrentState current;
     int released; /* at the last instant; 0 or not, see speed.h */
     int measured; /* positions are kept for the speed: since the first release; 0 or not */
-    double x_m;   /* measured position, at the last instant [m] */
     OrdersState orders;
     MeasuringState measuring;
     CorrectionsState corrections;
@@ -110,5 +110,8 @@ void drive_layout(Drive *p);
 
 /* Work the instant x->instant with the inputs of that time: opens the cycle [t_k, t_k+1] and computes its end. */
 void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInputs *in);
+
+/* The position [m] that the next instant measures, with x_a [m] and n_a [rad/s] there. */
+double drive_measured(const Drive *p, const DriveState *x, double x_a, double n_a);
 
 #endif

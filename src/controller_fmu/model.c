@@ -129,6 +129,7 @@ static void derive_effects(const Scalars *v, Drive *p) {
               m->noise > 0 || fabs(m->eccentricity) > 0;
 
     Corrections *c = &p->corrections;
+    c->resolution = v->setpoint_resolution;
     c->backlash = v->backlash_compensation_value;
     c->change = v->backlash_compensation_ramp > 0 ? fmin(2, 2 * v->T_pos / v->backlash_compensation_ramp) : 2;
     c->leadscrew =
@@ -144,6 +145,7 @@ static bool derive_compensation(Unit *unit, const Scalars *v, Drive *p) {
     *u = (FrictionPulse){.used = fabs(v->friction_pulse_amplitude) > 0 ||
                                  (v->friction_pulse_adaptation != 0 && fabs(v->friction_pulse_amplitude_min) > 0),
                          .adaptation = v->friction_pulse_adaptation != 0,
+                         .resolution = v->setpoint_resolution,
                          .I_P = v->I_P,
                          .T_pos = v->T_pos,
                          .amplitude = v->friction_pulse_amplitude,
@@ -163,6 +165,7 @@ static bool derive_compensation(Unit *unit, const Scalars *v, Drive *p) {
     }
     TorqueTable *t = &p->table;
     *t = (TorqueTable){.points = v->friction_table_points,
+                       .resolution = v->setpoint_resolution,
                        .I_P = v->I_P,
                        .T_pos = v->T_pos,
                        .distance = v->friction_table_distance,
@@ -261,7 +264,6 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
 /* What the outputs show that belong to the last instant. */
 static void show_instant(Scalars *v, const DriveState *x) {
     unit_show(&v->x_e, x->position.x_e);
-    unit_show(&v->x_m, x->x_m);
     unit_show(&v->n_s, x->n_s);
     unit_show(&v->n_ref, x->n_ref);
     unit_show(&v->M_s, x->M_s);
@@ -284,13 +286,20 @@ static void show_cycle(Scalars *v, const DriveState *x, double share) {
     v->i_q = x->left.i.i_q + share * (x->right.i.i_q - x->left.i.i_q);
 }
 
+/* The measured position belongs to the present x_a, which an importer sets behind the step that led there. */
+static void show_measured(Unit *unit) {
+    const Drive *p = &((const Controller *)unit_derived(unit))->drive;
+    Scalars *v = unit_scalars(unit);
+    v->x_m = drive_measured(p, &((const State *)unit_state(unit))->drive, v->x_a, v->n_a);
+}
+
 static void start(Unit *unit) {
     const State *state = unit_state(unit);
     Scalars *v = unit_scalars(unit);
     show_instant(v, &state->drive);
     show_cycle(v, &state->drive, 1.0);
     v->x_e = v->x_s - v->x_a;
-    v->x_m = v->x_a;
+    show_measured(unit);
 }
 
 /* Inputs `since` the start of the step [s]. */
@@ -352,6 +361,7 @@ static bool step(Unit *unit, double t, double h) {
         const double ahead = t_k - end; /* of the cycle, what lies behind the end of the step [s] */
         show_instant(v, x);
         show_cycle(v, x, instants_share(ahead, p->T_c));
+        unit_leave_late(unit);
     }
     if (p->orders.count > 0 && !controller->warned) {
         warn_of_orders(unit, controller, x->orders.n);
@@ -377,12 +387,25 @@ static double output_derivative(Unit *unit, unsigned vr) {
     }
 }
 
-/* Every output is sampled or computed from samples: no input acts on one at once. Ahead of the first instant x_e shows
- * the difference of its inputs. */
-static double partial(Unit *unit, unsigned output, unsigned input, bool initial) {
-    (void)unit;
-    if (initial && output == VR_x_m) {
+/* Of x_m, its rounding left out: small ways, over which the errors of measuring are straight. */
+static double partial_of_measured(Unit *unit, unsigned input, bool initial) {
+    Drive drive = ((const Controller *)unit_derived(unit))->drive;
+    const DriveState *x = &((const State *)unit_state(unit))->drive;
+    const Scalars *v = unit_scalars(unit);
+    drive.measuring.resolution = 0.0;
+    if (initial || !drive.measuring.used) {
         return input == VR_x_a ? 1.0 : 0.0;
+    }
+    const double dx = input == VR_x_a ? 1e-8 : 0.0, dn = input == VR_n_a ? 1e-2 : 0.0;
+    return (drive_measured(&drive, x, v->x_a + dx, v->n_a + dn) - drive_measured(&drive, x, v->x_a - dx, v->n_a - dn)) /
+           (2.0 * (dx + dn));
+}
+
+/* The other outputs are sampled or computed from samples: no input acts on one at once. Ahead of the first instant x_e
+ * shows the difference of its inputs. */
+static double partial(Unit *unit, unsigned output, unsigned input, bool initial) {
+    if (output == VR_x_m) {
+        return input == VR_x_a || input == VR_n_a ? partial_of_measured(unit, input, initial) : 0.0;
     }
     if (!initial || output != VR_x_e) {
         return 0.0;
@@ -397,6 +420,10 @@ const Model MODEL = {.identifier = "controller",
                      .accepts = accepts,
                      .start = start,
                      .step = step,
+                     .late_first = VR_x_m,
+                     .late_end = VR_x_m + 1,
+                     .late_reads_inputs = true,
+                     .show_late = show_measured,
                      .output_derivative = output_derivative,
                      .partial = partial,
                      .release = release};

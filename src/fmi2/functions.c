@@ -77,10 +77,13 @@ static bool accept_location(Unit *unit, const char *location) {
 #else
     const bool drive_letters = false;
 #endif
-    unit->resources = unit_alloc(unit, strlen(location) + 1, 1);
-    if (unit->resources == NULL) {
+    const size_t size = strlen(location) + 1;
+    unit->location = unit_alloc(unit, size, 1);
+    unit->resources = unit_alloc(unit, size, 1);
+    if (unit->location == NULL || unit->resources == NULL) {
         return false;
     }
+    memcpy(unit->location, location, size);
     if (!location_path(location, drive_letters, unit->resources)) {
         unit_free(unit, unit->resources);
         unit->resources = NULL;

@@ -19,6 +19,7 @@
 #define unit_state PREFIXED(unit_state)
 #define unit_start_time PREFIXED(unit_start_time)
 #define unit_resources PREFIXED(unit_resources)
+#define unit_location PREFIXED(unit_location)
 #define unit_resource_hash PREFIXED(unit_resource_hash)
 #define unit_set_axes PREFIXED(unit_set_axes)
 #define unit_set_start PREFIXED(unit_set_start)
@@ -91,6 +92,9 @@
 #define number_text PREFIXED(number_text)
 
 #define file_read PREFIXED(file_read)
+#define file_of_archive PREFIXED(file_of_archive)
+#define file_source PREFIXED(file_source)
+#define file_hash_agrees PREFIXED(file_hash_agrees)
 
 #define location_path PREFIXED(location_path)
 

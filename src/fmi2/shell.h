@@ -79,6 +79,7 @@ struct Unit {
     fmi2CallbackFunctions callbacks; /* memory functions always set, logger may be NULL */
     char *name;
     char guid[GUID_SIZE];
+    char *location; /* as the importer gave it */
     char *resources;
 };
 

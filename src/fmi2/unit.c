@@ -219,6 +219,7 @@ void unit_destroy(Unit *unit) {
     unit_free(unit, unit->start);
     unit_free(unit, unit->derived_for);
     unit_free(unit, unit->resources);
+    unit_free(unit, unit->location);
     unit_free(unit, unit->name);
     unit_free(unit, unit);
 }
@@ -271,6 +272,10 @@ double unit_start_time(const Unit *unit) {
 
 const char *unit_resources(const Unit *unit) {
     return unit->resources;
+}
+
+const char *unit_location(const Unit *unit) {
+    return unit->location;
 }
 
 const char *unit_resource_hash(const Unit *unit) {

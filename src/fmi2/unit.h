@@ -36,6 +36,8 @@ double unit_start_time(const Unit *unit);
 
 /* Directory of the unpacked resources, a UTF-8 path without closing separator; NULL where the importer gave none. */
 const char *unit_resources(const Unit *unit);
+/* The resource location as the importer gave it, also where it names no folder; NULL where it gave none. */
+const char *unit_location(const Unit *unit);
 /* Second half of the instantiation GUID (16 hexadecimal digits): FNV-1a 64 of the resource files the archive was packed
  * with. */
 const char *unit_resource_hash(const Unit *unit);
@@ -127,8 +129,10 @@ typedef struct Model {
 
     /* Real outputs that mostly nobody reads: value references `late_first` up to `late_end`, without the latter. step()
      * may leave them out (unit_leave_late()); show_late() then writes them from the state, when they are read or the
-     * state is saved. It depends on the state and on fixed parameters alone. NULL where there are none. */
+     * state is saved. It depends on the state and on fixed parameters alone, and on the inputs where `late_reads_inputs`.
+     * NULL where there are none. */
     unsigned late_first, late_end;
+    bool late_reads_inputs;
     void (*show_late)(Unit *unit);
 
     /* First derivative of Real output `vr` with respect to time at the end of the last step [unit/s]. */

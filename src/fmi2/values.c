@@ -153,6 +153,8 @@ static inline void note_set(Unit *unit, const Variable *variable) {
     }
     if (unit_header(unit)->phase != PHASE_STEPPING) {
         unit_header(unit)->stale = 1;
+    } else {
+        unit->late = unit->late || MODEL.late_reads_inputs;
     }
 }
 

@@ -108,6 +108,7 @@ static inline bool values_set_usual(Unit *unit, size_t count, const fmi2ValueRef
     for (size_t i = 0; i < count; i++) {
         *unit_real(unit, references[i]) = values[i];
     }
+    unit->late = unit->late || MODEL.late_reads_inputs;
     return true;
 }
 

@@ -20,6 +20,7 @@
 #include "../controller_fmu/points.c"
 #include "../controller_fmu/position.c"
 #include "../controller_fmu/reference_model.c"
+#include "../controller_fmu/reversal.c"
 #include "../controller_fmu/setpoint_ramp.c"
 #include "../controller_fmu/speed.c"
 #include "numbers.c"

@@ -90,6 +90,7 @@ static Part part_of(Unit *unit, const char *label, const char *resource_hash) {
     return (Part){.calls = &host_calls,
                   .host = unit,
                   .label = label,
+                  .location = unit_location(unit),
                   .resources = unit_resources(unit),
                   .resource_hash = resource_hash};
 }
@@ -97,42 +98,16 @@ static Part part_of(Unit *unit, const char *label, const char *resource_hash) {
 /* --- settings */
 
 typedef struct Settings {
-    const char *source; /* what messages call the file */
+    char source[64]; /* what messages call the file */
     char *text;
     size_t size;
 } Settings;
 
 static bool settings_read(Unit *unit, Settings *settings) {
-    const char *directory = unit_resources(unit);
-    if (directory != NULL) {
-        settings->source = "resources/" FILE_NAME;
-        settings->text = file_read(unit, directory, FILE_NAME, &settings->size);
-        return settings->text != NULL ||
-               unit_fail(unit, "%s/" FILE_NAME " cannot be read; it says what is in the archive", directory);
-    }
-    if (embedded_settings_size == 0) {
-        return unit_fail(unit,
-                         "the importer gave no resource location, and no machine is embedded in this unit: " FILE_NAME
-                         " cannot be read");
-    }
-    settings->source = "embedded " FILE_NAME;
-    settings->size = embedded_settings_size;
-    settings->text = unit_alloc(unit, embedded_settings_size + 1, 1);
-    if (settings->text == NULL) {
-        return false;
-    }
-    memcpy(settings->text, embedded_settings, embedded_settings_size);
-    return true;
-}
-
-static bool settings_are_the_packed(Unit *unit, const Settings *settings) {
-    char actual[HASH_TEXT_SIZE];
-    hash_text(actual, hash_bytes(HASH_OF_NOTHING, settings->text, settings->size));
-    return strcmp(actual, unit_resource_hash(unit)) == 0 ||
-           unit_fail(unit,
-                     "%s has hash %s, but the archive was packed with hash %s: the archive is stale or its file was "
-                     "changed; pack it anew",
-                     settings->source, actual, unit_resource_hash(unit));
+    snprintf(settings->source, sizeof settings->source, "%s" FILE_NAME, file_source(unit));
+    settings->text = file_of_archive(unit, FILE_NAME, embedded_settings, embedded_settings_size, &settings->size);
+    return settings->text != NULL &&
+           file_hash_agrees(unit, FILE_NAME, hash_bytes(HASH_OF_NOTHING, settings->text, settings->size));
 }
 
 static bool copy_cell(CsvRow *row, char *text) {
@@ -211,7 +186,7 @@ static bool load_axes(Unit *unit, Machine *machine) {
 }
 
 static bool load_parts(Unit *unit, Machine *machine, const Settings *settings) {
-    if (!settings_are_the_packed(unit, settings) || !settings_take(unit, machine, settings, take_hash)) {
+    if (!settings_take(unit, machine, settings, take_hash)) {
         return false;
     }
     machine->plant = part_of(unit, "plant", machine->plant_hash);
@@ -233,7 +208,7 @@ bool machine_load(Unit *unit) {
         return false;
     }
     unit_set_derived(unit, machine);
-    Settings settings = {NULL, NULL, 0};
+    Settings settings = {.text = NULL};
     const bool good =
         machine_rows_agree(unit) && settings_read(unit, &settings) && load_parts(unit, machine, &settings);
     unit_free(unit, settings.text);

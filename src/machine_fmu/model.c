@@ -188,15 +188,18 @@ static double setpoint_of(Unit *unit, const AxisBlock *axis) {
 }
 
 static bool begins_far(Unit *unit, const AxisBlock *axis, bool first) {
+    if (!axis->release || (!first && axis->drive_release)) {
+        return false;
+    }
     const double step = axis->drive_K_p * axis->drive_K_v * (setpoint_of(unit, axis) - axis->drive_x_a);
-    const bool begins = axis->release && (first || !axis->drive_release);
-    return begins && fabs(step / axis->drive_I_P) > axis->drive_M_max;
+    return fabs(step / axis->drive_I_P) > axis->drive_M_max;
 }
 
-static void warn_of_far(Unit *unit, Machine *machine, bool first) {
+/* From the axis `from` on, which is the first that is far. */
+static void warn_of_far_axes(Unit *unit, Machine *machine, size_t from, bool first) {
     char axes[FAR_TEXT_SIZE] = "", text[2][NUMBER_TEXT_SIZE];
     size_t at = 0;
-    for (size_t i = 0; i < machine->axes && at < sizeof axes; i++) {
+    for (size_t i = from; i < machine->axes && at < sizeof axes; i++) {
         const AxisBlock *axis = unit_axis(unit, i);
         if (begins_far(unit, axis, first)) {
             const char *input = unit_scalars(unit)->motion_built_in ? "motion.x_s" : "x_s";
@@ -205,9 +208,6 @@ static void warn_of_far(Unit *unit, Machine *machine, bool first) {
                                  at > 0 ? ", " : "", unit_axis_name(unit, i), input,
                                  number_text(text[0], setpoint_of(unit, axis)), number_text(text[1], axis->drive_x_a));
         }
-    }
-    if (at == 0 || machine->warned_far[first]) {
-        return;
     }
     machine->warned_far[first] = true;
     if (first) {
@@ -222,6 +222,15 @@ static void warn_of_far(Unit *unit, Machine *machine, bool first) {
             "setpoints are far from the axes when these are released: %s; the drives go there at their torque limits. "
             "Let setpoints begin where the axes stand at that time",
             axes);
+    }
+}
+
+/* At every step: the text only where there is one. */
+static void warn_of_far(Unit *unit, Machine *machine, bool first) {
+    for (size_t i = 0; i < machine->axes && !machine->warned_far[first]; i++) {
+        if (begins_far(unit, unit_axis(unit, i), first)) {
+            warn_of_far_axes(unit, machine, i, first);
+        }
     }
 }
 
@@ -320,6 +329,9 @@ static bool machine_step(Unit *unit, double t, double h) {
         show_inside(unit, machine, head->share);
     }
     take_end(unit, machine, head->cycle == first);
+    for (size_t i = 0; i < machine->axes; i++) {
+        controller_part.show_late(&machine->drives[i]); /* x_m: at the end of the last cycle */
+    }
     return true;
 }
 

@@ -25,6 +25,7 @@ struct Part {
     const PartHost *calls;
     void *host;
     const char *label;         /* ahead of its messages, as the names of its variables begin */
+    const char *location;      /* of the resources, as the importer gave it */
     const char *resources;     /* directory */
     const char *resource_hash; /* of its own resource files */
     void *derived;

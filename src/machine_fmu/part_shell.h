@@ -61,6 +61,10 @@ const char *unit_resources(const Unit *unit) {
     return unit->part.resources;
 }
 
+const char *unit_location(const Unit *unit) {
+    return unit->part.location;
+}
+
 const char *unit_resource_hash(const Unit *unit) {
     return unit->part.resource_hash;
 }

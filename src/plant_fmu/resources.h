@@ -10,7 +10,7 @@
 #define resources_free PREFIXED(resources_free)
 
 typedef struct Resources {
-    const char *source;         /* for messages: "resources/" or "embedded " */
+    const char *source;         /* how messages begin their names */
     char *axes, *modes, *poses; /* bytes of the files, each closed by a zero that the size does not count */
     size_t axes_size, modes_size, poses_size; /* poses NULL: the machine has one pose */
 } Resources;

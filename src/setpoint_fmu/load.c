@@ -1,6 +1,6 @@
 #include "load.h"
 
-#include <string.h>
+#include <stdio.h>
 
 #include "embedded_resources.h"
 #include "files.h"
@@ -8,48 +8,6 @@
 
 #define FILE_NAME "setpoints.csv"
 #define REPORT_SIZE 512
-
-/* The file's bytes, closed by a zero that *size does not count; *source is what messages call it. */
-static char *setpoint_bytes(Unit *unit, const char **source, size_t *size) {
-    const char *directory = unit_resources(unit);
-    if (directory != NULL) {
-        char *bytes = file_read(unit, directory, FILE_NAME, size);
-        *source = "resources/" FILE_NAME;
-        if (bytes == NULL) {
-            unit_fail(unit, "%s/" FILE_NAME " cannot be read; it is the table that this unit plays", directory);
-        }
-        return bytes;
-    }
-    if (embedded_setpoints_size == 0) {
-        unit_fail(unit, "the importer gave no resource location, and no table is embedded in this unit (large ones are "
-                        "not): " FILE_NAME " cannot be read");
-        return NULL;
-    }
-    char *copy = unit_alloc(unit, embedded_setpoints_size + 1, 1);
-    if (copy != NULL) {
-        memcpy(copy, embedded_setpoints, embedded_setpoints_size);
-    }
-    *source = "embedded " FILE_NAME;
-    *size = embedded_setpoints_size;
-    return copy;
-}
-
-static bool setpoint_is_the_packed(Unit *unit, const char *bytes, const char *source, size_t size) {
-    char actual[HASH_TEXT_SIZE];
-    if (strcmp(hash_text(actual, hash_bytes(HASH_OF_NOTHING, bytes, size)), unit_resource_hash(unit)) == 0) {
-        return true;
-    }
-    if (unit_resources(unit) == NULL) {
-        return unit_fail(unit,
-                         "the table embedded in this unit has hash %s, but the archive was packed with hash %s: with "
-                         "another table; the importer must give the resource location",
-                         actual, unit_resource_hash(unit));
-    }
-    return unit_fail(unit,
-                     "%s has hash %s, but the archive was packed with hash %s: the archive is stale or its file was "
-                     "changed; pack it anew",
-                     source, actual, unit_resource_hash(unit));
-}
 
 static bool setpoint_name_axes(Unit *unit, const SetpointAxis *names, size_t axes) {
     const char **pointers = unit_alloc(unit, axes, sizeof *pointers);
@@ -95,10 +53,11 @@ bool setpoint_load(Unit *unit) {
         return false;
     }
     unit_set_derived(unit, table);
-    const char *source = NULL;
+    char source[64];
+    snprintf(source, sizeof source, "%s" FILE_NAME, file_source(unit));
     size_t size = 0;
-    char *text = setpoint_bytes(unit, &source, &size);
-    const bool good = text != NULL && setpoint_is_the_packed(unit, text, source, size) &&
+    char *text = file_of_archive(unit, FILE_NAME, embedded_setpoints, embedded_setpoints_size, &size);
+    const bool good = text != NULL && file_hash_agrees(unit, FILE_NAME, hash_bytes(HASH_OF_NOTHING, text, size)) &&
                       setpoint_read(unit, table, text, size, source);
     unit_free(unit, text);
     return good;

@@ -1,4 +1,4 @@
-"""``feedsim machine build``, ``info`` and ``diff`` as a user meets them: files, messages, and nothing half-written."""
+"""``feedsim machine build``, ``info`` and ``view`` as a user meets them: files, messages, and nothing half-written."""
 
 from __future__ import annotations
 

@@ -13,10 +13,11 @@ from urllib.parse import quote
 import fmpy
 import pytest
 
+import fmi_helpers
 from fmu.apart import apart
 from fmu.binary import ERROR, Slave, of
 from fmu.continued import go_on
-from fmu.unpacked import Archive
+from fmu.unpacked import RESOURCES, Archive
 
 FOLDERS = (
     "plain",
@@ -245,3 +246,33 @@ def test_a_decimal_comma(archive: Archive, tmp_path: Path) -> None:
     slave.get(list(of(archive, "output").values()))
     slave.free()
     point.free()
+
+
+OF_OTHERS = "of files that are not embedded in this unit; the importer must give the resource location"
+
+
+@pytest.mark.parametrize("unit", RESOURCES)
+@pytest.mark.parametrize(
+    ("location", "said"),
+    [
+        (False, [OF_OTHERS, "it gave none"]),
+        ("", [OF_OTHERS, "it gave none"]),
+        ("http://host/archive/resources", [OF_OTHERS, "it gave http://host/archive/resources"]),
+        ("jar:file:/a.fmu!/resources", [OF_OTHERS, "it gave jar:file:/a.fmu!/resources"]),
+        ("file:///nowhere/a", ["/nowhere/a/", "location 'file:///nowhere/a' must be the folder resources"]),
+        ("file://host/resources", ["//host/resources/", "location 'file://host/resources' must be the folder"]),
+        ("nowhere", ["nowhere/", "location 'nowhere' must be the folder resources of the unpacked archive"]),
+    ],
+)  # fmt: skip
+def test_a_machine_that_is_not_embedded_asks_for_the_location(
+    unit: str, location: str | bool, said: list[str], fmus: Path, tmp_path: Path
+) -> None:
+    """The shipped binary under the GUID of other resources, as in an archive with another machine or motion."""
+    other = fmi_helpers.Archive.unpack(fmus / f"{unit}.fmu", tmp_path / unit)
+    other.description.guid = other.description.guid[:17] + 16 * "0"
+    messages: list[fmi_helpers.Message] = []
+    with pytest.raises(RuntimeError, match="failed to instantiate"):
+        fmi_helpers.Instance(other, messages, resources=location)
+    refusal = messages[-1].text
+    assert all(part in refusal for part in said), refusal
+    assert "anew" not in refusal  # the archive is sound

@@ -17,6 +17,7 @@ from lxml import etree
 from PIL import Image
 
 from feedsim.cosim import wiring
+from feedsim.jobs.pack import pack as pack_machine
 from feedsim_packager import build, cli
 from feedsim_packager.errors import InputError
 from fmu.toy_table import toy
@@ -279,3 +280,23 @@ def test_a_pair_that_nothing_fits_is_refused(tmp_path: Path, compiler: tuple[str
         "friction: M_fr input, n_fr input; a connection needs M_fr as output, n_fr as input, "
         "or all of them the other way round" in str(caught.value)
     )
+
+
+# --- without them, for importers that refuse them
+
+
+def test_archives_go_without_terminals_where_that_is_asked_for(fmus: Path, tmp_path: Path) -> None:
+    """What is packed into an archive without them has none either; all else stays."""
+    bare, again = tmp_path / "bare.fmu", tmp_path / "again.fmu"
+    tables = ["--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")]
+    tables += ["--modes", str(ROOT / "scenarios/machines/test_centre/modes.csv")]
+    assert cli.main(["repack", str(fmus / "plant.fmu"), *tables, "--no-terminals", "--out", str(bare)]) == 0
+    assert cli.main(["repack", str(bare), *tables, "--out", str(again)]) == 0
+    packed = tmp_path / "pack.fmu"
+    pack_machine(ROOT / "scenarios/machines/test_centre", packed, fmus=fmus, terminals=False)
+    for path, base in ((bare, "plant"), (again, "plant"), (packed, "machine")):
+        before, after = zipfile.ZipFile(fmus / f"{base}.fmu").namelist(), zipfile.ZipFile(path).namelist()
+        assert any(name.startswith("terminalsAndIcons/") for name in before)
+        assert not any(name.startswith("terminalsAndIcons/") for name in after)
+        assert "model.png" in after
+        assert {name for name in before if name.startswith(("binaries/", "sources/"))} <= set(after)

@@ -301,7 +301,7 @@ def test_stale_resources_are_refused(fmus: Path, tmp_path: Path) -> None:
     for byte in (stale.folder / "resources" / "axes.csv").read_bytes() + table.read_bytes():
         packed = (packed ^ byte) * 0x100000001B3 % 2**64
     text = failing_instantiation(stale)
-    assert f"have hash {packed:016x}" in text
+    assert f"the hash is {packed:016x}" in text
     assert f"packed with hash {stale.description.guid[17:]}" in text
 
 

@@ -256,6 +256,8 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
     if "release" in case.inputs:
         given["release"] = booleans(case.inputs, "release", seen_at)
     given["turns"] = given["n_a"]
+    # read at the end of a step, x_m follows the inputs that were set at its start
+    shown = effects.measured(p, given["x_a"], given["n_a"], following=True)[0]
     given["x_a"], given["n_a"] = effects.measured(p, given["x_a"], given["n_a"])
     ticks = round(p["T_pos"] / T_c)
     given["x_s"] = effects.corrected(p, given["x_s"], ticks)
@@ -268,7 +270,7 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
     for k in range(cycles):
         torque.append(cascade.sample(**{name: float(values[k]) for name, values in given.items()}))
         seen.append(cascade.seen | {"i_d": float(cascade.i[0]), "i_q": float(cascade.i[1])})
-        seen[-1]["x_m"] = float(given["x_a"][k])
+        seen[-1]["x_m"] = float(shown[k])
     times = np.arange(round(case.stop / every) + 1) * every
     last = np.ceil(times / T_c - 1e-9).astype(int)
     table = {"time": times, "M_a": np.interp(times, t, effects.torque(p, given["turns"][:-1], np.asarray(torque)))}

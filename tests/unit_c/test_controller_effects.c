@@ -144,6 +144,30 @@ static void backlash_compensation_follows_the_setpoint(void) {
     CHECK_NEAR(corrections_step(&table, &y, 0.25) - 0.25, -1e-6, 1e-16);
 }
 
+/* What a spline leaves of the end of a motion, to and fro about it, is no reversal; nor is a way back within the
+ * resolution, however long it takes. Beyond it is one. */
+static void a_way_back_within_the_resolution_is_no_reversal(void) {
+    const Corrections p = {.used = true, .resolution = 1e-7, .backlash = 8e-6, .change = 2.0};
+    const double left_of_a_stop[] = {1.7e-8, -1.7e-8, -4.6e-9, 4.6e-9, 1.2e-9, -1.2e-9, 0.0};
+    for (int side = -1; side <= 1; side += 2) {
+        CorrectionsState x = {.started = 0};
+        double end = 0.1;
+        corrections_step(&p, &x, end);
+        for (int k = 0; k < 10; ++k) {
+            end += side * 1e-4;
+            corrections_step(&p, &x, end);
+        }
+        for (size_t k = 0; k < sizeof left_of_a_stop / sizeof *left_of_a_stop; ++k) {
+            const double x_s = end + side * left_of_a_stop[k];
+            CHECK_NEAR(corrections_step(&p, &x, x_s) - x_s, side * 4e-6, 1e-16);
+        }
+        for (int k = 1; k <= 20; ++k) { /* of the furthest point, which is 17 nm behind the end */
+            const double back = k * 1e-8, x_s = end - side * back;
+            CHECK_NEAR(corrections_step(&p, &x, x_s) - x_s, side * (back + 1.7e-8 > 1e-7 ? -4e-6 : 4e-6), 1e-16);
+        }
+    }
+}
+
 /* Without current there is cogging, and no ripple; with the ideal current loop both act at once. */
 static void cogging_needs_no_current(void) {
     Drive p = {.T_c = T_C, .ticks = 8, .K_t = 2.0, .ideal_current_loop = true};
@@ -182,24 +206,33 @@ static void pulse_has_the_characteristic_of_the_manual(void) {
     CHECK_EQUAL(pulse_amplitude(&p, 0.005), 3e-4);
 }
 
-/* Of a constant acceleration through standstill: the pulse begins `wait` behind the first sample of the other sign. */
+/* Of a constant acceleration through standstill: the pulse begins `wait` behind the first sample of the other
+ * sign, and not ahead of when the reversal is known. */
 static void pulse_begins_at_the_reversal_and_decays(void) {
     const double I_P = 0.003, T_pos = 1e-3, T = 0.02;
-    for (int late = 0; late < 4; ++late) {
-        const double wait = 0.7e-3 * late;
-        const FrictionPulse p = {.used = true, .I_P = I_P, .T_pos = T_pos, .amplitude = 6e-4, .T = T, .wait = wait};
+    for (int late = 0; late < 8; ++late) {
+        const double wait = 0.7e-3 * (late / 2), resolution = late % 2 > 0 ? 1e-7 : 0.0;
+        const int known = late % 2 > 0 ? 19 : 18; /* behind 0.03 um, or 0.12 um */
+        const FrictionPulse p = {.used = true,
+                                 .resolution = resolution,
+                                 .I_P = I_P,
+                                 .T_pos = T_pos,
+                                 .amplitude = 6e-4,
+                                 .T = T,
+                                 .wait = wait};
         PulseState x = {.n = 0.0};
         for (int k = 0; k < 100; ++k) {
             const double n = 0.35 - 0.02 * k; /* reverses between 17 and 18 */
             const double value = pulse_step(&p, &x, n), since = (k - 18) * T_pos - wait;
-            const double expected = since < -1e-12 ? 0.0 : -0.2 * exp(-since / T);
+            const double expected = since < -1e-12 || k < known ? 0.0 : -0.2 * exp(-since / T);
             CHECK_NEAR(value, expected, 1e-12);
         }
     }
 }
 
 static void pulse_needs_a_reversal(void) {
-    const FrictionPulse p = {.used = true, .I_P = 0.003, .T_pos = 1e-3, .amplitude = 6e-4, .T = 0.02};
+    const FrictionPulse p = {
+        .used = true, .resolution = 1e-7, .I_P = 0.003, .T_pos = 1e-3, .amplitude = 6e-4, .T = 0.02};
     PulseState x = {.n = 0.0};
     const double n[] = {0.0, 1.0, 2.0, 0.0, 1e-6, -1e-6, 0.0, 3.0}; /* what a spline leaves of a stop is none */
     for (int k = 0; k < 8; ++k) {
@@ -265,6 +298,7 @@ int main(void) {
     indirect_is_the_angle_of_the_motor();
     resolution_and_noise();
     backlash_compensation_follows_the_setpoint();
+    a_way_back_within_the_resolution_is_no_reversal();
     cogging_needs_no_current();
     pulse_has_the_characteristic_of_the_manual();
     pulse_begins_at_the_reversal_and_decays();

@@ -30,6 +30,7 @@ def pack_whole(
     note: str = "",
     model: str = "",
     trial: bool = True,
+    terminals: bool = True,
 ) -> Packed:
     """Pack a machine into the archive `base` of the unit `machine`; write it to `out`, whole or not at all.
 
@@ -39,6 +40,7 @@ def pack_whole(
         name, note: what the archive's description and documentation say of the machine.
         model: what importers show as the model's name; default: that of the unit.
         trial: instantiate the packed unit once, where the base has a binary for this platform.
+        terminals: with terminals and icons.
 
     Raises:
         InputError: a role is filled by another maker's unit, a file is not what it should be, or the unit refuses.
@@ -54,7 +56,7 @@ def pack_whole(
             setpoint_table(program) if program is not None else None,
             {name: whole_machine.spelled(value) for name, value in settings.items()},
         )
-        return packed(base, out, given, name=name, note=note, model=model, trial=trial)
+        return packed(base, out, given, name=name, note=note, model=model, trial=trial, terminals=terminals)
 
 
 def pack_tables(base: Path, out: Path, machine: Machine) -> None:

@@ -28,6 +28,7 @@ from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 from feedsim.trace import Table, Trace, matching
 
 PLANT_SIGNALS = ("x_a", "n_a")
+MEASURED = "x_m"  # of a drive: of the present inputs
 GUIDE_SIGNAL = "guide.F_fr"  # of axes with friction there
 TRANSMISSION_SIGNALS = ("transmission.F", "transmission.way")  # of axes with one
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
@@ -128,10 +129,15 @@ class Recording:
             wiring.PLANT, {name: name for name in (*plant, *_effects(system.machine), *TOOL_SIGNALS, *loaded)}, cycle
         )
         self.limited: dict[str, int] = {}
+        self._measured: list[Operation] = []
         for axis, described in system.machine.axes.items():
             drive, friction = DRIVE.shown(described.drive), FRICTION_ROLE.shown(described.friction)
             self.limited |= {f"{axis}.{limit}": 0 for limit in LIMITS if limit in drive}
             self._log(wiring.controller(axis), {signal: f"{axis}.{signal}" for signal in drive}, cycle)
+            if (
+                f"{axis}.{MEASURED}" in self._columns
+            ):  # it follows the inputs, which the drive gets behind the recording
+                self._measured += cycle.measured(axis)
             self._log(wiring.friction(axis), {signal: f"{axis}.{signal}" for signal in friction}, cycle)
         residuals = [f"{axis}.{RESIDUAL}" for axis in system.axes]
         self._residual = np.zeros((self._ring, len(system.axes)))
@@ -160,7 +166,8 @@ class Recording:
         """What is done ahead of each cycle; the end of the last one is left to :meth:`record`."""
         when = When(every=self.every)
         kept = [copy(self._residual, self._cycle.bond.residual, when)] if self._residual_names else []
-        return [*(operation for log, _ in self._logs for operation in get_row(log, when)), *kept]
+        rows = (operation for log, _ in self._logs for operation in get_row(log, when))
+        return [*self._measured, *rows, *kept]
 
     def record(self, k: int) -> None:
         """Record the instant k T_c, where it is one to be recorded; those before are done."""

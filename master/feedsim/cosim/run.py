@@ -40,7 +40,7 @@ class Run:
     Attributes:
         trace: recorded signals, columns "X.x_a" ... in SI units.
         coupling: per axis, interface energy residual [J], its peak, and the friction work [J] to hold it against.
-        wall_time: duration of the cycle loop [s], without what a `sink` has taken.
+        wall_time: duration of the cycle loop [s], without what a `sink` has taken. cpu_time: of this thread in it.
         native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
         notes: what the units and their exchange say of themselves, a sentence each.
@@ -60,6 +60,7 @@ class Run:
     trace: Trace
     coupling: Mapping[str, float]
     wall_time: float
+    cpu_time: float
     units: Mapping[str, Mapping[str, str]]
     notes: tuple[str, ...] = ()
     executor_notes: tuple[str, ...] = ()
@@ -159,7 +160,7 @@ def _run(
         before += feeders(system, torque_feedforward or {}, total + 1)
         loop = Loop(cycle, before, loading.after, library, (drives, loading, *recordings))
         system.initialise(program, stop=total * cycles.T_c)
-        begun = time.perf_counter()
+        begun, worked = time.perf_counter(), time.thread_time()
         try:
             loop.run(total, progress)
         except SimulationError as error:
@@ -173,7 +174,7 @@ def _run(
             entry.record(total)
             entry.collect(total + 1)
         loading.count(total)
-        wall_time = time.perf_counter() - begun - recording.sinking
+        wall_time, cpu_time = time.perf_counter() - begun - recording.sinking, time.thread_time() - worked
         grid = grid_of(system)
         fine = None if at_full_rate is None else at_full_rate.trace()
         done = Run(
@@ -182,6 +183,7 @@ def _run(
             trace=recording.trace(),
             coupling=_energies(cycle),
             wall_time=wall_time,
+            cpu_time=cpu_time,
             units=system.archives,
             notes=(*system.warnings, *cycle.warnings),
             executor_notes=executor_notes,

@@ -6,7 +6,7 @@ parts. Here they become calls of units, with the ports and slopes that those hav
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -109,6 +109,10 @@ class Cycle:
             for index in range(self.scheme.passes):
                 yield from self._rows("EXCHANGE_PASS", j * self.step, second_pass=index > 0)
             yield op.exchange_energy(self.bond, self.step)
+
+    def measured(self, axis: str) -> Iterable[Operation]:
+        """Ahead of reading what the drive of an axis measures: at the start of the cycle, as it is sent behind that."""
+        return op.set_real(self.system.controllers[self.system.axes.index(axis)].measured)
 
     def _rows(self, table: str, since: float = 0.0, second_pass: bool = False) -> Iterator[Operation]:
         """Operations of a table's rows; since: the start of the exchange step after that of the cycle [s]."""

@@ -6,7 +6,7 @@ knows the parts by the names that they have as units. See :mod:`feedsim.cosim.on
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from feedsim.cosim import operations as op
@@ -111,6 +111,10 @@ class WholeCycle(Cycle):
                 f"a control cycle; scheme is {self.scheme.name}, allowed: {followed}; substeps are {self.substeps}, "
                 "allowed: 1; or units: separate"
             )
+        return ()
+
+    def measured(self, axis: str) -> Iterable[Operation]:
+        """The unit knows."""
         return ()
 
     def operations(self) -> Iterator[Operation]:

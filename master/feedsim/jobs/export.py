@@ -13,7 +13,7 @@ from feedsim.jobs.parameters import Archives, Argument, File, Force, Option, Set
 from feedsim.jobs.watch import NO_WATCH, Watch
 
 # Ending of the file -> the options that it has besides those of all.
-ENDINGS = {".fmu": ("inputs", "plant", "base"), ".ssp": ("one",), ".html": ("knobs",)}
+ENDINGS = {".fmu": ("inputs", "plant", "base", "terminals"), ".ssp": ("one",), ".html": ("knobs",)}
 OF_PLANT = ("at", "poses", "name", "note")
 
 
@@ -29,6 +29,14 @@ def export(
     inputs: Annotated[
         bool, Option("", "leave the scenario's motion out: setpoints are inputs", group="unit (.fmu)")
     ] = False,
+    terminals: Annotated[
+        bool,
+        Option(
+            "",
+            "with terminals and icons (default: yes; FMI Library 3 refuses units that have them)",
+            group="unit (.fmu)",
+        ),
+    ] = True,
     plant: Annotated[bool, Option("", "the structure alone, without drives and friction", group="unit (.fmu)")] = False,
     base: Annotated[
         File | None,
@@ -110,7 +118,7 @@ def export(
         raise InputError(f"{spelt('out')} {out}: the name must end in {', '.join(ENDINGS)}, which says what is written")
     given: dict[str, Any] = {
         "inputs": inputs, "plant": plant, "base": base, "at": at, "poses": poses, "name": name, "note": note,
-        "one": one, "knobs": knobs,
+        "one": one, "knobs": knobs, "terminals": not terminals,
     }  # fmt: skip
     asked = {key: value for key, value in given.items() if value}
     known = (*ENDINGS[ending], *(OF_PLANT if plant else ()))
@@ -134,7 +142,20 @@ def export(
             raise InputError(
                 f"{spelt('set')}: changes are for a scenario; {spelt('plant')} takes the machine file as it is"
             )
-        return machine_pack(subject, out, at=at, poses=poses, name=name, note=note, base=base, force=force, watch=watch)
+        return machine_pack(
+            subject,
+            out,
+            at=at,
+            poses=poses,
+            name=name,
+            note=note,
+            base=base,
+            terminals=terminals,
+            force=force,
+            watch=watch,
+        )
     from feedsim.jobs.pack import pack
 
-    return pack(subject, out, inputs=inputs, base=base, fmus=fmus, set=set, force=force, watch=watch)
+    return pack(
+        subject, out, inputs=inputs, base=base, terminals=terminals, fmus=fmus, set=set, force=force, watch=watch
+    )

@@ -44,6 +44,7 @@ def machine_pack(
     poses: Pairs[Value] = None,
     name: str | None = None,
     note: str | None = None,
+    terminals: bool = True,
     base: File | None = None,
     force: bool = False,
     watch: Watch = NO_WATCH,
@@ -56,6 +57,7 @@ def machine_pack(
         at: axis -> position [m], or a text with a unit; other axes stay at the machine's pose.
         poses: axis -> size of the cells of a grid of poses [m], or a text "20mm" or "0mm..400mm/20mm".
         name, note: of the machine in the archive; None: the machine's own.
+        terminals: with terminals and icons, which FMI Library 3 refuses in units of FMI 2.0.
         base: archive whose binaries are taken; None: plant.fmu of those that come along.
         force: `out` may be a file that feedsim did not write.
         watch: who hears how far the job is.
@@ -95,6 +97,7 @@ def machine_pack(
                 poses=grid,
                 name=loaded.name if name is None else name,
                 note=loaded.note if note is None else note,
+                terminals=terminals,
             )
             content = packed.path.read_bytes()
         where = ", ".join(f"{axis} at {position * 1e3:.9g} mm" for axis, position in pose.items())

@@ -25,6 +25,7 @@ def pack(
     out: File | None = None,
     *,
     inputs: bool = False,
+    terminals: bool = True,
     base: File | None = None,
     fmus: File | None = None,
     set: Changes = None,
@@ -37,6 +38,7 @@ def pack(
         subject: scenario file, machine file or machine folder. Of a scenario the motion is inside.
         out: archive to write; None: :meth:`Made.save` does it.
         inputs: leave the scenario's motion out, so that setpoints are inputs.
+        terminals: with terminals and icons, which FMI Library 3 refuses in units of FMI 2.0.
         base: archive whose binaries are taken; None: machine.fmu in `fmus`.
         fmus: folder of the archives.
         set: changes of the file, as behind ``--set``.
@@ -78,6 +80,7 @@ def pack(
                 name=machine.name if moving is None else f"{machine.name}; motion: {moving.name}",
                 note=machine.note if moving is None else " ".join(loaded.notes),
                 model=machine.name if moving is None else moving.name,
+                terminals=terminals,
             )
             content = packed.path.read_bytes()
         motion = f"motion of {program.duration:.4g} s inside" if program else "setpoints are inputs"

@@ -39,7 +39,7 @@ MARK = b'content="feedsim export"'
 def write(run: JudgedRun, out: Path, wanted: Sequence[str] = (), fmus: Path | None = None) -> int:
     """Write the page of a run's scenario, whole or not at all; returns its size [bytes].
 
-    wanted, fmus: as for :func:`export`. Raises InputError as that, and OutputError: `out` cannot be written.
+    wanted, fmus: as for :func:`page`. Raises InputError as that, and OutputError: `out` cannot be written.
     """
     content = page(run, wanted, fmus)
     with written_whole(out) as file:
@@ -65,7 +65,7 @@ def page(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
 
 
 def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
-    """The text of the page; arguments and errors as for :func:`export`."""
+    """The text of the page; arguments and errors as for :func:`page`."""
     contents = content(run.scenario, run.program, wanted, fmus)
     scenario, machine = run.scenario, run.scenario.machine
     shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]

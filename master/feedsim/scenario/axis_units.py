@@ -258,6 +258,7 @@ class Drive(_Effects):
     T_sym: float = _drive("T_sym")
     symmetry_lag: StrictBool = _drive("symmetry_lag", False)
     ramp_speed_setpoint: StrictBool = _drive("ramp_speed_setpoint", True)
+    setpoint_resolution: float = _drive("setpoint_resolution", 1e-7)
 
     # speed loop
     K_p: float = _drive("K_p")

@@ -54,6 +54,7 @@ def pack(
     note: str = "",
     trial: bool = True,
     level: int = 9,
+    terminals: bool = True,
 ) -> Packed:
     """Pack a machine into the plant archive `base`; write it to `out`, whole or not at all.
 
@@ -64,13 +65,15 @@ def pack(
         name, note: what the archive's description and documentation say of the machine.
         trial: instantiate the packed unit once, where the base has a binary for this platform.
         level: of compression, 0 (none) to 9.
+        terminals: with terminals and icons, as far as the base has them.
 
     Raises:
         InputError: a file is not what it should be, or the unit refuses the machine.
         OutputError: `out` cannot be written.
     """
     with packaging():
-        return packed(base, out, plant_tables(modes, pose, poses), name=name, note=note, trial=trial, level=level)
+        given = plant_tables(modes, pose, poses)
+        return packed(base, out, given, name=name, note=note, trial=trial, level=level, terminals=terminals)
 
 
 @contextmanager
@@ -87,7 +90,7 @@ def packaging() -> Iterator[None]:
 
 
 def plant_tables(modes: Path, pose: Mapping[str, float], poses: Path | None) -> MachineTables:
-    """A machine's files as an archive holds them, checked; arguments as those of `export`."""
+    """A machine's files as an archive holds them, checked; arguments as those of `pack`."""
     from feedsim_packager import machine_tables
     from feedsim_packager.resources import File
 
@@ -117,12 +120,16 @@ def packed(
     model: str = "",
     trial: bool = True,
     level: int = 9,
+    terminals: bool = True,
 ) -> Packed:
     """Pack the unit of the archive `base` with what is `given`; `model`: its modelName, where it is not the unit's; the
-    rest as in `export`."""
+    rest as in `pack`."""
     from feedsim_packager.machine import named
     from feedsim_packager.repack import repack
 
     with TemporaryFolder() if trial else nullcontext() as stage:
-        done = repack(base, given, named(name, note, model), out, trial_run=trial, level=level, stage=stage)
+        done = repack(
+            base, given, named(name, note, model), out, trial_run=trial, level=level, stage=stage,
+            with_terminals=terminals,
+        )  # fmt: skip
     return Packed(done.path, done.size, done.guid, done.platforms)

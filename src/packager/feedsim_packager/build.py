@@ -165,6 +165,7 @@ def build(
     *,
     targets: Sequence[Target] | None = None,
     progress: Callable[[str], None] | None = None,
+    with_terminals: bool = True,
 ) -> Result:
     """Compile and pack `unit` into `out`. `build_directory` keeps what was staged; without it nothing stays.
 
@@ -181,6 +182,8 @@ def build(
     pages, warnings = _documentation(unit, references)
     pictures, more_warnings = terminals.files(unit.directory, unit.variables)
     warnings += more_warnings
+    if not with_terminals:
+        pictures = terminals.without(pictures)
     content = archive.pack(
         {
             "modelDescription.xml": unit.description(),

@@ -26,6 +26,8 @@ exit codes:
 
 _UNIT_HELP = "plant, controller, friction, friction_gms, setpoint, machine, or a unit's folder"
 
+_NO_TERMINALS = "leave terminals and icons out, for importers with FMI Library 3, which refuses those of FMI 2.0 units"
+
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
@@ -46,6 +48,7 @@ def _parser() -> argparse.ArgumentParser:
         help=f"platforms to compile for, of {', '.join(targets.ALL)}, separated by commas, or all; more than this "
         "machine's own need zig. Checked to run on machines other than this one (default: this machine's, unchecked)",
     )
+    packing.add_argument("--no-terminals", action="store_true", help=_NO_TERMINALS)
     packing.add_argument("--build-dir", type=Path, help="keep staged sources and library in this folder")
     describing = commands.add_parser("describe", parents=[common], help="print modelDescription.xml")
     describing.add_argument("unit", metavar="UNIT", help=_UNIT_HELP)
@@ -62,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     repacking = commands.add_parser("repack", help="pack another machine or motion into an archive; needs no compiler")
     repacking.add_argument("base", type=Path, metavar="BASE.fmu", help="archive whose binaries and sources are taken")
     _add_resources(repacking)
+    repacking.add_argument("--no-terminals", action="store_true", help=_NO_TERMINALS)
     repacking.add_argument("--out", type=Path, required=True, help="archive to write")
     return parser
 
@@ -153,8 +157,9 @@ def _build(options: argparse.Namespace) -> None:
         unit = _load(name, compiler, options)
         out = options.out or checkout.PROJECT / "fmus" / f"{unit.table.unit}.fmu"
         result = build.build(
-            unit, out, compiler, options.build_dir, targets=platforms, progress=_tell if platforms else None
-        )
+            unit, out, compiler, options.build_dir, targets=platforms, progress=_tell if platforms else None,
+            with_terminals=not options.no_terminals,
+        )  # fmt: skip
         _warn(result.warnings)
         glibc = f", needs glibc {result.glibc}" if result.glibc else ""
         listed = ", ".join(result.platforms)
@@ -167,7 +172,9 @@ def _tell(line: str) -> None:
 
 def _repack(options: argparse.Namespace) -> None:
     given = kinds.from_files(_given(options))
-    result = repack.repack(options.base, given, named(options.name, options.note), options.out)
+    result = repack.repack(
+        options.base, given, named(options.name, options.note), options.out, with_terminals=not options.no_terminals
+    )
     platforms = ", ".join(result.platforms) or "no binaries"
     trial = "" if result.tried else "; not tried, as it has no binary for this platform"
     print(f"{result.path}: {result.size / 1024:.0f} KiB, {platforms}, guid {result.guid}{trial}")

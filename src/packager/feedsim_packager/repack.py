@@ -34,12 +34,13 @@ class Repacked:
 
 def repack(
     base: Path, given: Resources, machine: Machine, out: Path, *, trial_run: bool = True, level: int = 9,
-    stage: Path | None = None,
+    stage: Path | None = None, with_terminals: bool = True,
 ) -> Repacked:  # fmt: skip
     """Pack the unit of the archive `base` with the resources `given` into `out`, which may be `base` itself.
 
     `trial_run`: instantiate what was packed, where `base` has a binary for this platform. `level`: of compression.
-    `stage`: folder for the trial's files; None: where the system keeps what is temporary.
+    `stage`: folder for the trial's files; None: where the system keeps what is temporary. `with_terminals`: as far as
+    `base` has them.
 
     Raises:
         InputError: `base` is no archive of this packager, or cannot hold the machine; or the unit refuses it.
@@ -60,7 +61,10 @@ def repack(
     }
     kept = {path: content for path, content in files.items() if not path.startswith("resources/")}
     kept = reference.without(kept)  # they are of the resources that go
-    packed = kept | renewed | terminals.describe(listed, kept)
+    if not with_terminals:
+        kept = terminals.without(kept)
+    described = terminals.describe(listed, kept) if terminals.DESCRIPTION in kept else {}
+    packed = kept | renewed | described
     sources = [path.removeprefix("sources/") for path in packed if re.fullmatch(r"sources/[^/]+\.c", path)]
     packed[DESCRIPTION] = description.describe(
         table,

@@ -165,6 +165,11 @@ def files(directory: Path, variables: Sequence[Variable]) -> tuple[dict[str, byt
     return result | describe(variables, result), warnings
 
 
+def without(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """An archive's files without terminals and icons, for importers that stumble over them; the picture stays."""
+    return {path: content for path, content in files.items() if not path.startswith(f"{FOLDER}/")}
+
+
 def describe(variables: Sequence[Variable], present: Collection[str]) -> dict[str, bytes]:
     """terminalsAndIcons.xml under its path in the archive; nothing where there is nothing to tell.
 

@@ -50,6 +50,7 @@ ORDER = [
     "extras",
     "errors",
     "installation",
+    "signals",
 ]
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/unit.py"},

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from feedsim.scenario import Coupling, Machine
 
 T = TypeVar("T")
+STANDARD_OUTPUT = "standard output"  # what an error calls it
 
 
 class TerminalWatch(Watch):
@@ -81,7 +82,7 @@ class _Standard(io.FileIO):
         except OSError as error:
             if self.fileno() == 2:
                 return len(data)
-            error.filename = "standard output"
+            error.filename = STANDARD_OUTPUT
             raise
 
 

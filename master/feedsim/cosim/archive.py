@@ -17,11 +17,12 @@ from typing import IO, Any
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from feedsim.cosim import signals, untrusted
+from feedsim.cosim import untrusted
 from feedsim.cosim.mark import calling
 from feedsim.cosim.unpacked import STORE, Content, check_there
 from feedsim.errors import InputError
 from feedsim.owned import Closing
+from feedsim.signals import held
 
 _DESCRIPTION = "modelDescription.xml"
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # units of FMI 2.0
@@ -184,7 +185,7 @@ def _read_description(path: Path, directory: Path) -> Any:
         raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
     untrusted.refuse_document_type(file.read_bytes(), f"{path}: {_DESCRIPTION}")
     try:
-        with signals.held():  # FMPy's validation has a bare `except:`
+        with held():  # FMPy's validation has a bare `except:`
             description = read_model_description(str(directory))
     except Exception as error:
         raise InputError(f"{what}: {error}") from error

@@ -13,6 +13,7 @@ from typing import Any
 
 from feedsim.errors import InputError
 from feedsim.owned import TemporaryFolder
+from feedsim.signals import held
 
 ANSWER = 10.0  # s that a scheduler has to answer
 JOIN = 30.0  # s that a scheduler without workers has to get one
@@ -59,7 +60,8 @@ def local(workers: int) -> Iterator[Any]:
         folder = str(stack.enter_context(TemporaryFolder()))
         stack.enter_context(dask.config.set({**_QUIET, "temporary-directory": folder}))
         stack.enter_context(_environment(_ONE_THREAD))
-        with _without_interrupts():
+        # Processes that are half started are ended by nobody: a signal waits until they can be.
+        with held(), _without_interrupts():
             try:
                 cluster = started(
                     n_workers=workers,

@@ -244,25 +244,26 @@ class TemporaryFolder:
         path: where it is.
     """
 
-    def __init__(self, within: Path | None = None, *, lock: bool = False) -> None:
+    def __init__(self, within: Path | None = None, *, lock: bool = False, prefix: str = PREFIX) -> None:
         """
         Args:
             within: where it is made; None: in the folder that this process has where the system keeps what is
                 temporary.
             lock: whether it shows others that its process lives; what is in such a folder needs no lock of its own.
+            prefix: of its name.
 
         OutputError: nothing can be written there.
         """
         try:
-            while not self._make(within or _folder_of_process(), lock):
+            while not self._make(within or _folder_of_process(), lock, prefix):
                 pass
         except OSError as error:
             where = f"{within}: a folder" if within and not lock else "a folder for temporary files (TMPDIR)"
             raise OutputError(f"{where} cannot be made: {error.strerror or error}") from error
 
-    def _make(self, parent: Path, lock: bool) -> bool:
+    def _make(self, parent: Path, lock: bool, prefix: str) -> bool:
         """Make it. False: another process has the name, or has taken it, while it was empty, for one that is left."""
-        self.path = parent / (PREFIX + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
+        self.path = parent / (prefix + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
         files: list[int] = []
         # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
         self._end = weakref.finalize(self, _remove, self.path, files, os.getpid())

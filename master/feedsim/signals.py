@@ -72,13 +72,13 @@ def end_program(program: Callable[[], object]) -> None:
             shown(unraisable)
 
     def leave() -> None:
-        for number in taken:
-            signal.signal(number, signal.SIG_DFL)
         if arrived:
             for stream in (sys.stdout, sys.stderr):
                 with suppress(Exception):
                     stream.flush()
             os._exit(128 + arrived[0])
+        for number in taken:  # nothing is left to be done
+            signal.signal(number, signal.SIG_DFL)
 
     taken = [number for number in ENDING if signal.getsignal(number) not in (signal.SIG_IGN, None)]
     sys.unraisablehook = show

@@ -16,6 +16,7 @@ from feedsim.owned import TemporaryFolder
 from feedsim.signals import held
 
 ANSWER = 10.0  # s that a scheduler has to answer
+BUSY = 120.0  # s for the processes of this machine to find one another, however busy it is; who is late is lost
 JOIN = 30.0  # s that a scheduler without workers has to get one
 
 # Threads of linear algebra would compete with the workers for the cores.
@@ -31,7 +32,7 @@ _QUIET = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    "distributed.comm.timeouts.connect": f"{ANSWER} s",
+    "distributed.comm.timeouts.connect": f"{BUSY} s",
     "distributed.nanny.pre-spawn-environ": {},  # it would stay in this process's environment
 }
 

@@ -108,6 +108,10 @@ PLACES = {
     "a destructor": "It.__del__ = strike; It()",
     "a bare except": "try: strike()\n        except: pass",
     "two of them": "ctypes.CFUNCTYPE(None)(strike)(); weakref.finalize(It(), strike)",
+    "a library that makes another error of it": """
+        try: strike()
+        except BaseException: raise ImportError("broken") from None
+    """,
     "a generator that nobody asks any more": "[it for it, _ in zip('ab', asked())]",
 }
 PROGRAM = """
@@ -159,6 +163,16 @@ def test_a_signal_ends_the_program_wherever_it_arrives(place: str, name: str) ->
     number = getattr(signal, name)
     done = ended(PLACES[place], number, again="strike()")
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "unwound\nleft\n", "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_an_import_comes_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of one that is broken off libraries say that it has failed, and go on."""
+    (tmp_path / "imported.py").write_text(
+        "import __main__, time\n__main__.strike()\ntime.sleep(0.1)\nprint('imported')\n"
+    )
+    done = ended(f"sys.path.insert(0, {str(tmp_path)!r}); import imported", signal.SIGTERM)
+    assert (done.returncode, done.stdout, done.stderr) == (143, "imported\nunwound\nleft\n", "")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

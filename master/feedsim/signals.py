@@ -4,7 +4,8 @@ May use: nothing. Start reading at end_program(); held() is for a few steps that
 
 A handler of Python raises wherever the main thread is at work. In a callback from C, in that of a weak reference, in
 ``__del__`` and in a library with a bare ``except:`` the exception vanishes. An exception that is on its way lives; so
-one that is dead while the program is still at work has vanished, and the signal is sent once more.
+one that is dead while the program is still at work has vanished, and the signal is sent once more. While a module is
+imported none is raised: there libraries make another exception of it, "import failed".
 """
 
 from __future__ import annotations
@@ -33,25 +34,28 @@ class Ended(KeyboardInterrupt, SystemExit):
 def end_program(program: Callable[[], object]) -> None:
     """Let signals unwind the stack of `program`, which is called next, and end the process with 128 + their number.
 
-    The first one raises Ended. Further ones find the program on its way out and do not disturb that. Behind `program`
-    nothing is raised: what is registered with atexit comes to its end first. A signal that is ignored stays so (nohup).
+    The first one raises Ended, behind an import. Further ones find the program on its way out and do not disturb that.
+    Behind `program` nothing is raised: what is registered with atexit comes to its end first. A signal that is ignored
+    stays so (nohup).
     """
     arrived: list[int] = []
     raised: list[weakref.ref[Ended]] = []
     dead: list[weakref.ref[Ended]] = []
-    main, shown = threading.main_thread().ident or 0, sys.unraisablehook
+    main, shown, told = threading.main_thread().ident or 0, sys.unraisablehook, sys.excepthook
 
     def end(number: int, frame: FrameType | None) -> None:
         arrived.append(number)
+        if len(arrived) == 1:  # a plain thread: those of threading wait for locks that this one may have
+            with suppress(RuntimeError):
+                _thread.start_new_thread(watch, ())
         while frame is not None and frame.f_code is not program.__code__:
+            if frame.f_code.co_filename.startswith("<frozen importlib"):
+                return
             frame = frame.f_back
         if frame is None or len(dead) < len(raised):
             return
         ended = Ended(128 + arrived[0])
         raised.append(weakref.ref(ended, dead.append))
-        if len(raised) == 1:  # a plain thread: those of threading wait for locks that this one may have
-            with suppress(RuntimeError):
-                _thread.start_new_thread(watch, ())
         try:
             raise ended
         finally:
@@ -71,6 +75,10 @@ def end_program(program: Callable[[], object]) -> None:
         if unraisable.exc_type is not Ended:
             shown(unraisable)
 
+    def tell(*error: Any) -> None:
+        if not arrived:  # else it is most likely what a library has made of Ended
+            told(*error)
+
     def leave() -> None:
         if arrived:
             for stream in (sys.stdout, sys.stderr):
@@ -81,7 +89,7 @@ def end_program(program: Callable[[], object]) -> None:
             signal.signal(number, signal.SIG_DFL)
 
     taken = [number for number in ENDING if signal.getsignal(number) not in (signal.SIG_IGN, None)]
-    sys.unraisablehook = show
+    sys.unraisablehook, sys.excepthook = show, tell
     atexit.register(leave)  # the first, so that it is called last
     for number in taken:
         signal.signal(number, end)

@@ -38,7 +38,7 @@ COMMANDS: dict[str, tuple[list[str], set[str], int]] = {
     "identify": (["identify", "log.csv", "--axis", "Z", "--machine", str(MACHINE), "--stages", "1"], set(), 3),
     "sweep": (["sweep", "study.yaml", "--workers", "2"], {"runs.jsonl", "study.json", "table.csv"}, 1),
     "tune drive": (
-        ["tune", "drive", str(ROOT / "scenarios" / "one_axis.yaml"), "--axis", "X", "--evaluations", "5"], set(), 1,
+        ["tune", "drive", str(ROOT / "scenarios" / "one_axis.yaml"), "--axis", "X", "--evaluations", "10"], set(), 1,
     ),
     "tune compensation": (
         ["tune", "compensation", str(ROOT / "scenarios" / "xz_circle.yaml"), "--kind", "pulse"], set(), 1,

@@ -14,6 +14,7 @@ from types import FrameType
 
 import pytest
 
+from command_helpers import PATIENCE
 from feedsim import owned
 from feedsim.errors import OutputError
 from feedsim.owned import TemporaryFolder, claimed, remove_orphans
@@ -39,10 +40,10 @@ def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[
         assert process.stdout.readline() == "there\n"
         if kill:
             process.kill()
-            process.wait(120)
+            process.wait(PATIENCE)
         yield process
     finally:
-        process.communicate("\n", timeout=120)
+        process.communicate("\n", timeout=PATIENCE)
 
 
 CLAIM = "claim = claimed(Path('out/below'))\nclaim.__enter__()"
@@ -255,7 +256,7 @@ def test_a_pool_of_processes_leaves_little_and_not_for_long(tmp_path: Path, meth
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "master"), "TMPDIR": str(temporary)}
 
     def left_by(end: str) -> set[Path]:
-        subprocess.run([sys.executable, str(script), method, end], env=environment, check=True, timeout=120)
+        subprocess.run([sys.executable, str(script), method, end], env=environment, check=True, timeout=PATIENCE)
         return set(temporary.glob("feedsim-*"))
 
     assert left_by("joined") == set()

@@ -18,6 +18,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from command_helpers import PATIENCE
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.trace import write_csv
 from identification_helpers import I_P, log_of, strokes
@@ -45,7 +46,6 @@ COMMANDS: dict[str, tuple[list[str], set[str], int]] = {
     ),
 }  # fmt: skip
 CAP = 30.0  # s of a command within which it is ended
-DYING = 300.0  # s until what still runs is a failure, on a busy machine too
 
 
 class Place:
@@ -82,7 +82,7 @@ class Place:
                 self.check(command, process.returncode, said, [])
             except subprocess.TimeoutExpired:
                 process.send_signal(number)
-                _, said = process.communicate(timeout=DYING)
+                _, said = process.communicate(timeout=PATIENCE)
                 self.check(command, process.returncode - number - 128, said, [])
             self.lasted[command] = time.monotonic() - begun
         while True:
@@ -90,12 +90,12 @@ class Place:
             instant = self.random.uniform(0.0, self.lasted[command])
             time.sleep(instant)
             process.send_signal(number)
-            _, said = process.communicate(timeout=DYING)
+            _, said = process.communicate(timeout=PATIENCE)
             if process.returncode != 0:
                 break
             self.lasted[command] *= 0.95  # it has been quicker than the signal
             shutil.rmtree(self.folder / "out")
-        until = time.monotonic() + DYING
+        until = time.monotonic() + PATIENCE
         while (running := in_session(process.pid)) and time.monotonic() < until:
             time.sleep(0.05)
         self.codes[process.returncode] += 1

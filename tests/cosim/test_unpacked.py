@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from command_helpers import PATIENCE
 from feedsim import cosim, nc, scenario
 from feedsim.cosim import unpacked
 from feedsim.cosim.archive import Archive
@@ -164,7 +165,7 @@ assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 assert (idle / "modelDescription.xml").is_file()
 """
     environment = {**os.environ, "TMPDIR": str(scratch)}
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment, timeout=60)
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment, timeout=PATIENCE)
     assert not list(scratch.iterdir())  # the parent's went with it, closed or not
 
 
@@ -282,7 +283,7 @@ print(*set(found))
 def test_forked_workers_leave_nothing(kind: str, begun: str, fmus: Path, scratch: Path) -> None:
     words = [sys.executable, "-c", WORKERS, str(fmus / "friction.fmu"), kind, begun]
     environment = {**os.environ, "TMPDIR": str(scratch)}
-    done = subprocess.run(words, check=True, env=environment, timeout=60, capture_output=True, text=True)
+    done = subprocess.run(words, check=True, env=environment, timeout=PATIENCE, capture_output=True, text=True)
     assert done.stdout.split()
     assert not list(scratch.iterdir())
 
@@ -306,4 +307,6 @@ if child == 0:
     os._exit(0)
 assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 """
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60, env={**os.environ, "TMPDIR": str(scratch)})
+    subprocess.run(
+        [sys.executable, "-c", code], check=True, timeout=PATIENCE, env={**os.environ, "TMPDIR": str(scratch)}
+    )

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from command_helpers import feedsim, feedsim_process
+from command_helpers import PATIENCE, feedsim, feedsim_process
 from feedsim import cosim, scenario
 from feedsim.cosim import worker
 from feedsim.errors import SimulationError
@@ -195,12 +195,11 @@ def test_a_hanging_unit_is_left_at_once(number: signal.Signals, place: Callable[
     environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master")}
     process = subprocess.Popen(words, cwd=folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
     kept = folder / "out" / "result.partial.csv"
-    for _ in range(600):
+    until = time.monotonic() + PATIENCE
+    while not (kept.is_file() and len(kept.read_text().splitlines()) > 40) and time.monotonic() < until:
         time.sleep(0.05)
-        if kept.is_file() and len(kept.read_text().splitlines()) > 40:
-            break
     process.send_signal(number)
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == (130 if number == signal.SIGINT else 143)
     assert b"are kept in" in said
     assert {path.name for path in (folder / "out").iterdir()} == {"result.partial.csv"}

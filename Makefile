@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
+.PHONY: help run axe ends check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -194,11 +194,23 @@ fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into
 	$(PY) tests/fuzz/units.py $(ARGS)
 	PYTHONPATH=tests $(PY) -m fuzz.readers $(ARGS)
 
+ends: fmus $(VENV)/.dev ## SIGTERM at random instants to commands on one core: nothing is left behind (ARGS="--count N --seed S")
+	PYTHONPATH=tests $(PY) tests/cli/ends.py $(ARGS)
+
 test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
 	$(PY) tests/processors/run.py $(ARGS)
 
 test-platforms: $(ALL_FMUS) $(VARIABLES) $(VENV)/.dev ## the FMUs of all platforms: Windows under Wine, ARM under qemu, files for macOS
 	ZIG='$(ZIG)' FEEDSIM_PLATFORM_FMUS=$(BUILD)/fmus-all $(PY) -m pytest -s tests/platforms
+
+# axe-core, of the version and with the sums that tests/axe/package-lock.json has.
+AXE := $(BUILD)/axe/node_modules/axe-core/axe.min.js
+axe: $(AXE) ## fetch axe-core by npm, which tests reports and pages for accessibility (FEEDSIM_AXE names it)
+$(AXE): $(wildcard tests/axe/*.json)
+	mkdir -p $(BUILD)/axe
+	cp $^ $(BUILD)/axe
+	cd $(BUILD)/axe && npm ci --silent --ignore-scripts --no-audit --no-fund
+	touch $@
 
 # Other people's simulators and validators. What cannot be installed is skipped; the summary at the end says what and why.
 # Java and Maven are the machine's: nothing is installed outside this folder here (CONTRIBUTING.md says how).

@@ -20,6 +20,7 @@ import pytest
 from feedsim.cli import main
 
 MASTER = Path(__file__).resolve().parent.parent / "master"
+PATIENCE = 300.0  # s until what hangs is a failure, on a busy machine too
 Done = subprocess.CompletedProcess[str]
 
 

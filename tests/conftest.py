@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # Threads wait for one another over small matrices: the command, the Makefile and the benchmarks do the same. Before
 # numpy is loaded.
@@ -25,8 +25,8 @@ UNITS = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine
 # What a test computes, no earlier run has computed for it.
 os.environ["FEEDSIM_CACHE"] = ""
 
-# How long an example takes is no verdict.
-settings.register_profile("feedsim", deadline=None)
+# How long an example takes is no verdict, nor how long it takes to be made up.
+settings.register_profile("feedsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("feedsim")
 
 # A shell's job in the background ignores Ctrl-C, and so would all that is started here.

@@ -53,8 +53,28 @@ def chromium() -> Iterator[Any]:
             found = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         except api.Error as error:
             pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
+        open_context = found.new_context
+
+        def new_context(**given: Any) -> Any:
+            context = open_context(**given)
+            context.set_default_timeout(1e3 * WAIT)
+            return context
+
+        found.new_context, found.new_page = new_context, lambda **given: new_context(**given).new_page()
         yield found
         found.close()
+
+
+def drawn(page: Any) -> None:
+    """Wait until the page has drawn what it does in a frame or when it is idle, however long a busy machine takes."""
+    page.evaluate(
+        """async () => {
+          for (let k = 0; k < 3; k++) {
+            await new Promise(done => requestAnimationFrame(done));
+            await new Promise(done => (window.requestIdleCallback || setTimeout)(done));
+          }
+        }"""
+    )
 
 
 class Opened:
@@ -81,9 +101,10 @@ class Opened:
 
     def settled(self) -> None:
         """Until pictures, figures, warnings and frequency response are those of the newest state."""
-        self._until(SETTLED)
+        self.until(SETTLED)
 
-    def _until(self, holds: str) -> None:
+    def until(self, holds: str) -> None:
+        """Until the expression is true in the page."""
         # wait_for_function() evaluates text in the page, which the page's policy forbids.
         for _ in range(int(WAIT / 0.05)):
             if self.page.evaluate(holds):
@@ -95,7 +116,7 @@ class Opened:
         """Another state of the knobs, by the address that a link has; until all of it is shown."""
         before = self.count("asked")
         self.page.evaluate("address => { location.hash = address; }", address)
-        self._until(f"document.documentElement.dataset.asked !== '{before}'")
+        self.until(f"document.documentElement.dataset.asked !== '{before}'")
         self.settled()
 
     def figures(self) -> dict[str, str]:

@@ -51,6 +51,7 @@ ORDER = [
     "extras",
     "errors",
     "installation",
+    "signals",
 ]
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/loose.py", "cosim/unit.py"},

@@ -14,6 +14,7 @@ from types import FrameType
 
 import pytest
 
+from command_helpers import PATIENCE
 from feedsim import owned
 from feedsim.errors import OutputError
 from feedsim.owned import TemporaryFolder, claimed, remove_orphans
@@ -39,10 +40,10 @@ def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[
         assert process.stdout.readline() == "there\n"
         if kill:
             process.kill()
-            process.wait(120)
+            process.wait(PATIENCE)
         yield process
     finally:
-        process.communicate("\n", timeout=120)
+        process.communicate("\n", timeout=PATIENCE)
 
 
 CLAIM = "claim = claimed(Path('out/below'))\nclaim.__enter__()"
@@ -191,13 +192,15 @@ def test_temporary_folders_go_with_their_process(tmp_path: Path, monkeypatch: py
     with another_process(make, tmp_path, kill=True):
         assert len(set(tmp_path.iterdir()) - there) == 1
         with TemporaryFolder() as own:
-            remove_orphans()
-            assert set(tmp_path.iterdir()) == {*there, own}
-    assert set(tmp_path.iterdir()) == there
+            assert set(tmp_path.iterdir()) == {*there, own.parent}, "the first use removes what is left"
+    assert list(own.parent.iterdir()) == [own.parent / owned.LOCK]
     assert (tmp_path / "mine" / "file").exists()
 
 
-def test_a_signal_at_any_line_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("lock", [False, True])
+def test_a_signal_at_any_line_leaves_no_temporary_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lock: bool
+) -> None:
     monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
     interrupted, at = True, 0
     while interrupted:
@@ -213,14 +216,58 @@ def test_a_signal_at_any_line_leaves_no_temporary_folder(tmp_path: Path, monkeyp
 
         sys.settrace(trace)
         try:
-            with TemporaryFolder() as folder:
+            with TemporaryFolder(tmp_path, lock=lock) as folder:
                 (folder / "file").touch()
         except SystemExit:
             interrupted = True
         finally:
             sys.settrace(None)
         assert not list(tmp_path.iterdir()), f"interrupted at line {at} of those executed"
-    assert at > 20
+    assert at > 15
+
+
+POOL = """
+import multiprocessing, sys, time
+from feedsim.owned import TemporaryFolder
+folders = []
+
+def work(number):
+    folders.extend(TemporaryFolder() for _ in range(3))
+
+if __name__ == "__main__":
+    multiprocessing.set_start_method(sys.argv[1])
+    with multiprocessing.Pool(2) as pool:
+        pool.map(work, range(8))
+        if sys.argv[2] == "joined":
+            pool.close()
+            pool.join()
+        else:  # at work, and not waiting for more, which they would be told there is none
+            pool.map_async(time.sleep, [60.0] * 4)
+            time.sleep(0.5)
+"""
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
+def test_a_pool_of_processes_leaves_little_and_not_for_long(tmp_path: Path, method: str) -> None:
+    """`with Pool() as pool:` ends workers by SIGTERM: each leaves one folder, until the next first use."""
+    script, temporary = tmp_path / "pool.py", tmp_path / "temporary"
+    temporary.mkdir()
+    script.write_text(POOL)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "master"), "TMPDIR": str(temporary)}
+
+    def left_by(end: str) -> set[Path]:
+        subprocess.run([sys.executable, str(script), method, end], env=environment, check=True, timeout=PATIENCE)
+        return set(temporary.glob("feedsim-*"))
+
+    assert left_by("joined") == set()
+    first = left_by("ended")
+    assert 0 < len(first) <= 2
+    second = left_by("ended")
+    assert 0 < len(second) <= 2
+    assert not first & second
+    with another_process("folder = TemporaryFolder()", temporary):
+        assert len(set(temporary.iterdir())) == 1
+    assert not list(temporary.iterdir())
 
 
 def test_a_file_that_was_not_finished_goes_with_the_next(tmp_path: Path) -> None:

@@ -147,15 +147,13 @@ def test_the_search_finds_pages_from_disk(browser: Any, site: Path) -> None:
         page.wait_for_function(
             "part => [...document.querySelectorAll('ul.search li > a')].slice(0, 8)"
             ".some(each => each.href.includes(part))",
-            arg=f"/{target}.html", timeout=30_000,
-        )  # fmt: skip
+            arg=f"/{target}.html",
+        )
     page.close()
     assert not [url for url in asked if not url.startswith(("file:", "data:"))]
 
 
-@pytest.mark.skipif(
-    "FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (npm pack axe-core)"
-)
+@pytest.mark.skipif("FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (make axe)")
 def test_axe_core_finds_nothing(browser: Any, site: Path) -> None:
     """Pages of every part, on light and dark screens, wide and narrow."""
     script = Path(os.environ["FEEDSIM_AXE"]).read_text(encoding="utf-8")

@@ -2,7 +2,7 @@
 
 An answer belongs to all that it follows from: the bytes of the user's files, the arguments, and the code that finds it.
 Where one of these changes it is found anew, so that a kept answer is the very one that would be found. What cannot be
-read or written is found as if nothing had been kept. May use: installation. Start reading at cached().
+read or written is found as if nothing had been kept. May use: signals and installation. Start reading at cached().
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.installation import version
+from feedsim.signals import held
 
 FOLDER = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
 MAX_ANSWERS = 256  # answers of one kind; the oldest go first
@@ -111,7 +112,7 @@ def _keep(file: Path, kind: str, text: str) -> None:
     if len(text) > MAX_ANSWER_BYTES:
         return
     file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", prefix=".", dir=file.parent, delete=False) as out:
+    with held(), tempfile.NamedTemporaryFile("w", encoding="utf-8", prefix=".", dir=file.parent, delete=False) as out:
         fresh = Path(out.name)
         try:
             out.write(text)

@@ -1,6 +1,6 @@
 """Scenarios, studies, machines, structures and notebooks that come along, and copies of them for the user to change.
 
-May use: files, installation, errors. Start reading at copy().
+May use: files, installation, signals, errors. Start reading at copy().
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 from feedsim.errors import InputError, OutputError
 from feedsim.files.source import at, places, read
 from feedsim.installation import mend, shipped
+from feedsim.signals import held
 
 # Kind -> the file that stands for one, in the folder of all of them; of a kind whose files lie in a folder each, that
 # folder is the example.
@@ -93,12 +94,13 @@ def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
         )
     written: list[Path] = []
     try:
-        for path, content in contents.items():
-            if not _exists(path):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                with path.open("xb") as file:
-                    written.append(path)
-                    file.write(content)
+        with held():
+            for path, content in contents.items():
+                if not _exists(path):
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    with path.open("xb") as file:
+                        written.append(path)
+                        file.write(content)
     except OSError as error:
         for path in written:
             with suppress(OSError):

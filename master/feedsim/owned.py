@@ -1,6 +1,6 @@
 """What belongs to one process as long as it lives: a folder of results, folders for temporary files, a file that grows.
 
-May use: errors. Start reading at claimed().
+May use: signals and errors. Start reading at claimed().
 
 A lock of the system on an open file shows whether its owner lives: it goes with the process, whatever has ended that.
 So nothing that a killed process has left keeps others waiting, and the next start removes it.
@@ -8,6 +8,7 @@ So nothing that a killed process has left keeps others waiting, and the next sta
 
 from __future__ import annotations
 
+import atexit
 import errno
 import hashlib
 import os
@@ -29,6 +30,7 @@ from types import TracebackType
 from typing import Self
 
 from feedsim.errors import OutputError
+from feedsim.signals import held
 
 PREFIX = "feedsim-"  # of folders for temporary files
 _NAME_LETTERS, _LENGTH = "abcdefghijklmnopqrstuvwxyz0123456789_", 8  # of their names behind it, as tempfile has them
@@ -41,7 +43,9 @@ _FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
 _LOOK = 0.02  # s between two looks at a lock that is waited for
 _BETWEEN = 1e-4  # s between two attempts at what others may remove at the same moment
 _UNSETTLED = 5.0  # s for which they may
-_claims: set[tuple[str, int]] = set()  # lock and thread
+_folders: dict[tuple[int, str], TemporaryFolder] = {}  # by process and where the system keeps what is temporary
+# What blocks have: locks and folders that were made, by path of the lock, thread and process.
+_claims: dict[tuple[str, int, int], tuple[list[_Lock], list[Path]]] = {}
 
 
 @contextmanager
@@ -57,7 +61,7 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
     Raises:
         OutputError: another has it, with who that is; or the folder cannot be written to.
     """
-    key = os.path.realpath(directory / lock), threading.get_ident()
+    key = os.path.realpath(directory / lock), threading.get_ident(), os.getpid()
     if key in _claims:
         yield
         return
@@ -71,52 +75,63 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
         if not stat.S_ISDIR(mode):
             raise OutputError(f"{directory}: cannot be written, {path} is a file; allowed: a directory")
         break
+    _claims[key] = [], made
     try:
-        locks = _taken(directory, lock, time.monotonic() + wait)
-        try:
-            _claims.add(key)
-            yield
-        finally:
-            _claims.discard(key)
-            for entry in locks:
-                entry.release()
+        _take(directory, lock, time.monotonic() + wait, _claims[key][0])
+        yield
     finally:
+        _give_back(key)
+
+
+def _give_back(key: tuple[str, int, int]) -> None:
+    with held():
+        locks, made = _claims[key]
+        while locks:
+            locks.pop().release()
         for path in made:
             with suppress(OSError):  # not empty, as a rule
                 path.rmdir()
+        del _claims[key]
 
 
-def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
-    """The locks that make a folder ours. OutputError."""
+@atexit.register
+def _give_all_back() -> None:
+    """A signal may have ended a block ahead of its end."""
+    for key in [key for key in _claims if key[2] == os.getpid()]:
+        _give_back(key)
+
+
+def _take(directory: Path, name: str, until: float, locks: list[_Lock]) -> None:
+    """Add the locks that make a folder ours. OutputError."""
     began = time.monotonic()
     while True:
         try:
             directory.mkdir(parents=True, exist_ok=True)
-            lock = _Lock(directory / name)
+            with held():
+                locks.append(lock := _Lock(directory / name))
         except OSError as error:
             between = isinstance(error, (FileNotFoundError, FileExistsError))  # made or removed by another just now
             if between and not directory.is_symlink() and time.monotonic() < began + _UNSETTLED:
                 time.sleep(_BETWEEN)  # not in step with the other
                 continue
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
-        locks = [lock]
         if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
             holder = lock.content()
             if holder and f" on {platform.node()} since " not in holder:
-                lock.close()
+                locks.pop().close()
                 raise OutputError(
                     f"{directory}: another process writes its results there, as {lock.path} says: {holder}. If it is "
                     "not at work any more, remove that file; or take another directory"
                 )
             unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]
-            with suppress(OSError):
+            with suppress(OSError), held():
                 locks.append(_Lock(Path(tempfile.gettempdir()) / f"{PREFIX}{unique}.lock"))
         if all(lock.state is not False for lock in locks):
             lock.tell(_self())
-            return locks
+            return
         holder = lock.content()
-        for entry in locks:
-            entry.close()
+        while locks:
+            locks.pop().close()
         if time.monotonic() >= until:
             who = f": {holder}" if holder else ""
             raise OutputError(
@@ -229,35 +244,42 @@ class TemporaryFolder:
         path: where it is.
     """
 
-    def __init__(self, within: Path | None = None) -> None:
-        """within: where it is made; None: where the system keeps what is temporary.
+    def __init__(self, within: Path | None = None, *, lock: bool = False, prefix: str = PREFIX) -> None:
+        """
+        Args:
+            within: where it is made; None: in the folder that this process has where the system keeps what is
+                temporary.
+            lock: whether it shows others that its process lives; what is in such a folder needs no lock of its own.
+            prefix: of its name.
 
         OutputError: nothing can be written there.
         """
         try:
-            parent = within or Path(tempfile.gettempdir())
-            while True:
-                self.path = parent / (PREFIX + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
-                indexes: list[int] = []
-                # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
-                self._end = weakref.finalize(self, _remove, self.path, indexes, os.getpid())
-                try:
-                    self.path.mkdir(0o700)
-                except FileExistsError:  # another's
-                    self._end.detach()
-                    continue
-                try:
-                    indexes.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
-                except FileNotFoundError:  # taken for one that a killed process has left, while it was empty
-                    self._end.detach()
-                    continue
-                if locked(indexes[0]) is not False and _is(self.path / LOCK, indexes[0]):
-                    break
-                self._end.detach()
-                os.close(indexes[0])
+            while not self._make(within or _folder_of_process(), lock, prefix):
+                pass
         except OSError as error:
-            where = f"{within}: a folder" if within else "a folder for temporary files (TMPDIR)"
+            where = f"{within}: a folder" if within and not lock else "a folder for temporary files (TMPDIR)"
             raise OutputError(f"{where} cannot be made: {error.strerror or error}") from error
+
+    def _make(self, parent: Path, lock: bool, prefix: str) -> bool:
+        """Make it. False: another process has the name, or has taken it, while it was empty, for one that is left."""
+        self.path = parent / (prefix + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
+        files: list[int] = []
+        # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
+        self._end = weakref.finalize(self, _remove, self.path, files, os.getpid())
+        try:
+            self.path.mkdir(0o700)
+            if lock:
+                files.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
+            if not lock or (locked(files[0]) is not False and _is(self.path / LOCK, files[0])):
+                return True
+        except (FileExistsError, FileNotFoundError):
+            if not parent.is_dir():
+                raise
+        self._end.detach()
+        for file in files:
+            os.close(file)
+        return False
 
     def close(self) -> None:
         """Remove it with all that is in it."""
@@ -272,16 +294,36 @@ class TemporaryFolder:
         self.close()
 
 
-def _remove(folder: Path, indexes: list[int], owner: int) -> None:
-    """A process that was forked off leaves its parent's folders alone."""
+def _folder_of_process() -> Path:
+    """The folder that has all others of this process, so that it leaves one if it is killed.
+
+    It is made when it is needed; then what killed processes have left is removed, too.
+    """
+    key = os.getpid(), tempfile.gettempdir()
+    if (known := _folders.get(key)) is None or not known.path.is_dir():  # cleaners take what has been idle for long
+        _folders.pop(key, None)
+        remove_orphans()
+        known = _folders.setdefault(key, TemporaryFolder(Path(key[1]), lock=True))
+        # Workers that multiprocessing forks end without what atexit and weakref were given.
+        processes = sys.modules.get("multiprocessing.process")
+        if processes is not None and processes.parent_process() is not None:
+            from multiprocessing.util import Finalize
+
+            Finalize(None, known.close, exitpriority=-100)  # the last, like multiprocessing's own folders
+    return known.path
+
+
+def _remove(folder: Path, files: list[int], owner: int) -> None:
+    """Remove a folder and close its lock. A process that was forked off leaves its parent's folders alone."""
     if os.getpid() != owner:
         return
-    until = time.monotonic() + WRITING
-    while not _emptied(folder) and time.monotonic() < until:
-        time.sleep(_LOOK)
-    while indexes:  # ahead of the rest: Windows does not remove what is open
-        os.close(indexes.pop())
-    shutil.rmtree(folder, ignore_errors=True)
+    with held():  # also where an exception of a handler would vanish, and the folder stay
+        until = time.monotonic() + WRITING
+        while not _emptied(folder) and time.monotonic() < until:
+            time.sleep(_LOOK)
+        while files:  # ahead of the rest: Windows does not remove what is open
+            os.close(files.pop())
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _emptied(folder: Path) -> bool:

@@ -17,6 +17,8 @@ from harness import Contestant, Costs, digits, measure, table
 import provenance
 import pytest
 
+from command_helpers import PATIENCE
+
 all_benchmarks = importlib.import_module("all")  # as a name of this module it would hide Python's own
 
 
@@ -205,7 +207,7 @@ def test_numpy_comes_after_the_harness() -> None:
 )
 def test_every_benchmark_tells_its_options(name: str) -> None:
     command = [sys.executable, str(harness.ROOT / "benchmarks" / f"{name}.py"), "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     assert "--json" in done.stdout
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from capture_helpers import axis_signals, content
-from command_helpers import feedsim
+from command_helpers import PATIENCE, feedsim
 from ssp_helpers import short_scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -137,7 +137,7 @@ def test_surroundings(name: str, command: str, place: Path, fmus: Path, request:
     # Standard error goes into a file, so that a row may do with it what it likes.
     done = subprocess.run(
         ["bash", "-c", f"{{ {row.shell}; }} 2>>told.txt", "-", *words], cwd=place, env=environment,
-        stdout=subprocess.PIPE, encoding="utf-8", errors="replace", timeout=120, check=False,
+        stdout=subprocess.PIPE, encoding="utf-8", errors="replace", timeout=PATIENCE, check=False,
     )  # fmt: skip
     told = (place / "told.txt").read_text(encoding="utf-8", errors="replace")
     (place / "told.txt").unlink()
@@ -175,7 +175,7 @@ def test_what_is_no_file_of_people_is_not_read(setting: str, told: str, tmp_path
         file.write(b"name: ")
         file.truncate(300_000_000)
     done = subprocess.run(
-        [sys.executable, "-m", "feedsim", "validate", "short.yaml", "--set", setting], cwd=tmp_path, timeout=60,
+        [sys.executable, "-m", "feedsim", "validate", "short.yaml", "--set", setting], cwd=tmp_path, timeout=PATIENCE,
         env={**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master")}, capture_output=True,
         text=True, check=False,
     )  # fmt: skip
@@ -188,7 +188,7 @@ def test_what_is_no_file_of_people_is_not_read(setting: str, told: str, tmp_path
 def test_a_trace_that_is_none_keeps_nobody_waiting(words: list[str], tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     done = subprocess.run(
-        [sys.executable, "-m", "feedsim", *words], cwd=tmp_path, timeout=60, capture_output=True, check=False,
+        [sys.executable, "-m", "feedsim", *words], cwd=tmp_path, timeout=PATIENCE, capture_output=True, check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT / "master")},
     )  # fmt: skip
     assert done.returncode == 2

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from command_helpers import PATIENCE
 from feedsim.cli import main
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.sweep import read_table
@@ -99,7 +100,7 @@ def test_a_second_one_is_refused_before_it_begins(
         )
         assert [path.name for path in (place / "claimed").iterdir()] == begun
     finally:
-        owner.communicate("\n", timeout=120)
+        owner.communicate("\n", timeout=PATIENCE)
     assert not (place / "claimed").exists()
 
 
@@ -117,7 +118,7 @@ def test_of_several_at_once_one_leaves_its_set(place: Path, fmus: Path) -> None:
     assert 0 in codes
     summary = complete(place / "several")
     alone = started(["run", "short.yaml", "--out", "alone", *told(summary)], place, fmus)
-    assert alone.communicate(timeout=120)[0] is None
+    assert alone.communicate(timeout=PATIENCE)[0] is None
     assert (place / "alone" / "result.csv").read_bytes() == (place / "several" / "result.csv").read_bytes()
     assert list((place / "temporary").iterdir()) == []
 
@@ -136,7 +137,7 @@ def test_ended_at_any_moment(command: str, place: Path, fmus: Path) -> None:
     out, other = place / f"ended_{command}", ["--set", "name=Other"] if command == "run" else ["--hold", "F_log=0 N.m"]
     begun = time.monotonic()
     first = started(words, place, fmus)
-    first.communicate(timeout=120)
+    first.communicate(timeout=PATIENCE)
     assert first.returncode == 0
     lasted = time.monotonic() - begun
     moments, killed = random.Random(command), False
@@ -144,11 +145,11 @@ def test_ended_at_any_moment(command: str, place: Path, fmus: Path) -> None:
         process = started([*words, *other], place, fmus)
         time.sleep(moments.uniform(0.4, 1.0) * lasted)
         process.send_signal(number)
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE)
         killed |= process.returncode == -signal.SIGKILL  # its lock stays until another has claimed the folder
         complete(out, [".feedsim*", "result.partial.csv"] if killed else ["result.partial.csv"])
     last = started([*words, *other], place, fmus)
-    last.communicate(timeout=120)
+    last.communicate(timeout=PATIENCE)
     assert last.returncode == 0
     complete(out)
     assert list((place / "temporary").iterdir()) == []
@@ -167,16 +168,16 @@ def test_a_study_goes_on_whatever_has_ended_it(place: Path, fmus: Path) -> None:
                 break
             time.sleep(0.01)
         process.send_signal(number)
-        process.wait(60)
+        process.wait(PATIENCE)
         assert process.returncode == (-number if number == signal.SIGKILL else 128 + number)
-        until = time.monotonic() + 60
+        until = time.monotonic() + PATIENCE
         while alive(process.pid):
             assert time.monotonic() < until, "its workers go on"
             time.sleep(0.1)
         process.communicate()
     assert list((place / "temporary").iterdir()) == []
     last = started([*words, "0"], place, fmus)
-    last.communicate(timeout=120)
+    last.communicate(timeout=PATIENCE)
     assert last.returncode == 0
     tables = [read_table(folder) for folder in (parts, place / "whole")]
     for name in tables[0].columns:

@@ -202,7 +202,7 @@ RANDOM = st.fixed_dictionaries(
 )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(RANDOM, st.sampled_from(ENCODINGS))
 def test_writing_and_reading_is_the_identity(values: dict[str, Value], encoding: str) -> None:
     files = [opened("nc.tea", NC.encode(encoding)), opened("ps.tea", DRIVE.encode())]

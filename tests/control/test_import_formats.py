@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control_helpers import DRIVE, INI, NC, TABLE, reasons, values
@@ -104,7 +104,7 @@ def test_a_byte_order_mark_is_of_no_line(encoding: str) -> None:
 SEEDS = [NC, DRIVE, TABLE, INI, 'getriebe[0].kv 5\n<TcSmItem><Axis><Velo Maximum="3"/></Axis>', "p1460[0]=1\n"]
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300)
 @given(st.data())
 def test_no_bytes_end_in_anything_but_a_sentence(data: st.DataObject) -> None:
     raw = bytearray(data.draw(st.sampled_from(SEEDS)).encode())
@@ -124,7 +124,7 @@ def test_no_bytes_end_in_anything_but_a_sentence(data: st.DataObject) -> None:
     assert all(archive.text[slice(*each.span)] == each.text for each in archive.entries)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=300))
 def test_any_bytes(data: bytes) -> None:
     try:

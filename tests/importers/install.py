@@ -3,9 +3,9 @@ fmu-runner by cargo.
 
     python tests/importers/install.py [--system] [--rust] FOLDER
 
-Java and Maven must be there, and cargo for --rust, which takes minutes. With --system Java and Maven are installed
-first where they are not (apt, as root); without it nothing is installed on the machine itself. What is missing is said,
-and is no failure: its tests are skipped with the reason.
+Java and Maven must be there, and for --rust, which takes minutes, cargo and libclang. With --system Java, Maven and
+libclang are installed first where they are not (apt, as root); without it nothing is installed on the machine itself.
+What is missing is said, and is no failure: its tests are skipped with the reason.
 """
 
 from __future__ import annotations
@@ -35,23 +35,30 @@ RUST = {
     "fmu-runner-program": ("--path", str(Path(__file__).with_name("rust"))),
 }
 LONGEST = 900  # s; fmi-sim, with 150 crates, takes minutes
-PACKAGES = {"java": "default-jre-headless", "mvn": "maven"}
+PACKAGES = {"java": "default-jre-headless", "mvn": "maven", "libclang": "libclang-dev"}
+LIBCLANG = (
+    "llvm-*/lib/libclang*.so*",
+    "*/libclang*.so*",
+    "libclang*.so*",
+)  # below the system's lib; fmi-sim reads C by it
 
 
 def main(words: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description="Fetch what make test-importers needs beyond pip.")
-    parser.add_argument("--system", action="store_true", help="install Java and Maven too, with apt, as root")
+    parser.add_argument("--system", action="store_true", help="install Java, Maven and libclang too, with apt, as root")
     parser.add_argument("--rust", action="store_true", help="build fmi-sim and fmu-runner too, with cargo")
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     options = parser.parse_args(words)
     fetch(options.folder, system=options.system)
     if options.rust:
-        build(options.folder / "cargo")
+        build(options.folder / "cargo", system=options.system)
     return 0
 
 
-def build(folder: Path) -> None:
-    """The programs in Rust, into `folder`/bin."""
+def build(folder: Path, *, system: bool = False) -> None:
+    """The programs in Rust, into `folder`/bin. `system`: whether the machine's package manager may be used."""
+    if system and not _has_libclang():
+        _apt(["libclang"])
     for name, words in RUST.items():
         if shutil.which(name, path=str(folder / "bin")):
             continue
@@ -66,13 +73,23 @@ def build(folder: Path) -> None:
             _left_out(name, f"cargo did not build it within {LONGEST} s")
             continue
         if done.returncode:
-            _left_out(name, "cargo could not build it:\n" + (done.stdout + done.stderr).strip()[-500:])
+            told = (done.stdout + done.stderr).strip()[-500:]
+            if "libclang" in told:
+                told = f"libclang not found (Debian: {PACKAGES['libclang']}; LIBCLANG_PATH names its folder):\n{told}"
+            _left_out(name, f"cargo could not build it: {told}")
+
+
+def _has_libclang() -> bool:
+    folders = (Path("/usr/lib"), Path("/usr/lib64"), Path("/usr/local/lib"))
+    return "LIBCLANG_PATH" in os.environ or any(
+        path for folder in folders for name in LIBCLANG for path in folder.glob(name)
+    )
 
 
 def fetch(folder: Path, *, system: bool) -> None:
     """Maestro and VDMCheck2. `system`: whether the machine's package manager may be used."""
     jars, vdmcheck = folder / "jars", folder / "vdmcheck"
-    needed = ["java"] if _complete(folder) else list(PACKAGES)
+    needed = ["java"] if _complete(folder) else ["java", "mvn"]
     if system and any(not shutil.which(program) for program in needed):
         _apt(needed)
     if missing := [program for program in needed if not shutil.which(program)]:

@@ -37,10 +37,14 @@ def test_nothing_is_installed_unasked(
         assert f"left out: {name}: cargo not found" in said
 
 
-def test_java_and_maven_are_installed_when_asked(commands: list[list[str]], tmp_path: Path) -> None:
-    assert install.main(["--system", str(tmp_path)]) == 0
-    assert [words[0] for words in commands] == ["apt-get", "apt-get"]
-    assert set(install.PACKAGES.values()) <= set(commands[-1])
+def test_what_is_missing_is_installed_when_asked(
+    commands: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(install, "LIBCLANG", ())
+    monkeypatch.delenv("LIBCLANG_PATH", raising=False)
+    assert install.main(["--system", "--rust", str(tmp_path)]) == 0
+    assert {words[0] for words in commands} == {"apt-get"}
+    assert set(install.PACKAGES.values()) <= {word for words in commands for word in words}
 
 
 def test_cargo_builds_what_is_not_there_yet(
@@ -63,6 +67,16 @@ def test_cargo_builds_what_is_not_there_yet(
     monkeypatch.setattr(shutil, "which", lambda name, path=None: f"/usr/bin/{name}")
     install.build(tmp_path)
     assert made == []
+
+
+def test_a_build_without_libclang_names_its_package(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fault = subprocess.CompletedProcess([], 101, "", "Unable to find libclang: set the `LIBCLANG_PATH` variable")
+    monkeypatch.setattr(shutil, "which", lambda name, path=None: None if path else f"/usr/bin/{name}")
+    monkeypatch.setattr(subprocess, "run", lambda words, **_: fault)
+    install.build(tmp_path)
+    assert "Debian: libclang-dev" in capsys.readouterr().out
 
 
 def test_versions_are_those_of_the_page() -> None:

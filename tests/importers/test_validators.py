@@ -12,6 +12,8 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 from fmpy.validation import validate_fmu
 
+from command_helpers import PATIENCE
+
 UNITS = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
 # VDMCheck2 has its rules twice, written independently: what it calls with which class.
 RULES = ("VDMCheckPlus", "VDMCheck")
@@ -48,7 +50,7 @@ def _fmutool(archive: Path) -> str:
     tool = Path(sys.executable).with_name("fmutool")
     if not tool.is_file():
         pytest.skip("fmu-manipulation-toolbox is not installed")
-    done = subprocess.run([tool, "-input", archive, "-check"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([tool, "-input", archive, "-check"], capture_output=True, text=True, timeout=PATIENCE)
     return done.stdout + done.stderr
 
 
@@ -70,7 +72,7 @@ def _vdmcheck(archive: Path, rules: str, folder: Path) -> str:
     if jar is None or not jar.is_file() or not shutil.which("java"):
         pytest.skip("VDMCheck2 is installed by `make test-importers` (Java and Maven)")
     command = ["java", "-cp", str(jar), rules, str(archive)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
     return done.stdout + done.stderr
 
 

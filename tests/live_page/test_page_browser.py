@@ -21,11 +21,11 @@ def test_knobs_by_keyboard_undo_keep_and_take_away(browser: Any, files: dict[str
         page.locator("#keep").click()
         slider = page.get_by_role("slider", name="axis Z, F_C: Coulomb friction torque, slider")
         slider.focus()
-        before = opened.count("loops")
+        before, asked = opened.count("loops"), opened.count("asked")
         for _ in range(5):
             page.keyboard.press("ArrowRight")
         page.keyboard.press("Tab")
-        page.wait_for_timeout(300)
+        opened.until(f"document.documentElement.dataset.asked !== '{asked}'")
         opened.settled()
         assert opened.count("loops") > before
         assert opened.figures() != first
@@ -210,6 +210,7 @@ def test_tiles_say_what_is_and_what_was(browser: Any, files: dict[str, Path]) ->
         assert opened.page.locator("#keys .key.changed").count() >= 1
 
 
+@pytest.mark.usefixtures("files")  # no module, no page
 def test_text_of_the_user_is_text(browser: Any, tmp_path: Path) -> None:
     out = tmp_path / "x.html"
     hostile = "<img src=x onerror=alert(1)></script><script>alert(2)</script>{data}"

@@ -18,6 +18,7 @@ from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.report.picture import Picture
 from feedsim.report.style import PALETTE
+from page_browsers import drawn
 from report_helpers import FakeRun, circle_run, positioning_run
 
 OPEN_WITHIN = 0.5  # s of a processor, so that a reader does not wait
@@ -52,7 +53,7 @@ def pages(browser: Any, runs: dict[str, tuple[FakeRun, Path]]) -> Iterator[dict[
         page.taken = metrics["TaskDuration"]
         page.wait_for_selector(".still", state="detached")
         page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-        page.wait_for_timeout(100)
+        drawn(page)
         found[name] = page
     yield found
     for page in found.values():
@@ -77,7 +78,7 @@ def inner(page: Any, stem: str, panel: int) -> dict[str, float]:
     )
     if frame["y"] < 0 or frame["y"] + frame["height"] > page.viewport_size["height"]:
         page.mouse.wheel(0, frame["y"] - 100)
-        page.wait_for_timeout(50)
+        drawn(page)
         return inner(page, stem, panel)
     return frame
 
@@ -219,7 +220,7 @@ def test_a_long_path_in_a_warning_does_not_widen_a_phone(browser: Any) -> None:
 def test_nothing_has_to_be_scrolled_sideways(pages: dict[str, Any], width: int) -> None:
     for page in pages.values():
         page.set_viewport_size({"width": width, "height": 800})
-        page.wait_for_timeout(100)
+        drawn(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         for chart in page.locator("svg.chart").all():
             assert chart.evaluate("each => each.viewBox.baseVal.width") == pytest.approx(
@@ -233,7 +234,7 @@ def test_no_axis_has_a_single_tick(pages: dict[str, Any], width: int) -> None:
     """One value makes no scale; ticks are told from other words by where they stand."""
     for page in pages.values():
         page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(100)
+        drawn(page)
         counts = page.evaluate(
             """() => {
             const number = (each, name) => Number(each.getAttribute(name)), counts = [];

@@ -21,6 +21,7 @@ from feedsim.report import run as report
 from feedsim.report.content import Report, parted
 from feedsim.report.page import html
 from kinds_helpers import KINDS, Kinds
+from page_browsers import drawn
 from report_helpers import circle_run
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,7 +84,7 @@ def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, 
         fold.locator("summary").first.focus()
         page.keyboard.press("Enter")
         assert fold.evaluate("each => each.open")
-    page.wait_for_timeout(100)
+    drawn(page)
     for chart in page.locator("details.fold svg.chart").all():
         assert chart.evaluate("each => each.viewBox.baseVal.width") == pytest.approx(
             chart.evaluate("each => each.parentNode.clientWidth"), abs=1
@@ -94,7 +95,7 @@ def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, 
 def test_a_link_opens_what_it_leads_to(browser: Any, kinds: Kinds) -> None:
     page = opened(browser, kinds.page("circle"), 1200, 900)
     page.locator("footer a").first.click()
-    page.wait_for_timeout(100)
+    drawn(page)
     assert page.locator("details.fold:has(#figures)").evaluate("each => each.open")
     page.close()
 
@@ -184,22 +185,20 @@ def test_the_diagnosis_names_the_same_peaks_as_the_figures() -> None:
     assert np.isfinite(figures["XZ.G"].value)
 
 
-@pytest.mark.skipif(
-    "FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (npm pack axe-core)"
-)
+@pytest.mark.skipif("FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (make axe)")
 @pytest.mark.parametrize("name", KINDS)
 def test_axe_core_finds_nothing(name: str, browser: Any, kinds: Kinds) -> None:
     """Folded and unfolded, on light and dark screens; the page's policy is set aside for the tester's script."""
     context = browser.new_context(bypass_csp=True, viewport={"width": 1400, "height": 900})
     page = context.new_page()
     page.goto(kinds.page(name).as_uri())
-    page.wait_for_timeout(300)
+    drawn(page)
     page.evaluate(Path(os.environ["FEEDSIM_AXE"]).read_text(encoding="utf-8"))
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         for unfolded in (False, True):
             page.evaluate("all => document.querySelectorAll('details').forEach(each => { each.open = all; })", unfolded)
-            page.wait_for_timeout(100)
+            drawn(page)
             found = page.evaluate("axe.run(document)")["violations"]
             assert not found, [(each["id"], each["nodes"][0]["html"][:120]) for each in found]
     context.close()

@@ -18,6 +18,7 @@ from feedsim.report import run as report
 from feedsim.report.content import FOLDER, Report, Span, code, typed
 from feedsim.report.page import html
 from kinds_helpers import Kinds
+from page_browsers import drawn
 from report_helpers import positioning_run
 
 SHOWN = """() => {
@@ -128,7 +129,7 @@ def test_panels_below_one_another_begin_alike(browser: Any, kinds: Kinds) -> Non
         page.goto(kinds.page(kind).as_uri())
         page.wait_for_selector(".still", state="detached")
         page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-        page.wait_for_timeout(100)
+        drawn(page)
         found = page.evaluate(
             """() => [...document.querySelectorAll("svg.chart")].map(svg => {
               const box = svg.getBoundingClientRect();

@@ -22,6 +22,7 @@ import pytest
 import scipy
 from scipy.io import loadmat, savemat
 
+from command_helpers import PATIENCE
 from feedsim.errors import InputError
 from feedsim.trace import read_recording
 from feedsim.trace.mat import read_mat
@@ -193,7 +194,7 @@ def test_a_file_that_inflates_without_end(tmp_path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (700 << 20, 700 << 20))
 
     words = ["convert", str(tmp_path / "x.mat"), "--column", "t=time:s", "--out", str(tmp_path / "x.csv")]
-    done = subprocess.run([sys.executable, "-m", "feedsim", *words], capture_output=True, text=True, timeout=60,
+    done = subprocess.run([sys.executable, "-m", "feedsim", *words], capture_output=True, text=True, timeout=PATIENCE,
                           preexec_fn=narrow)  # fmt: skip
     assert done.returncode == 2, done.stderr
     assert "inflate to more bytes than are allowed" in done.stderr

@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import gc
 import os
-import signal
 import sys
 import traceback
 from collections.abc import Sequence
@@ -24,8 +23,16 @@ from feedsim.cli.commands import Command, add_commands, arguments, given_files, 
 from feedsim.cli.grammar import Parser
 from feedsim.cli.kinds import meant
 from feedsim.cli.start import START_TEXT
-from feedsim.cli.terminal import choose_colour, finish, painted, prepare_streams, shown_streams, watching
-from feedsim.owned import remove_orphans
+from feedsim.cli.terminal import (
+    STANDARD_OUTPUT,
+    choose_colour,
+    finish,
+    painted,
+    prepare_streams,
+    shown_streams,
+    watching,
+)
+from feedsim.signals import end_program
 
 EPILOG = """exit codes:
   0 done    1 internal error, or with --strict a result that is WRONG    2 bad input or usage
@@ -86,7 +93,6 @@ def _main(given: Sequence[str]) -> int:
     from feedsim.errors import FeedsimError
     from feedsim.extras import missing
 
-    _end_cleanly_on_signals()
     try:
         code = _done(command, options)
         if sys.stdout is not None:  # closed by a reader that has gone
@@ -103,15 +109,14 @@ def _main(given: Sequence[str]) -> int:
     except KeyboardInterrupt:
         print("feedsim: interrupted", file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        sys.stdout = None  # who read the output has gone; Python would flush into the closed pipe once more
-        return 0
     except OSError as error:
+        sys.stdout = None  # Python would flush into the closed pipe once more
+        if isinstance(error, BrokenPipeError) and error.filename == STANDARD_OUTPUT:  # who read it has gone
+            return 0
         print(
             f"feedsim: {error.filename or 'a temporary file (TMPDIR names the folder)'}: {error.strerror}",
             file=sys.stderr,
         )
-        sys.stdout = None
         return _code(command, 4)
     except Exception:
         if command.name != "compare":
@@ -166,17 +171,6 @@ def _say(sentence: str, error: object) -> None:
     print(painted(f"feedsim: {sentence or error}", "red", sys.stderr), file=sys.stderr)
 
 
-def _end_cleanly_on_signals() -> None:
-    """Let the signals that end a job unwind the stack, so that instances are freed and temporary folders removed."""
-
-    def leave(number: int, frame: object) -> None:
-        raise SystemExit(128 + number)
-
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):  # Windows has no SIGHUP
-            signal.signal(getattr(signal, name), leave)
-
-
 def entry() -> None:
     """Entry point of the console script."""
     if "_ARGCOMPLETE" in os.environ:  # a shell asks how a command goes on
@@ -187,8 +181,8 @@ def entry() -> None:
     # some 0.12 s of a run's 1.0 s, with this none. 200,000 objects take some 30 MB. Left alone where main() is called:
     # by a process that is not this program's own.
     gc.set_threshold(200_000, 20, 20)
+    end_program(entry)
     prepare_streams()
-    remove_orphans()
     try:
         sys.exit(main())
     finally:

@@ -17,6 +17,8 @@ from unicodedata import category
 from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.jobs.watch import Watch
 
+STANDARD_OUTPUT = "standard output"  # what an error calls it
+
 
 class TerminalWatch(Watch):
     """Shows what a job reports: a progress bar, and sentences on standard error."""
@@ -78,7 +80,7 @@ class _Standard(io.FileIO):
         except OSError as error:
             if self.fileno() == 2:
                 return len(data)
-            error.filename = "standard output"
+            error.filename = STANDARD_OUTPUT
             raise
 
 

@@ -18,12 +18,13 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from feedsim import units
-from feedsim.cosim import loose, signals, untrusted
+from feedsim.cosim import loose, untrusted
 from feedsim.cosim.arithmetic import restored
 from feedsim.cosim.mark import calling, watched
 from feedsim.cosim.unpacked import STORE, Content, check_there
 from feedsim.errors import InputError
 from feedsim.owned import Closing
+from feedsim.signals import held
 
 _DESCRIPTION = "modelDescription.xml"
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # units of FMI 2.0
@@ -222,7 +223,7 @@ def _read_description(path: Path, directory: Path) -> tuple[Any, list[str]]:
         raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
     untrusted.refuse_document_type(file.read_bytes(), f"{path}: {_DESCRIPTION}")
     problems: list[str] = []
-    with signals.held():  # FMPy's validation has a bare `except:`
+    with held():  # FMPy's validation has a bare `except:`
         try:
             description = read_model_description(str(directory))
         except Exception as error:

@@ -19,12 +19,12 @@ from feedsim.cosim.loop import REPORTED_EVERY, RING
 from feedsim.cosim.mark import watched
 from feedsim.cosim.operations import Interpreter, Operation, When, copy, get_row
 from feedsim.cosim.schedule import Cycle
-from feedsim.cosim.signals import held
 from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
+from feedsim.signals import held
 from feedsim.trace import Table, Trace, matching
 
 PLANT_SIGNALS = ("x_a", "n_a")

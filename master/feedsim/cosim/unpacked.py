@@ -10,7 +10,6 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -138,17 +137,6 @@ class Store:
             return
         self._ends = True
         atexit.register(self.clear)  # Windows does not remove a library that is loaded
-        # Workers that multiprocessing forks end without what atexit and weakref were given.
-        processes = sys.modules.get("multiprocessing.process")
-        if processes is not None and processes.parent_process() is not None:
-            from multiprocessing.util import Finalize
-
-            Finalize(None, self._end, exitpriority=-100)  # the last, like multiprocessing's own folders
-
-    def _end(self) -> None:
-        self.clear()
-        for content in self._contents.values():
-            content.remove_folder()
 
     def _digest(self, file: BufferedReader) -> str:
         """SHA-256 of an open file, computed once as long as the file stays as it is."""

@@ -31,7 +31,8 @@ from typing import Any, TypeVar
 from feedsim.cosim.channel import TOKEN, GarbledError, Receiver, Sender
 from feedsim.cosim.mark import DESCRIBED_CALL, OWN_CODE, SPOILED, Mark, Watched, watch, watched
 from feedsim.errors import FeedsimError, SimulationError
-from feedsim.owned import TemporaryFolder, remove_orphans
+from feedsim.owned import TemporaryFolder
+from feedsim.signals import held
 
 T = TypeVar("T")
 
@@ -80,21 +81,23 @@ class _Worker:
     def __init__(self) -> None:
         self._folder = TemporaryFolder()
         self._mark = Mark(self._folder.path / "mark")
-        their_end, ours = os.pipe()
-        our_end, theirs = os.pipe()
         token = os.urandom(TOKEN)
-        words = [sys.executable, "-c", _SERVE, str(their_end), str(theirs), str(self._mark.path), token.hex()]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
-        # In a session of its own: a Ctrl-C is for us, and we end it.
-        self._process = subprocess.Popen(
-            words, env=environment, stdin=subprocess.DEVNULL, pass_fds=(their_end, theirs), start_new_session=True
-        )
-        os.close(their_end)
-        os.close(theirs)
-        self._to, self._from = Sender(ours, token), Receiver(our_end, token)
-        self._ended = False
+        environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(self._folder.path))  # what it leaves goes
         self._owner = os.getpid()
-        _all.append(self)
+        with held():  # a worker that runs is known
+            their_end, ours = os.pipe()
+            our_end, theirs = os.pipe()
+            words = [sys.executable, "-c", _SERVE, str(their_end), str(theirs), str(self._mark.path), token.hex()]
+            # In a session of its own: a Ctrl-C is for us, and we end it.
+            self._process = subprocess.Popen(
+                words, env=environment, stdin=subprocess.DEVNULL, pass_fds=(their_end, theirs), start_new_session=True
+            )
+            os.close(their_end)
+            os.close(theirs)
+            self._to, self._from = Sender(ours, token), Receiver(our_end, token)
+            self._ended = False
+            _all.append(self)
 
     @property
     def alive(self) -> bool:
@@ -109,7 +112,8 @@ class _Worker:
         surroundings = (Path.cwd(), {name: value for name, value in os.environ.items() if name.startswith("FEEDSIM")})
         self._mark.at("the worker: starting", OWN_CODE)
         try:
-            self._to.send((surroundings, function, given, dict(named), sink is not None, progress is not None))
+            with suppress(BrokenPipeError):  # it has ended since: the answer shows how
+                self._to.send((surroundings, function, given, dict(named), sink is not None, progress is not None))
             return self._watch(limit, sink, progress)
         except FeedsimError:
             raise
@@ -213,7 +217,6 @@ class _Worker:
         for end in (self._to, self._from):
             os.close(end.descriptor)
         self._folder.close()
-        remove_orphans()
         with suppress(ValueError):
             _all.remove(self)
 

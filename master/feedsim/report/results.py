@@ -6,18 +6,18 @@ import contextlib
 import json
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from feedsim.errors import OutputError
 from feedsim.outputs import forced, same
-from feedsim.owned import claimed
+from feedsim.owned import TemporaryFolder, claimed
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import sha256, to_json
+from feedsim.signals import held
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 SCRATCH = ".feedsim-"  # how the folder begins in which files are made
@@ -117,8 +117,8 @@ def write_results(
     directory = Path(directory)
     with claimed(directory), _as_output_error(directory):
         check_place(directory, files, kind=kind, own=own)
-        with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=directory) as scratch:
-            fresh = Path(scratch) / "fresh"
+        with TemporaryFolder(directory, prefix=SCRATCH) as scratch:
+            fresh = scratch / "fresh"
             (fresh / FIGURES).mkdir(parents=True)
             figures = {f"{FIGURES}/{picture.stem}.{kind}": (picture, kind) for picture in pictures for kind in drawn}
             for name, (picture, kind) in figures.items():
@@ -126,7 +126,8 @@ def write_results(
             names = [*figures, *files]
             fill(fresh, names)
             sources = {name: fresh / name for name in names} | dict(grown or {})
-            _move(sources, directory, _stale(directory, names), Path(scratch))
+            with held():
+                _move(sources, directory, _stale(directory, names), scratch)
     return tuple(directory / name for name in names)
 
 

@@ -143,7 +143,7 @@ class Workplace:
         self._planned: tuple[Any, Program] | None = None
         # Messages name the user's files, and are the same in every process.
         self._names = {str(file): name for name, file in moved.items()} | {f"{folder}{os.sep}": ""}
-        self._unpacked = re.compile(rf"{re.escape(str(Path(tempfile.gettempdir()) / PREFIX))}\w+[/\\]?")
+        self._unpacked = re.compile(rf"{re.escape(tempfile.gettempdir() + os.sep)}(?:{PREFIX}\w+[/\\]?)+")
 
     def run(self, task: Task) -> Outcome:
         """Make a run. Whatever goes wrong is reported in the outcome, but for MemoryError: the machine's fault."""

@@ -13,8 +13,10 @@ from typing import Any
 
 from feedsim.errors import InputError
 from feedsim.owned import TemporaryFolder
+from feedsim.signals import held
 
 ANSWER = 10.0  # s that a scheduler has to answer
+BUSY = 120.0  # s for the processes of this machine to find one another, however busy it is; who is late is lost
 JOIN = 30.0  # s that a scheduler without workers has to get one
 
 # Threads of linear algebra would compete with the workers for the cores.
@@ -30,7 +32,7 @@ _QUIET = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    "distributed.comm.timeouts.connect": f"{ANSWER} s",
+    "distributed.comm.timeouts.connect": f"{BUSY} s",
     "distributed.nanny.pre-spawn-environ": {},  # it would stay in this process's environment
 }
 
@@ -59,7 +61,8 @@ def local(workers: int) -> Iterator[Any]:
         folder = str(stack.enter_context(TemporaryFolder()))
         stack.enter_context(dask.config.set({**_QUIET, "temporary-directory": folder}))
         stack.enter_context(_environment(_ONE_THREAD))
-        with _without_interrupts():
+        # Processes that are half started are ended by nobody: a signal waits until they can be.
+        with held(), _without_interrupts():
             try:
                 cluster = started(
                     n_workers=workers,

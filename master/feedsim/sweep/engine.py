@@ -25,7 +25,7 @@ from feedsim.sweep.bundle import Bundle, Workplace
 from feedsim.sweep.design import Outcome, Task
 
 LOST = 20.0  # s without the scheduler, after which a study is given up
-ALONE = 60.0  # s without any worker that can take part, likewise
+ALONE = 300.0  # s without any worker that can take part, likewise: on a busy machine one that died comes back slowly
 FETCH = 5.0  # s for a result to arrive; one that is lost with its worker is made again, and may take any time
 _LOOK = 1.0  # s between two looks at the cluster
 

@@ -16,9 +16,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-from feedsim.cosim.signals import held
 from feedsim.errors import InputError, OutputError
 from feedsim.owned import Closing, claimed
+from feedsim.signals import held
 from feedsim.sweep.design import Outcome
 
 JOURNAL_NAME = "runs.jsonl"

@@ -14,6 +14,7 @@ from typing import IO
 
 from feedsim.errors import OutputError
 from feedsim.owned import locked
+from feedsim.signals import held
 
 
 @contextmanager
@@ -33,22 +34,25 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
             _poured(path, buffer.getvalue())
             return
         target = Path(os.path.realpath(path))
-        with _begun(target) as file:
-            temporary = Path(file.name)
-            try:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-                if os.name == "nt":  # it does not move what is open; elsewhere the lock goes with the name
-                    file.close()
-                temporary.chmod(0o666 & ~_umask())
-                temporary.replace(target)
-            except BaseException:
+        file = None
+        try:
+            with held():  # what is made is known, and removed
+                file = _begun(target)
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+            if os.name == "nt":  # it does not move what is open; elsewhere the lock goes with the name
+                file.close()
+            Path(file.name).chmod(0o666 & ~_umask())
+            Path(file.name).replace(target)
+            file.close()
+        except BaseException:
+            if file is not None:
                 with suppress(OSError):  # on a full disk what is still to be written fails once more
                     file.close()
                 with suppress(OSError):
-                    temporary.unlink()
-                raise
+                    Path(file.name).unlink()
+            raise
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
 

@@ -21,7 +21,6 @@ from feedsim.trace import Recording, read_recording
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
 COMPARED_SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
-TIME_NAMES = ("time", "t")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +103,9 @@ def _read(path: Path, name: str) -> Source:
             "(FOLDER:17, FOLDER:max=FIGURE) is needed"
         )
     recording = read_recording(curves)
-    column = next((name for name in recording.names if name.lower() in TIME_NAMES), None)
-    if column is None:
+    if (clock := recording.clock()) is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
-    factor = float(units.factor(recording.units[column] or "s", "s"))
+    column, factor = clock
     time = np.asarray(recording.read([column])[column], dtype=np.float64) * factor
     if len(time) < 2 or not np.all(np.diff(time) > 0):
         raise InputError(f"{curves}: its time does not rise from row to row; two rows or more are needed")

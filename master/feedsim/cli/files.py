@@ -8,6 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import Command, Option, arguments
+from feedsim.cli.terminal import finish
 
 
 def schema(options: Namespace) -> None:
@@ -22,7 +23,8 @@ def convert(options: Namespace) -> None:
     """feedsim convert."""
     from feedsim.jobs.convert import convert
 
-    print(f"{options.out}: {convert(**arguments(convert, options)).answers[0]}")
+    made = convert(**arguments(convert, options))
+    finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 
 FILE_KINDS = ("scenario", "machine", "structure", "columns", "tolerances", "study")
@@ -36,18 +38,16 @@ SCHEMA = Command(
 )
 CONVERT = Command(
     "convert",
-    "turn a MAT file or a control's capture into a CSV trace",
+    "turn a record into a CSV trace",
     convert,
     (
-        Option("file", "FILE", "MAT, CSV, or a capture of a SINUMERIK (.json)", type=Path),
-        Option(
-            "--column", "VARIABLE=NAME:UNIT", "one column; the first must be time; none: all of a capture", many=True
-        ),
+        Option("file", "FILE", "CSV, MAT, or another record (docs/traces.md)", type=Path),
+        Option("--column", "VARIABLE=NAME:UNIT", "one column; the first must be time; none: all", many=True),
         Option("--out", "FILE.csv", "", type=Path, required=True),
     ),
     needs=(),
     job="convert",
-    description="Turn a recording into a CSV trace with units in its header: all signals of a control's capture, or "
-    "variables of a MAT file, e.g. the recorded position reference of an axis: "
+    description="Turn a recording into a CSV trace with units in its header: all of its signals, or some, "
+    "e.g. the recorded position reference of an axis: "
     "feedsim convert record.mat --column t=time:s --column qg=Z.x_s:m --out reference.csv",
 )

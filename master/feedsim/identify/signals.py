@@ -85,12 +85,12 @@ def _mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> 
         signal = _time(recording, mapping) if role == "time" else mapping.signal(role)
         if signal is None:
             continue
-        if signal.column not in recording.names:
+        if (name := recording.called(signal.column)) is None:
             missing = f"{recording.header} has no column {signal.column!r}; there is {few(recording.names, 20)}"
             faults.append(f"{mapping.where(role)}: {missing}")
             continue
         try:
-            channels[role] = column(recording, role, signal)
+            channels[role] = column(recording, role, signal.model_copy(update={"column": name}))
         except InputError as error:
             faults.append(f"{mapping.where(role)}: {error}")
     if faults:
@@ -225,9 +225,8 @@ def _named_time(recording: Recording, axis: str) -> str:
         )
     if result:
         return result[0]
-    first = recording.names[0]
-    if known_unit(recording.units[first]) and units.unit(recording.units[first] or "1").dimension == "time":
-        return first
+    if (clock := recording.clock()) is not None:
+        return clock[0]
     raise InputError(
         f"{recording.header}: no column of time; there is {few(recording.names, 20)}; name it in a mapping file: "
         "time: {column: ..., unit: s}, or give time: {interval: 2 ms} where there is none"

@@ -15,12 +15,13 @@ from feedsim.owned import TemporaryFolder
 
 
 def convert(file: File, out: File | None = None, *, column: str | Sequence[str] = (), force: bool = False) -> Made:
-    """Turn a recording into a CSV trace: all signals of a control's capture, or variables of a MAT or CSV file.
+    """Turn a recording into a CSV trace: all of its signals, or some of its columns, over its time.
 
     Args:
-        file: MAT, CSV, or a capture of a SINUMERIK (.json).
+        file: any record; docs/traces.md lists the formats.
         out: the CSV file to write; None: :meth:`Made.save` does it.
-        column: texts "VARIABLE=NAME:UNIT", one a column, the time first; none: all of a capture.
+        column: texts "VARIABLE=NAME:UNIT", one a column, the time first; none: all, where the time is known by
+            its name or unit.
         force: `out` may be a file of other content.
 
     Raises:
@@ -37,11 +38,12 @@ def convert(file: File, out: File | None = None, *, column: str | Sequence[str] 
     if out is not None:
         check_file(Path(out), [path], ours=lambda there: True)  # an input is refused before it is read
     with TemporaryFolder() as folder:
-        written = trace.convert(path, columns, folder / "converted.csv")
+        recording = trace.read_recording(path)
+        written = trace.convert(recording, columns, folder / "converted.csv")
         content = (folder / "converted.csv").read_bytes()
     kind = Kind("convert", "table", unchanged(content))
     answer = f"{len(written.columns) + 1} columns from {path}"
-    made = Made(kind, f"{path.stem}.csv", content, [answer], inputs=[path])
+    made = Made(kind, f"{path.stem}.csv", content, [answer], recording.notes, inputs=[path])
     if out is not None:
         made.save(out, force=force)
     return made

@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
+from feedsim.files.spellings import spelled
 from feedsim.trace import capture, sinumerik_xml
 from feedsim.trace.capture_axes import CaptureAxis
-from feedsim.trace.cells import Table, read_table
+from feedsim.trace.cells import TIME_NAMES, Table, read_table, usual_column
 from feedsim.trace.csv import write_csv
+from feedsim.trace.layout import titles
 from feedsim.trace.mat import Other, Value, flat, read_mat
 from feedsim.trace.scopes import read_scope
 from feedsim.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
@@ -79,6 +81,28 @@ class Recording:
         hint = "; a CSV file has none, write the number itself" if self._table else suggest(name, self.scalars)
         raise InputError(f"{self.path}: no variable {name!r}{hint}")
 
+    def called(self, text: str) -> str | None:
+        """The column of a name, or of a path as a control has it; None: there is none."""
+        if text in self.units:
+            return text
+        return next((title for title in titles([text]) if title in self.units), None)
+
+    def clock(self) -> tuple[str, float] | None:
+        """The column of the time, by its usual names, else the first one if its unit is a time; and the factor of its
+        values to s. Without a unit it is in s. None: there is none.
+
+        Raises InputError: several are called so; its unit is no time.
+        """
+        known = [self.units[name] for name in self.names]
+        index = usual_column(self.names, known, TIME_NAMES, "s", self.header)
+        if index is None:
+            return None
+        name = self.names[index]
+        try:
+            return name, float(units.factor(spelled(self.units[name]) or "s", "s"))
+        except InputError as error:
+            raise InputError(f"{self.header}: column {name!r}: {error}") from None
+
     @property
     def control(self) -> str:
         """The control whose own file it is, by the name that machine files have for it; empty where any program may
@@ -109,25 +133,31 @@ def read_recording(path: str | Path) -> Recording:
     version 7.3, which is HDF5, or one without a vector of real numbers.
     """
     path = Path(path)
+    if path.suffix.lower() == MAT:
+        return _read_mat(path)
+    if (recording := of_control(path)) is not None:
+        return recording
+    table = read_table(path)
+    # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
+    units = ["" if unit.isdecimal() else unit for unit in table.units]
+    return Recording(
+        path, table.names, dict(zip(table.names, units, strict=True)),
+        notes=table.notes, remarks=table.remarks, _table=table,
+    )  # fmt: skip
+
+
+def of_control(path: Path) -> Recording | None:
+    """What a control has recorded, in a format of its own; its time is "time" [s]. None: another file. InputError."""
     if path.suffix.lower() == capture.SUFFIX:
         result = capture.read_capture(path)
         return Recording(
             path, tuple(result.columns), result.units, axes=result.axes, marks=result.marks, _variables=result.columns
         )
-    if path.suffix.lower() == MAT:
-        return _read_mat(path)
     signals = sinumerik_xml.read_signals(path) if path.suffix.lower() == sinumerik_xml.SUFFIX else read_scope(path)
-    if signals is not None:
-        _check(path, signals.columns)
-        return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _variables=signals.columns)
-    table = read_table(path, remarks_ahead=True)
-    taken = f"{path}: the header is taken to be line {table.header_line}; the lines ahead of it are not read"
-    notes = (taken,) if table.remarks else ()
-    # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
-    units = ["" if unit.isdecimal() else unit for unit in table.units]
-    return Recording(
-        path, table.names, dict(zip(table.names, units, strict=True)), notes=notes, remarks=table.remarks, _table=table
-    )
+    if signals is None:
+        return None
+    _check(path, signals.columns)
+    return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _variables=signals.columns)
 
 
 def _check(path: Path, columns: Mapping[str, Array]) -> None:
@@ -164,7 +194,7 @@ def _read_mat(path: Path) -> Recording:
     return Recording(path, tuple(vectors), dict.fromkeys(vectors, ""), scalars, _variables=variables)
 
 
-def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
+def convert(file: str | Path | Recording, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
     """Write columns of a recording as a CSV trace and return the trace.
 
     columns  (variable, new name, unit); the first must be the time (name "time", any unit of time). Values whose unit
@@ -174,27 +204,29 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
     Raises InputError: what read_recording() refuses, a variable that is missing (with those there are), no vector of
     real finite numbers, or of another length than the time. OutputError: `out` cannot be written.
     """
-    path = Path(path)
     if columns and columns[0][1] != "time":
         raise InputError("the first column must be the time, for example t=time:s")
-    factor = units.factor(columns[0][2], "s") if columns else 1
+    factor = float(units.factor(columns[0][2], "s")) if columns else 1.0
     for _, _, unit in columns[1:]:
         units.unit(unit)
     if doubled := [name for i, (_, name, _) in enumerate(columns) if name in [other for _, other, _ in columns[:i]]]:
         raise InputError(f"two columns are to be called {doubled[0]!r}")
-    recording = read_recording(path)
+    recording = file if isinstance(file, Recording) else read_recording(file)
+    path = recording.path
     if not columns:
-        if recording.units.get("time") != "s":
+        clock = recording.clock()
+        if clock is None or not (recording.units[clock[0]] or recording._table):
             raise InputError(
                 f"{path}: which column is the time? --column t=time:s, and one for each other column; there are "
-                f"{', '.join(sorted(recording.names))}"
+                f"{few(sorted(recording.names), 20)}"
             )
-        columns = [("time", "time", "s")]
-        columns += [(name, name, recording.units[name]) for name in recording.names if name != "time"]
+        at, factor = clock
+        columns = [(at, "time", recording.units[at] or "s")]
+        columns += [(name, name, recording.units[name]) for name in recording.names if name != at]
     read = recording.read(variable for variable, _, _ in columns)
     scales = {variable: _scale(recording, variable, unit) for variable, _, unit in columns}
     read = {name: values if scales[name] == 1 else values * scales[name] for name, values in read.items()}
-    time = read[columns[0][0]] * float(factor)
+    time = read[columns[0][0]] * factor
     try:
         trace = Trace(time, {name: read[variable] for variable, name, _ in columns[1:]},
                       {name: unit for _, name, unit in columns[1:] if unit})  # fmt: skip

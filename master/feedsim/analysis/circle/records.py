@@ -38,7 +38,6 @@ WAYS = {
 }
 RADII = ("radius", "r", "length", "ballbar length", "radius length", "rayon")
 LEAST_RADIUS = 1e-3  # [m]; where a name does not say, what is never less is a radius and no deviation
-TIME_COLUMNS = ("time", "t", "zeit", "temps")
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
@@ -189,10 +188,10 @@ def _values(recording: Recording, name: str, unit: str) -> Array:
 
 
 def _time(recording: Recording) -> Array | None:
-    name = _column(recording, TIME_COLUMNS, "s")
-    if name is None:
+    if (clock := recording.clock()) is None:
         return None
-    time = _values(recording, name, "s")
+    name, factor = clock
+    time = recording.read([name])[name] * factor
     if (back := np.flatnonzero(np.diff(time) < 0)).size:
         row = int(back[0]) + 1
         raise InputError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from feedsim import units
 from feedsim.analysis.circularity import Turn
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.files.regular import json_file
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
 
@@ -112,8 +112,8 @@ def _read(path: Path, name: str) -> Source:
     summary = curves.with_name(SUMMARY)
     if curves.name != RESULT or not summary.is_file():
         return Source(name, path, recording, time)
+    content = json_file(summary)
     try:
-        content = json.loads(summary.read_text(encoding="utf-8"))
         return Source(
             name, path, recording, time,
             figures=_figures(content),

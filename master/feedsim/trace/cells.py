@@ -35,6 +35,7 @@ _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 TIME_NAMES = ("time", "t", "zeit", "temps")  # in any case
 _SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # .xlsx and .ods; .xls
+MAX_DATED = 20  # columns of time stamps that are read; more are text
 MAX_SHOWN, MAX_HEAD = 60, 1000  # characters: of a cell in a message; of the head of a column
 _WINDOWS = "cp1252"  # of programs that know no UTF-8; it has no byte for five values, and digits are the same
 
@@ -236,7 +237,7 @@ def _dated(table: Table) -> Table:
     dates: dict[int, Stamps | InputError] = {}
     names, header_units = table.names, list(table.units)
     for i, column in enumerate(table.columns):
-        if is_stamp(column[0]):
+        if len(dates) < MAX_DATED and is_stamp(column[0]):
             try:
                 dates[i] = stamps(column, table.lines, table.where, names[i])
             except InputError as error:

@@ -21,7 +21,7 @@ from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.header import Told, own_format
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.files.spellings import spelled
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
@@ -211,7 +211,7 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
         if deviation is None and radius is None:
             return angle, length, float(np.abs(_values(recording, length, "m")).min()) > LEAST_RADIUS
         return angle, length, deviation is None
-    has = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in recording.units.items())
+    has = few([f"{name} [{unit}]" if unit else name for name, unit in recording.units.items()], 20)
     if all(_plain(name) in (*units.UNIT_SYMBOLS, *units.ALIASES) for name in recording.names):
         raise InputError(
             f"{recording.header}: is a row of units, {has}; needed is one row of names with their units, such as "

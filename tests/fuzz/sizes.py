@@ -1,14 +1,14 @@
 """Files of a size that a machine or a vandal makes: nested, long, wide, or many of one thing. A row for each.
 
-Every file is answered in time that grows with its size alone: `SIZE` bytes in `SECONDS` of a processor, where a reader
-that grows with the square takes minutes. `files` makes the rows of a kind (kinds.py) into content.
+Every file is answered in time that grows with its size alone: `SIZE` bytes in `SECONDS` of a processor, of which a
+reader takes some tenths to two, and one that grows with the square many more. `files` makes the rows of a kind (kinds.py) into content.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-SIZE, SECONDS = 1_000_000, 2  # bytes; s of a processor
+SIZE, SECONDS = 1_000_000, 4  # bytes; s of a processor
 
 Shape = Callable[[int], str]  # bytes -> text of about that many
 
@@ -95,6 +95,10 @@ SIZES: dict[str, dict[str, Shape]] = {
         "brackets alone": nested("[", "]"),
         "many rows": many("[#, 1], ", _CAPTURE.replace("[{}]", '[{"HFData": [{}[9999999, 1]]}]')),
         "many messages": many('{"a": 1}, ', _CAPTURE.replace("[{}]", '[{}{"a": 1}]')),
+        "many axes": many(
+            '{"Name": "TORQUE|#"}, {"Name": "POWER|#"}, {"Name": "ENC_POS|#"}, ',
+            '{"Header": {"CycleTimeMs": 2, "SignalListHFData": [{}{"Name": "CYCLE"}]}}',
+        ),
         "many signals": many(_SIGNAL, '{"Header": {"CycleTimeMs": 2, "SignalListHFData": [{}{"Name": "CYCLE"}]}}'),
         "a long text": many("a", '{"a": "{}"}'),
         "a long number": many("9", '{"a": {}}'),
@@ -105,7 +109,7 @@ SIZES: dict[str, dict[str, Shape]] = {
         "nested frame": nested("<a>", "</a>", around=_FRAME),
         "nested measurement": nested("<a>", "</a>", around="<ResponseTestCustom>{}</ResponseTestCustom>"),
         "many rows": many('<rec time="#" f1="1"/>', _FRAME),
-        "many signals": many('<dataSignal id="f#" name="s"/>', _FRAME + ""),
+        "many signals": many('<dataSignal id="f#" name="s"/>', _FRAME),
         "many attributes": many('a#="1" ', "<traceData {}/>"),
         "a long text": many("a ", "<traceData>{}</traceData>"),
         "a long name": many("a ", '<traceData><dataFrame><dataSignal name="{}"/></dataFrame></traceData>'),
@@ -116,7 +120,7 @@ SIZES: dict[str, dict[str, Shape]] = {
         "many keys": many("SampleTime[ms]\t2\n", "Name\tA\nStarttime of export\t1\n{}\n0\t1\n1\t2\n"),
         "a long cell": many("9", _SCOPE.replace("{}", "0\t{}\t0\t1\n2\t1\t2\t1\n")),
         "halscope's rows": many("a.b +1.0 c -1.0 \n", "Sampling period is 1000 nSec\n\n{}"),
-        "halscope's channels": many("a# +1.0 ", "Sampling period is 1000 nSec\n\n{}\n{}\n{}\n{}\n"),
+        "halscope's channels": many("a# +1.0 ", "Sampling period is 1000 nSec\n\n{}\n"),
         "halscope's labels": many("a;", "# Sampling period is 1000 ns\n{}\n1;2\n"),
         "halscope's values": many("1;", "# Sampling period is 1000 ns\na\n{}\n"),
     },

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from feedsim.files import regular
 from feedsim.files.spellings import known_unit, spelled
 from feedsim.trace.trace import Array
 
+MAX_CHANNELS = 1000
 SCOPE_BYTES = 65536  # bytes within which a file shows what it is
 # Rows of a TwinCAT header; they repeat their key ahead of every column of time.
 KEYS = frozenset({
@@ -112,7 +114,9 @@ def _twincat(path: Path, text: str, separator: str) -> Signals:
         raise InputError(f"{path}: a TwinCAT Scope header without the names of its channels; export it with them")
     names = header["Name"]
     clocks = [k for k, cell in enumerate(names) if cell.strip() == "Name"]
-    channels = {k: names[k].strip() for k in range(len(names)) if k not in clocks and names[k].strip()}
+    channels = {k: name.strip() for k, name in enumerate(names) if name.strip() not in ("", "Name")}
+    if len(channels) > MAX_CHANNELS:
+        raise InputError(f"{path}: {len(channels)} channels of TwinCAT Scope; allowed: up to {MAX_CHANNELS}")
     if not channels:
         raise InputError(f"{path}: a TwinCAT Scope header without the names of its channels; export it with them")
     if "SymbolName" in header and len(set(channels.values())) < len(channels):
@@ -144,8 +148,8 @@ def _grouped(
     """All channels over one time: that of the group with the most rows, where all of them are recorded."""
     groups: list[tuple[_Clock, dict[int, Array]]] = []
     silent: list[str] = []
-    for clock in clocks:
-        own = [k for k in channels if clock < k and not any(clock < other < k for other in clocks)]
+    for clock, after in zip(clocks, [*clocks[1:], math.inf], strict=True):
+        own = [k for k in channels if clock < k < after]
         if not own:
             continue
         kept = [(line, row) for line, row in body if len(row) > clock and row[clock].strip()]

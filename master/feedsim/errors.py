@@ -77,12 +77,17 @@ def few(names: Sequence[str], most: int) -> str:
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
+MAX_WORD, MAX_KNOWN = 200, 500  # characters of a word, and names, that a suggestion is looked for in
+
+
 def nearest(word: str, known: Sequence[str]) -> str:
-    """The name that a word most likely means; "" where it resembles none."""
+    """The name that a word most likely means; "" where it resembles none. Of many names the first are compared."""
     from difflib import get_close_matches  # not for those who make no mistakes
 
     same = [name for name in known if name.lower() == word.lower()]
-    return next(iter(same or get_close_matches(word, known, n=1, cutoff=0.6)), "")
+    if same or len(word) > MAX_WORD:
+        return next(iter(same), "")
+    return next(iter(get_close_matches(word, known[:MAX_KNOWN], n=1, cutoff=0.6)), "")
 
 
 def no_such_file(path: str | Path) -> str:

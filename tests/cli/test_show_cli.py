@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from command_helpers import feedsim
 from feedsim import cli
 from feedsim.analysis import diagnoses, evaluate
 from feedsim.report import run as report
@@ -161,3 +162,20 @@ def test_values_in_unlike_units_have_no_difference() -> None:
     ]
     (row,) = _figures(sources).parts[0].rows
     assert row[1:] == ("8.00", "9.50", "+1.50", "–", "–", "µm")
+
+
+@pytest.mark.parametrize("depth", [100_000, 900])
+def test_json_that_is_nested_too_deep_is_refused(depth: int, fmus: Path, tmp_path: Path) -> None:
+    """As a capture, as the summary of a result, and as what lies in a folder that a result is written to."""
+    deep = f'{{"a": {"[" * depth}{"]" * depth}}}'
+    folder = tmp_path / "result"
+    folder.mkdir()
+    (folder / "result.csv").write_text("time [s],X.x_a [mm]\n0,1\n1,2\n")
+    for name in ("deep.json", "result/summary.json"):
+        (tmp_path / name).write_text(deep)
+    for words in (("convert", "deep.json", "--out", "x.csv"), ("show", "result", "--out", "o"),
+                  ("show", "deep.json", "--out", "o"), ("run", "deep.json"), ("run", "result")):  # fmt: skip
+        done = feedsim(*words, fmus=fmus, cwd=tmp_path)
+        assert done.returncode == 2
+        assert len(done.stderr) < 1000
+    assert "deep.json: its values are nested too deep" in feedsim("diff", "deep.json", fmus=fmus, cwd=tmp_path).stderr

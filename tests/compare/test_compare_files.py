@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from time import process_time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -185,3 +188,37 @@ def test_folders_in_the_layout_of_the_cross_check(tmp_path: Path) -> None:
         (results / "held" / "two_ref.csv", references / "held" / "two_ref.csv"),
         (results / "one.csv", references / "one_ref.csv"),
     ]
+
+
+def test_folders_that_vanish_while_it_looks_are_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ours", "theirs"):
+        (tmp_path / name / "gone").mkdir(parents=True)
+        file(tmp_path / name, "time,x\n0,1\n")
+    scandir = os.scandir
+
+    def vanished(path: Any = ".") -> Any:
+        if Path(path).name == "gone":
+            raise FileNotFoundError(path)
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", vanished)
+    assert pairs_of([tmp_path / "ours", tmp_path / "theirs"]) == [
+        (tmp_path / "ours" / "t.csv", tmp_path / "theirs" / "t.csv")
+    ]
+
+
+def test_time_of_a_comparison_grows_with_the_number_of_columns_alone(tmp_path: Path) -> None:
+    """Of columns that are the same, differ or are missing; four times as many would take sixteen times as long."""
+
+    def seconds(count: int) -> float:
+        rows = [",".join([str(k), *("1.5" if i % 3 else str(k + 1) for i in range(count))]) for k in range(3)]
+        ours = file(tmp_path, "\n".join([",".join(["time", *(f"a{i}.x [m]" for i in range(count))]), *rows]), "a.csv")
+        names = [f"a{i}.x [m]" if i % 2 else f"b{i}.y [m]" for i in range(count)]
+        other = [row.replace("1.5", "1.75") for row in rows]
+        theirs = file(tmp_path, "\n".join([",".join(["time", *names]), *other]), "b.csv")
+        begin = process_time()
+        assert compare_files(ours, theirs).verdict == "different"
+        return process_time() - begin
+
+    seconds(10)
+    assert seconds(8000) < 9 * seconds(2000)

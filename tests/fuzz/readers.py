@@ -3,10 +3,11 @@
     PYTHONPATH=tests python -m fuzz.readers --seconds 600 --seed 1 [--only mat,uff] [--keep build/fuzz]
 
 Files of every kind are made, and changed at random: bits, bytes, chunks lost, doubled or taken from another file,
-numbers that are huge or none; entries of archives likewise, and of archives inside archives. Allowed is a result, or
-feedsim's own error. A finding is any other exception, a crash, more than 5 s of computing or a minute altogether, or
-more than 1 GB. Findings are kept, told, and make the exit code 1; those of the past are in corpus/readers, named by
-what reads them, and are tried by the test suite.
+numbers that are huge or none; entries of archives likewise, and of archives inside archives. Besides, files of a
+megabyte that are nested, long, wide or many of one thing (sizes.py). Allowed is a result, or feedsim's own error. A
+finding is any other exception, a crash, more than 5 s of computing or a minute altogether, or more than 1 GB. Findings
+are kept, told, and make the exit code 1; those of the past are in corpus/readers, named by what reads them, and are
+tried by the test suite.
 """
 
 from __future__ import annotations
@@ -40,13 +41,17 @@ CORPUS = Path(__file__).resolve().parent / "corpus" / "readers"
 COMPUTING, WAITING, MEMORY = 5, 60, 1 << 30  # s of a processor, s altogether, bytes
 
 
-def outcome(read: Callable[[Path], object], path: Path) -> str:
-    """How a reader ends on a file, in a process of its own: "read", "refused", or what is wrong with its end."""
+def outcome(read: Callable[[Path], object], path: Path, computing: int = 0) -> str:
+    """How a reader ends on a file, in a process of its own: "read", "refused", or what is wrong with its end.
+
+    computing: s of a processor that it may take; 0: COMPUTING.
+    """
+    computing = computing or COMPUTING
     ours, theirs = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(ours)
-        _try(read, path, theirs)
+        _try(read, path, theirs, computing)
     os.close(theirs)
     try:
         ready, _, _ = select.select([ours], [], [], WAITING)
@@ -60,15 +65,15 @@ def outcome(read: Callable[[Path], object], path: Path) -> str:
         return f"no end within {WAITING} s"
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
-        return f"more than {COMPUTING} s of computing" if number == signal.SIGXCPU else f"crash by signal {number}"
+        return f"more than {computing} s of computing" if number == signal.SIGXCPU else f"crash by signal {number}"
     return said or f"exit code {os.WEXITSTATUS(status)} without a word"
 
 
-def _try(read: Callable[[Path], object], path: Path, pipe: int) -> None:
+def _try(read: Callable[[Path], object], path: Path, pipe: int, computing: int) -> None:
     said = "read"
     try:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_CPU, (COMPUTING, COMPUTING + 1))
+        resource.setrlimit(resource.RLIMIT_CPU, (computing, computing + 1))
         with suppress(OSError):  # no such page on other systems
             held = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
             resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, held + MEMORY))

@@ -13,7 +13,7 @@ import pytest
 if platform.system() != "Linux":
     pytest.skip("cases are processes that are forked and limited as Linux has it", allow_module_level=True)
 
-from fuzz import readers
+from fuzz import readers, sizes
 
 SECONDS = 15
 ALLOWED = ("read", "refused")
@@ -42,6 +42,18 @@ def test_readers_withstand_what_a_fuzzer_makes_up(known: dict[str, readers.Kind]
     counts, findings = readers.fuzz(known, tmp_path, SECONDS, 1, tmp_path / "found")
     assert not findings
     assert sum(counts.values()) > 20
+
+
+@pytest.mark.parametrize("kind", sizes.SIZES)
+def test_time_grows_with_the_size_of_a_file_alone(kind: str, known: dict[str, readers.Kind], tmp_path: Path) -> None:
+    """Nested, long, wide or many of one thing: a megabyte is answered in seconds of a processor."""
+    path = tmp_path / f"case{known[kind].suffix}"
+    ends = {}
+    for name, content in sizes.files(kind):
+        path.write_bytes(content)
+        ends[name] = readers.outcome(known[kind].read, path, sizes.SECONDS)
+    assert ends
+    assert not {name: end for name, end in ends.items() if end not in ALLOWED}
 
 
 def _for_ever(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -169,6 +170,95 @@ def test_halscope_files_that_are_refused(tmp_path: Path, lines: list[str], messa
     with pytest.raises(InputError) as caught:
         read(tmp_path, "\n".join(lines))
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", ["ns", "nSec"])
+@pytest.mark.parametrize("comma", [False, True])
+def test_halscope_up_to_2_8(tmp_path: Path, unit: str, comma: bool) -> None:
+    """Of every locale; one row more than recorded at the end."""
+    rows = [f"a.in {0.5 * k:+.14f} b {-0.25 * k:+.14f} " for k in range(6)]
+    text = "\n".join([f"Sampling period is 2000000 {unit} ", "", *rows])
+    found = read(tmp_path, re.sub(r"(?<=\d)\.(?=\d{14})", ",", text) if comma else text)
+    values = found.read(found.names)
+    assert found.names == ("time", "a.in", "b")
+    np.testing.assert_allclose(values["time"], 0.002 * np.arange(5), rtol=1e-15)
+    assert values["b"].tolist() == [0, -0.25, -0.5, -0.75, -1]
+
+
+@pytest.mark.parametrize(
+    "between", [[], ["# Position: 0.500000;0.500000", "# Scale: 0;3"]], ids=["2.9", "with scales of the display"]
+)
+@pytest.mark.parametrize("names", [("a.in", "b"), ("a.in",)])
+def test_halscope_from_2_9_on(tmp_path: Path, between: list[str], names: tuple[str, ...]) -> None:
+    """Labels ahead of the values, which are as many as recorded; one channel alone has no separator."""
+    rows = [";".join(f"{0.5 * k + j:.14f}" for j in range(len(names))) for k in range(5)]
+    found = read(tmp_path, "\n".join(["# Sampling period is 1000000 ns", ";".join(names), *between, *rows]) + "\n")
+    values = found.read(found.names)
+    assert found.names == ("time", *names)
+    assert found.notes == ()
+    np.testing.assert_allclose(values["time"], 1e-3 * np.arange(5), rtol=1e-15)
+    assert values[names[-1]].tolist() == [0.5 * k + len(names) - 1 for k in range(5)]
+    convert(tmp_path / "scope.csv", [], tmp_path / "out.csv")
+    assert read_csv(tmp_path / "out.csv").names == names
+
+
+# --- clocks ---
+
+DATE = 133238090039920000  # in 100 ns
+
+
+def two_channels(begins: tuple[float, float], step: tuple[float, float], *, dates: bool = False, rows: int = 40) -> str:
+    """A position that is the file's time in ms, a torque that is the time in s, from their begin on [ms]."""
+    lines = []
+    for k in range(rows):
+        times = [begin + own * k for begin, own in zip(begins, step, strict=True)]
+        cells = [f"{DATE + round(1e4 * time)}" if dates else f"{time:g}" for time in times]
+        lines.append(f"{cells[0]}\t{times[0]:.9g}\t{cells[1]}\t{1e-3 * times[1]:.9g}")
+    return "\n".join([*FULL, *lines])
+
+
+@pytest.mark.parametrize("dates", [False, True])
+@pytest.mark.parametrize(
+    ("begins", "step"),
+    [
+        ((0, -6), (2, 2)),
+        ((0, 6), (2, 2)),
+        ((-6, 0), (2, 2)),
+        ((0, 3), (2, 2)),  # between the other's instants
+        ((0, 0.5), (2, 4)),
+        ((5000, 4993), (1, 1)),
+    ],
+)
+def test_channels_that_begin_apart_have_one_clock(
+    tmp_path: Path, begins: tuple[float, float], step: tuple[float, float], dates: bool
+) -> None:
+    found = read(tmp_path, two_channels(begins, step, dates=dates))
+    values = found.read(found.names)
+    time, position, torque = (values[name] for name in ("time", "ActPos", "ActTorque"))
+    np.testing.assert_allclose(torque, 1e-3 * position, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.diff(position), 1e3 * np.diff(time), rtol=0, atol=1e-6)
+    assert position[0] >= max(begins) - 1e-6
+    assert position[-1] <= min(b + s * 39 for b, s in zip(begins, step, strict=True)) + 1e-6
+    assert len(time) > 10
+    assert any("begin or end at different times" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (two_channels((0, 500), (2, 2)), "no time in common: ActPos 0 to 0.078 s, ActTorque 0.5 to 0.578 s"),
+        ("\n".join([*FULL, f"0\t1\t{DATE}\t1", f"2\t1\t{DATE + 20000}\t1"]), "counts from another instant"),
+    ],
+)
+def test_channels_without_a_time_in_common_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, text)
+
+
+def test_a_flag_between_two_instants_is_not_interpolated(tmp_path: Path) -> None:
+    lines = [f"{2 * k}\t{k}\t{2 * k + 1}\t{int(k > 5)}" for k in range(12)]
+    values = read(tmp_path, "\n".join([*FULL, *lines])).read(["ActTorque"])
+    assert set(values["ActTorque"]) == {0.0, 1.0}
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,13 +14,13 @@ from feedsim import units
 from feedsim.analysis.circularity import Turn
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.files.regular import json_file
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
 
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
 COMPARED_SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
-TIME_NAMES = ("time", "t")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,18 +103,17 @@ def _read(path: Path, name: str) -> Source:
             "(FOLDER:17, FOLDER:max=FIGURE) is needed"
         )
     recording = read_recording(curves)
-    column = next((name for name in recording.names if name.lower() in TIME_NAMES), None)
-    if column is None:
+    if (clock := recording.clock()) is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
-    factor = float(units.factor(recording.units[column] or "s", "s"))
+    column, factor = clock
     time = np.asarray(recording.read([column])[column], dtype=np.float64) * factor
     if len(time) < 2 or not np.all(np.diff(time) > 0):
         raise InputError(f"{curves}: its time does not rise from row to row; two rows or more are needed")
     summary = curves.with_name(SUMMARY)
     if curves.name != RESULT or not summary.is_file():
         return Source(name, path, recording, time)
+    content = json_file(summary)
     try:
-        content = json.loads(summary.read_text(encoding="utf-8"))
         return Source(
             name, path, recording, time,
             figures=_figures(content),

@@ -5,12 +5,14 @@ May use: errors, files. Start with meant(), which the command line asks about a 
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from feedsim.errors import InputError
+from feedsim.files.regular import json_file
 
 NO_RECORD = "a folder of results without a record (result.csv)"
 # Kind of a summary -> the command that makes it, where they differ.
@@ -23,6 +25,7 @@ COMMAND_NAMES = {
     "show": "diff",
     "tune": "tune compensation",
 }
+MAX_SUMMARY_BYTES = 50_000_000
 KIND_BYTES = 4096  # bytes of a file that are read to see what it is
 
 
@@ -37,7 +40,6 @@ class Kind:
 
 def _keys(path: Path) -> set[str]:
     """Keys of the first level of a YAML file; none of a file that is none."""
-    from feedsim.errors import InputError
     from feedsim.files.source import read
 
     if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
@@ -88,11 +90,11 @@ def _capture(path: Path) -> bool:
 
 
 def _summary(path: Path) -> bool:
-    if path.suffix.lower() != ".json" or not path.is_file() or path.stat().st_size > 50_000_000:
+    if path.suffix.lower() != ".json" or not path.is_file():
         return False
     try:
-        content: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = json_file(path, MAX_SUMMARY_BYTES)
+    except InputError:
         return False
     return isinstance(content, dict) and bool({"scenario", "files", "feedsim"} & {*content})
 
@@ -129,7 +131,11 @@ INPUT_KINDS = (
     Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
     Kind("a table of modes, which a machine file names", (), _modes),
     Kind("a record", _RECORDS, lambda path: _table(path) or _ends(".mat")(path)),
-    Kind("a capture of a control", ("identify drive", "replay", "identify friction", "tools convert"), _capture),
+    Kind(
+        "a capture of a control",
+        ("identify drive", "replay", "identify friction", "tools convert", "diff", "compare"),
+        _capture,
+    ),
 )
 
 
@@ -165,8 +171,8 @@ def meant(command: str, values: Iterable[Any]) -> str:
 def _result(folder: Path) -> str:
     """What a folder without a record holds, as its summary has it: the command, and the page; "" where it has none."""
     try:
-        content: Any = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = json_file(folder / "summary.json", MAX_SUMMARY_BYTES)
+    except InputError:
         return ""
     of = content.get("kind") if isinstance(content, dict) else None
     if not isinstance(of, str) or not re.fullmatch("[a-z]+([ -][a-z]+)?", of):

@@ -34,6 +34,8 @@ CONVERSION_ROUNDING = 4 * np.finfo(float).eps
 FOLLOWS = 0.1
 # Curves are kept of so many variables, the worst ones.
 CURVES = 12
+SUGGESTED = 20  # missing columns for which a name that could be meant is looked for
+MAX_PAIRS = 10_000  # of columns that are looked through for one that another follows
 
 
 def compare(
@@ -97,6 +99,7 @@ def _compared(
     notes += over.notes
     reported: dict[str, list[str]] = {}
     variables = []
+    missed = 0
     for name in asked:
         if fault := _not_read(reference, name, results.get(name), result):
             variables.append(
@@ -108,7 +111,9 @@ def _compared(
                 reported.setdefault(remark, []).append(name)
             variables.append(variable)
         elif not options.common:
-            variables.append(Variable(name, "missing", reason=missing(name, result.names)))
+            missed += 1
+            reason = missing(name, result.names) if missed <= SUGGESTED else f"the result has no column {name!r}"
+            variables.append(Variable(name, "missing", reason=reason))
     notes += [f"{few(who, LISTED)}: {remark}" for remark, who in reported.items()]
     notes += _default(variables, reference, tolerances)
     verdict: Verdict = "same"
@@ -261,6 +266,7 @@ def _unused(result: Series, reference: Series, tolerances: Tolerances, options: 
     ):
         check_used(what, patterns, names)
     for whose, series in (("result", result), ("reference", reference)):
+        notes += series.notes
         if series.skipped:
             notes.append(f"columns of text in the {whose} are not compared: {', '.join(series.skipped[:5])}")
     return notes
@@ -278,7 +284,8 @@ def _default(variables: Sequence[Variable], reference: Series, tolerances: Toler
         return []
     names = few([variable.name for variable in compared], LISTED)
     text = f"no tolerance is given for {names}: {DEFAULT:g} of the range is allowed"
-    followed = [(variable, *_leader(variable, reference)) for variable in compared]
+    few_enough = max(1, MAX_PAIRS // len(reference.columns))
+    followed = [(variable, *_leader(variable, reference)) for variable in compared[:few_enough]]
     entry, leader, apart = max(followed, key=lambda item: item[0].allowed / item[2] if item[2] else 0.0)
     if apart:
         text += (

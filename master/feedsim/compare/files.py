@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,7 +34,7 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
     results: list[tuple[Path, Path]] = []
     for result, reference in zip(paths[::2], paths[1::2], strict=True):
         if reference.is_dir() and result.is_dir():
-            files = sorted(path for path in reference.rglob("*") if path.suffix.lower() == ".csv" and path.is_file())
+            files = csv_files(reference)
             # Beside references of the FMI cross-check lie inputs, parameters and others.
             files = [path for path in files if path.name.endswith(REFERENCE_ENDING)] or files
             files = [path for path in files if not path.name.endswith(BOUNDS)]
@@ -47,6 +48,12 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
         else:
             results.append((result / reference.name if result.is_dir() else result, reference))
     return results
+
+
+def csv_files(folder: Path) -> list[Path]:
+    """CSV files of a folder and of those below, in order, without what vanishes meanwhile or may not be read."""
+    paths = (Path(place, name) for place, _, names in os.walk(folder) for name in names)
+    return sorted(path for path in paths if path.suffix.lower() == ".csv" and path.is_file())
 
 
 def compare_files(

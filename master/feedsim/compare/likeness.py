@@ -25,6 +25,7 @@ MISTAKEN = ("m", "mm", "um", "in", "rad", "deg", "rev", "rad/s", "rpm", "deg/s",
             "m/min", "in/min", "N", "kN", "N.m", "N.cm", "mN.m", "A", "mA", "percent", "1")  # fmt: skip
 LIKE_A_UNIT = 1e-3  # relative; a factor is called a unit when it is that near
 ROWS_SEARCHED = 2000  # rows of a result that its digits and its shift are looked for in,
+VARIABLES_EXPLAINED = 1000  # that are looked at, the worst
 VARIABLES_SEARCHED = 6  # and variables, the worst, that show a shift
 MIN_GUESS_ROWS = 3  # rows that a guess rests on
 # Largest shift that is looked for: so many steps, or that long, but no more than a tenth of the compared time.
@@ -57,11 +58,10 @@ def likeness(
 
     comparison: with the curves of all variables. again: the same comparison with other options.
     """
-    asked = [
-        variable
-        for variable in comparison.those("different")
-        if variable.curves is not None and _enough(variable.curves)
-    ]
+    those = comparison.those("different")
+    if len(those) > VARIABLES_EXPLAINED:
+        those = tuple(sorted(those, key=lambda variable: -variable.ratio)[:VARIABLES_EXPLAINED])
+    asked = [variable for variable in those if variable.curves is not None and _enough(variable.curves)]
     if not asked:
         return ()
     guessed: dict[str, _Guess] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from feedsim.compare.files import beside, tolerances_of
+from feedsim.compare.files import beside, csv_files, tolerances_of
 from feedsim.compare.verdict import Comparison, Variable, seconds
 
 MOST_LINES = 10
@@ -92,7 +92,7 @@ def _unreferenced(comparisons: Sequence[Comparison], asked: Sequence[Path]) -> l
     results = []
     for folder, reference in zip(asked[::2], asked[1::2], strict=False):
         if folder.is_dir() and reference.is_dir():
-            more = sorted({path for path in folder.rglob("*.csv") if path.is_file()} - compared)
+            more = [path for path in csv_files(folder) if path not in compared]
             named = ", ".join(str(path.relative_to(folder)) for path in more[:3]) + (", ..." if len(more) > 3 else "")
             results += [f"note: {folder}: {len(more)} CSV files have no reference: {named}"] if more else []
     return results

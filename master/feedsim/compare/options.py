@@ -74,12 +74,13 @@ def sources(result: Sequence[str], reference: Sequence[str], options: Options) -
             if results.get(name, source) != source:
                 raise InputError(f"--column: both {results[name]!r} and {source!r} of the result would be {name!r}")
             results[name] = source
-    return {name: results.get(name, name) for name in reference if name in results or name in result}
+    there = {*results, *result}
+    return {name: results.get(name, name) for name in reference if name in there}
 
 
 def missing(name: str, result: Sequence[str]) -> str:
     """That a reference's column is not in the result, and what could be meant."""
-    alike = [entry for entry in result if re.fullmatch(rf".*[.:/|]{re.escape(name)}", entry)]
+    alike = [entry for entry in result if entry.endswith(name) and entry[: -len(name)].endswith((".", ":", "/", "|"))]
     if len(alike) == 1:
         prefix = alike[0].removesuffix(name)
         return f"the result has no column {name!r}; is it {alike[0]!r}? Then --column '{prefix}*=*'"

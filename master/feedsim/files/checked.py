@@ -93,6 +93,7 @@ def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
             fetch(source, model, (*place, i), faults)
 
 
+MAX_EXPLAINED = 200  # problems of a file that are listed
 UNREAD = "(not read)"  # stands for the content of a file whose problem is reported already
 
 
@@ -100,7 +101,10 @@ def check(source: Source, model: type[M], faults: list[str]) -> M | None:
     try:
         return model.model_validate(source.data, context=reading(model, source.data))
     except ValidationError as error:
-        faults += [text for detail in error.errors() if (text := explain(source, model, detail, UNREAD))]
+        details = error.errors()
+        faults += [text for detail in details[:MAX_EXPLAINED] if (text := explain(source, model, detail, UNREAD))]
+        if (more := len(details) - MAX_EXPLAINED) > 0:
+            faults.append(describe(source, (), f"{more} more problems are not listed"))
         return None
 
 

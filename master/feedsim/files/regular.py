@@ -1,17 +1,23 @@
-"""Bytes of a file that a user names: of a regular one, up to a size. No pipe or device keeps a command waiting."""
+"""Bytes of a file that a user names: of a regular one, up to a size. No pipe or device keeps a command waiting.
+
+JSON from such files is read here as well: nested so deep that Python's stack would not hold it, it is refused.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
+from typing import Any
 
 from feedsim.errors import InputError, no_such_file
 
+MAX_JSON_DEPTH = 100  # levels of groups and lists
 # What else a name may stand for, in words.
 _OTHERS = (
     (stat.S_ISDIR, "a folder"),
@@ -107,3 +113,38 @@ def digest(path: Path) -> str:
     """SHA-256 of what is in a file, which may be larger than the memory. InputError: as of content()."""
     with opened(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def json_file(path: Path, largest: int | None = None) -> Any:
+    """What is in a JSON file in UTF-8. InputError: as of content() and json_value()."""
+    return json_value(content(path, largest), str(path))
+
+
+def json_value(text: str | bytes, where: str) -> Any:
+    """The value of a JSON text. InputError: it is none, or nested too deep."""
+    try:
+        value = json.loads(text)
+    except RecursionError:
+        raise _too_deep(where) from None
+    except ValueError as error:  # bytes that are no UTF-8, and whole numbers of thousands of digits, too
+        raise InputError(f"{where} is no JSON that can be read: {error}") from None
+    check_depth(value, text, where)
+    return value
+
+
+def check_depth(value: Any, text: str | bytes, where: str) -> None:
+    """InputError: a value, which JSON text holds, is nested deeper than what works on it could follow."""
+    opening = ("[", "{") if isinstance(text, str) else (b"[", b"{")
+    if sum(map(text.count, opening)) <= MAX_JSON_DEPTH:  # type: ignore[arg-type]
+        return
+    level = [value]
+    for _ in range(MAX_JSON_DEPTH + 1):
+        level = [inner for outer in level if isinstance(outer, list | dict)
+                 for inner in (outer.values() if isinstance(outer, dict) else outer)]  # fmt: skip
+        if not level:
+            return
+    raise _too_deep(where)
+
+
+def _too_deep(where: str) -> InputError:
+    return InputError(f"{where}: its values are nested too deep; allowed: up to {MAX_JSON_DEPTH} levels")

@@ -85,13 +85,12 @@ def _mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> 
         signal = _time(recording, mapping) if role == "time" else mapping.signal(role)
         if signal is None:
             continue
-        signal = signal.model_copy(update={"column": recording.named(signal.column)})
-        if signal.column not in recording.names:
+        if (name := recording.called(signal.column)) is None:
             missing = f"{recording.header} has no column {signal.column!r}; there is {recording.there}"
             faults.append(f"{mapping.where(role)}: {missing}")
             continue
         try:
-            channels[role] = column(recording, role, signal)
+            channels[role] = column(recording, role, signal.model_copy(update={"column": name}))
         except InputError as error:
             faults.append(f"{mapping.where(role)}: {error}")
     if faults:
@@ -105,7 +104,7 @@ def _time(recording: Recording, mapping: Columns) -> Signal | None:
         return None
     if clock.column is not None:
         # What has no unit is s, as everywhere in traces; but a counter is nothing before its factor.
-        named = recording.named(clock.column)
+        named = recording.called(clock.column) or clock.column
         unit = clock.unit or (None if clock.factor or recording.units.get(named) else "s")
         return Signal(column=named, unit=unit, factor=clock.factor)
     named_time = _named_time(recording, mapping.axis or "")
@@ -227,9 +226,8 @@ def _named_time(recording: Recording, axis: str) -> str:
         )
     if result:
         return result[0]
-    first = recording.names[0]
-    if known_unit(recording.units[first]) and units.unit(recording.units[first] or "1").dimension == "time":
-        return first
+    if (clock := recording.clock()) is not None:
+        return clock[0]
     raise InputError(
         f"{recording.header}: no column of time; there is {recording.there}; name it in a mapping file: "
         "time: {column: ..., unit: s}, or give time: {interval: 2 ms} where there is none"

@@ -17,16 +17,19 @@ from feedsim.owned import TemporaryFolder
 
 @job("turn a record of any kind into a CSV trace", needs=())
 def convert(
-    file: Annotated[File, Argument("FILE", "MAT, CSV, or a capture of a SINUMERIK (.json)")],
-    out: Annotated[File | None, out_file("FILE.csv", "")] = None,
+    file: Annotated[File, Argument("FILE", "CSV, MAT, or another record (docs/traces.md)")],
+    out: Annotated[File | None, out_file("FILE.csv", "the table to write")] = None,
     *,
     column: Annotated[
         str | Sequence[str],
-        Option("VARIABLE=NAME:UNIT", "one column; the first must be time; none: all of a capture", many=True),
+        Option("VARIABLE=NAME:UNIT", "one column; the first must be time; none: all", many=True),
     ] = (),
     force: Force = False,
 ) -> Made:
-    """Turn a recording into a CSV trace: all signals of a control's capture, or variables of a MAT or CSV file.
+    """Turn a recording into a CSV trace: all of its signals, or some of its columns, over its time.
+
+    Command line:
+        feedsim tools convert record.mat --column t=time:s --column qg=Z.x_s:m -o reference.csv
 
     Raises:
         InputError: a faulty file, a text of another form, a variable that is not there, a value that is not finite.
@@ -42,11 +45,12 @@ def convert(
     if out is not None:
         check_file(Path(out), [path], ours=lambda there: True)  # an input is refused before it is read
     with TemporaryFolder() as folder:
-        written = trace.convert(path, columns, folder / "converted.csv")
+        recording = trace.read_recording(path)
+        written = trace.convert(recording, columns, folder / "converted.csv")
         content = (folder / "converted.csv").read_bytes()
     kind = Kind("convert", "table", unchanged(content))
     answer = f"{len(written.columns) + 1} columns from {path}"
-    made = Made(kind, f"{path.stem}.csv", content, [answer], inputs=[path])
+    made = Made(kind, f"{path.stem}.csv", content, [answer], recording.notes, inputs=[path])
     if out is not None:
         made.save(out, force=force)
     return made

@@ -73,8 +73,8 @@ class Overlay(Result):
 
     @property
     def findings(self) -> Sequence[str]:
-        """None: the results have their own."""
-        return ()
+        """What a reader of the records should know; results of feedsim have their own."""
+        return [note for source in self._sources for note in source.recording.notes]
 
     @property
     def answers(self) -> Sequence[str]:

@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim.errors import OutputError
+from feedsim.errors import InputError, OutputError
+from feedsim.files.regular import json_file
 from feedsim.outputs import forced, same
 from feedsim.owned import TemporaryFolder, claimed
 from feedsim.report.content import Report
@@ -209,8 +210,8 @@ def _settle(directory: Path) -> None:
     """
     for scratch in directory.glob(f"{SCRATCH}*"):
         try:
-            moves = json.loads((scratch / MOVES).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            moves = json_file(scratch / MOVES)
+        except InputError:
             moves = {}  # it was still being filled
         for name, source in moves.items():
             if not _inside(name) or not _inside(source or name):
@@ -254,8 +255,8 @@ def _listed(directory: Path) -> list[str] | None:
 def _summary(directory: Path) -> dict[str, Any]:
     """The summary of an earlier run in ``directory``; empty where there is none."""
     try:
-        result = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        result = json_file(directory / SUMMARY)
+    except InputError:
         return {}
     return result if isinstance(result, dict) else {}
 

@@ -16,6 +16,7 @@ from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import UNIT
 from feedsim.errors import InputError
+from feedsim.files.regular import json_value
 from feedsim.scenario.axis_units import EFFECTS, FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.ssp.described import RECORDINGS, STRUCTURE
@@ -135,12 +136,7 @@ def annotation(text: str | None, files: Collection[str], where: str) -> dict[str
     if text is None:
         return None
     what = f"{where}: the annotation feedsim.scenario"
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise InputError(f"{what} is not readable JSON: {error}") from None
-    except RecursionError:
-        raise InputError(f"{what} is nested too deeply") from None
+    data = json_value(text, what)
     _check_types(data, what)
     unknown = [key for key in data if key not in OWN_KEYS]
     missing = [name for name in named_files(data) if name not in files or not name.startswith(f"{RECORDINGS}/")]

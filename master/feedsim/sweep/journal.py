@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError, OutputError
+from feedsim.files.regular import json_value
 from feedsim.owned import Closing, claimed
 from feedsim.signals import held
 from feedsim.sweep.design import Outcome
@@ -219,8 +220,8 @@ _ANEW = "choose another folder with --out, or begin anew with --restart, which d
 
 def _line(line: bytes) -> Any:
     try:
-        return json.loads(line)
-    except ValueError:
+        return json_value(line, "")
+    except InputError:
         return None
 
 

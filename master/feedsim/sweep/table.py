@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError, OutputError, no_such_file
 from feedsim.extras import need
 from feedsim.fields import did_you_mean
+from feedsim.files.regular import json_file, json_value
 from feedsim.scenario.study import Parameter
 from feedsim.sheets import read_rows, write_rows
 from feedsim.sweep.design import Design, Outcome
@@ -213,8 +214,8 @@ def read_table(path: str | Path) -> Table:
 def record_of(directory: Path) -> dict[str, Any]:
     """study.json of a folder: how its runs were made; empty where there is none, or none that can be read."""
     try:
-        result = json.loads((directory / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        result = json_file(directory / RECORD)
+    except InputError:
         return {}
     return result if isinstance(result, dict) else {}
 
@@ -328,7 +329,7 @@ def _read_parquet(path: Path) -> Table:
     except (ValueError, TypeError, KeyError, OverflowError, arrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as the table of a study: {error}") from None
     try:
-        record = json.loads((whole.schema.metadata or {}).get(_KEY, b"{}"))
-    except ValueError:
+        record = json_value((whole.schema.metadata or {}).get(_KEY, b"{}"), str(path))
+    except InputError:
         record = {}
     return _read_table(columns, units, record)

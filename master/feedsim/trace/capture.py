@@ -27,6 +27,7 @@ from feedsim.trace.trace import MAX_MAGNITUDE, Array, recorded
 SUFFIX = ".json"
 COUNTER = "CYCLE"
 LEAST_CYCLE = 1e-3  # ms
+MAX_SIGNALS = 1000
 MAX_NAME_LENGTH, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a message
 # 1.1 GB as numbers, in memory twice while they are sorted into columns; a file of some 1.3 GB.
 MOST_NUMBERS, MOST_BLOCKS = 1 << 27, 1_000_000
@@ -222,6 +223,8 @@ def _signals(header: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
     names = [str(signal.get("Address") or signal.get("Name")) for signal in _signals(header)]
+    if len(names) > MAX_SIGNALS:
+        raise InputError(f"{path}: Header.SignalListHFData has {len(names)} signals; allowed: up to {MAX_SIGNALS}")
     texts = [*names, *(str(signal.get("Axis", "")) for signal in _signals(header))]
     if long := [text for text in texts if len(text) > MAX_NAME_LENGTH]:
         raise InputError(

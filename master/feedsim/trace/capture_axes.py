@@ -31,6 +31,7 @@ TORQUE_CONSTANTS = (0.05, 5.0)
 TOGETHER = 0.9  # of a correlation, above which TORQUE and CURRENT are the same thing in two units
 HEAP = 0.005  # share of the rows that are one value to the last digit, at an end of the range: it is cut off there
 FIT_ROWS = 20_000  # rows that a fit rests on
+MAX_AXES_SEARCHED = 32  # axes among which a signal of another one is looked for
 OUTLIER_SHARE = 0.02  # share of the rows that may stand out
 
 
@@ -198,6 +199,8 @@ def _fit(time: Array, torque: Array, power: Array, position: Array, rows: Rows) 
 def _swapped(number: str, names: Mapping[str, str], columns: Mapping[str, Array]) -> str:
     """The signal that fits if it is taken of another axis, in words; "" where there is none."""
     own = {signal: columns[f"{signal}|{number}"] for signal in ("TORQUE", "POWER", "ENC_POS")}
+    if len(names) > MAX_AXES_SEARCHED:
+        return ""
     whole = np.ones(len(columns["time"]), dtype=bool)
     best: tuple[float, str] = (FITS, "")
     for other, name in names.items():

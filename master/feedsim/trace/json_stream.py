@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from feedsim.errors import InputError
+from feedsim.files.regular import check_depth
 
 CHUNK = 1 << 20  # characters
 MAX_VALUE_LENGTH = 1 << 26  # characters of a value that is taken whole
@@ -78,6 +79,7 @@ class JsonStream:
                 raise InputError(f"{self._path} is no JSON file that can be read: {error}") from None
             if end == len(self._buffer) and self._fill():
                 continue  # a number may go on
+            check_depth(value, self._buffer[self._at : end], str(self._path))
             self._at, self._chunk = end, CHUNK
             return value
 

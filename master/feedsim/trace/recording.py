@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from feedsim import units
 from feedsim.errors import InputError, few
+from feedsim.files.spellings import spelled
 from feedsim.trace import capture, sinumerik_xml
 from feedsim.trace.capture_axes import CaptureAxis
-from feedsim.trace.cells import TIME_NAMES, Table, read_table
+from feedsim.trace.cells import TIME_NAMES, Table, read_table, usual_column
 from feedsim.trace.csv import write_csv
+from feedsim.trace.layout import titles
 from feedsim.trace.mat_columns import MAT, read_columns
 from feedsim.trace.mat_columns import named as named_so
 from feedsim.trace.scopes import read_scope
@@ -77,7 +79,7 @@ class Recording:
 
     def _vector(self, name: str) -> Array:
         """InputError: no such column, a number that is not finite or too large."""
-        values = self._columns.get(self.named(name))
+        values = self._columns.get(self.called(name) or name)
         if values is None:
             other = self.unread.get(name)
             if name not in self.scalars and other is None:
@@ -97,10 +99,6 @@ class Recording:
                 f"{self.path}: {name!r} is {numbers[row]:g} at element {row + 1}; allowed: up to {MAX_MAGNITUDE:g}"
             )
         return numbers
-
-    def named(self, name: str) -> str:
-        """The name of a column in any of its spellings, such as signals(2).values; as it is where there is none."""
-        return named_so(name, self._columns, self._spellings)
 
     @property
     def there(self) -> str:
@@ -124,6 +122,28 @@ class Recording:
             if name != time and (not self._columns or len(self._columns[name]) == len(self._columns[time]))
         ]  # fmt: skip
         return [(name, re.sub(r"\[(.*?)\]", r"(\1)", name), self.units[name]) for name in there]
+
+    def called(self, text: str) -> str | None:
+        """The column of a name in any of its spellings, signals(2).values, or a path of a control."""
+        if (name := named_so(text, self._columns, self._spellings)) in self.units:
+            return name
+        return next((title for title in titles([text]) if title in self.units), None)
+
+    def clock(self) -> tuple[str, float] | None:
+        """The column of the time, by its usual names, else the first one if its unit is a time; and the factor of its
+        values to s. Without a unit it is in s. None: there is none.
+
+        Raises InputError: several are called so; its unit is no time.
+        """
+        known = [self.units[name] for name in self.names]
+        index = usual_column(self.names, known, TIME_NAMES, "s", self.header)
+        if index is None:
+            return None
+        name = self.names[index]
+        try:
+            return name, float(units.factor(spelled(self.units[name]) or "s", "s"))
+        except InputError as error:
+            raise InputError(f"{self.header}: column {name!r}: {error}") from None
 
     @property
     def control(self) -> str:
@@ -155,25 +175,31 @@ def read_recording(path: str | Path) -> Recording:
     without a vector of real numbers.
     """
     path = Path(path)
+    if path.suffix.lower() == MAT:
+        return _read_mat(path)
+    if (recording := of_control(path)) is not None:
+        return recording
+    table = read_table(path)
+    # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
+    units = ["" if unit.isdecimal() else unit for unit in table.units]
+    return Recording(
+        path, table.names, dict(zip(table.names, units, strict=True)),
+        notes=table.notes, remarks=table.remarks, _table=table,
+    )  # fmt: skip
+
+
+def of_control(path: Path) -> Recording | None:
+    """What a control has recorded, in a format of its own; its time is "time" [s]. None: another file. InputError."""
     if path.suffix.lower() == capture.SUFFIX:
         result = capture.read_capture(path)
         return Recording(
             path, tuple(result.columns), result.units, axes=result.axes, marks=result.marks, _columns=result.columns
         )
-    if path.suffix.lower() == MAT:
-        return _read_mat(path)
     signals = sinumerik_xml.read_signals(path) if path.suffix.lower() == sinumerik_xml.SUFFIX else read_scope(path)
-    if signals is not None:
-        _check(path, signals.columns)
-        return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _columns=signals.columns)
-    table = read_table(path, remarks_ahead=True)
-    taken = f"{path}: the header is taken to be line {table.header_line}; the lines ahead of it are not read"
-    notes = (taken,) if table.remarks else ()
-    # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
-    units = ["" if unit.isdecimal() else unit for unit in table.units]
-    return Recording(
-        path, table.names, dict(zip(table.names, units, strict=True)), notes=notes, remarks=table.remarks, _table=table
-    )
+    if signals is None:
+        return None
+    _check(path, signals.columns)
+    return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _columns=signals.columns)
 
 
 def _check(path: Path, columns: Mapping[str, Array]) -> None:
@@ -201,7 +227,7 @@ def _read_mat(path: Path) -> Recording:
     )  # fmt: skip
 
 
-def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
+def convert(file: str | Path | Recording, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
     """Write columns of a recording as a CSV trace and return the trace.
 
     columns  (variable, new name, unit); the first must be the time (name "time", any unit of time). Values whose unit
@@ -211,28 +237,30 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
     Raises InputError: what read_recording() refuses, a variable that is missing (with those there are), no vector of
     real finite numbers, or of another length than the time. OutputError: `out` cannot be written.
     """
-    path = Path(path)
     if columns and columns[0][1] != "time":
         raise InputError("the first column must be the time, for example t=time:s")
-    factor = units.factor(columns[0][2], "s") if columns else 1
+    factor = float(units.factor(columns[0][2], "s")) if columns else 1.0
     for _, _, unit in columns[1:]:
         units.unit(unit)
     if doubled := [name for i, (_, name, _) in enumerate(columns) if name in [other for _, other, _ in columns[:i]]]:
         raise InputError(f"two columns are to be called {doubled[0]!r}")
-    recording = read_recording(path)
+    recording = file if isinstance(file, Recording) else read_recording(file)
+    path = recording.path
     if not columns:
-        if recording.units.get("time") != "s":
+        clock = recording.clock()
+        if clock is None or not (recording.units[clock[0]] or recording._table):
             first = next((name for name in recording.names if name.lower() in TIME_NAMES), recording.names[0])
             text = f"{first}=time:s"
             raise InputError(
                 f"{path}: which column is the time? --column {quote(text)}, and one "
                 f"for each other column; there are {recording.there}"
             )
-        columns = [("time", "time", "s"), *recording.beside("time")]
+        at, _ = clock
+        columns = [(at, "time", recording.units[at] or "s"), *recording.beside(at)]
     read = recording.read(variable for variable, _, _ in columns)
     scales = {variable: _scale(recording, variable, unit) for variable, _, unit in columns}
     read = {name: values if scales[name] == 1 else values * scales[name] for name, values in read.items()}
-    time = read[columns[0][0]] * float(factor)
+    time = read[columns[0][0]] * factor
     try:
         trace = Trace(time, {name: read[variable] for variable, name, _ in columns[1:]},
                       {name: unit for _, name, unit in columns[1:] if unit})  # fmt: skip
@@ -244,7 +272,7 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
 
 def _scale(recording: Recording, variable: str, unit: str) -> float:
     """From the file's unit to `unit`; 1 where the file has none that is known. InputError: of another dimension."""
-    known = recording.units.get(recording.named(variable), "")
+    known = recording.units.get(recording.called(variable) or variable, "")
     if not known or known == unit:
         return 1.0
     try:

@@ -15,8 +15,20 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError, few
-from feedsim.trace.cells import TIME_NAMES, Decimal, Table, decimal_mark, fits, read_table, round_unit
+from feedsim.trace.cells import (
+    TIME_NAMES,
+    Decimal,
+    Table,
+    check_unlike,
+    decimal_mark,
+    fits,
+    instead_of,
+    read_table,
+    round_unit,
+    shown,
+)
 from feedsim.trace.mat_columns import MAT, named, read_columns
+from feedsim.trace.recording import of_control
 from feedsim.trace.trace import Array, TimeColumns, Trace
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
@@ -42,6 +54,7 @@ class Series(TimeColumns):
     units    name -> unit as written; "" where none is known
     skipped  columns of text that are not read
     broken   name -> what is wrong with a column that is not read either: of numbers, but for some cells
+    notes    what a reader of the file should know
 
     Arrays are copied and read-only. InputError: lengths that differ, time that is not finite or runs back.
     """
@@ -51,6 +64,7 @@ class Series(TimeColumns):
     units: Mapping[str, str] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
     broken: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self._settle()
@@ -70,7 +84,8 @@ def as_series(trace: Trace | Series) -> Series:
 
 
 def read_series(path: str | Path, *, time: str | None = None) -> Series:
-    """Read the CSV or MAT file of any simulator; layout, separators and decimal marks as `read_csv`.
+    """Read the CSV or MAT file of any simulator, or the record of a control; layout, separators and decimal marks as of
+    records (`read_recording`).
 
     time   name of the time column, or NAME:UNIT where there is no column of that whole name and the header does not
            show the unit (default s); default "time" or "t" in any case, else a first column whose unit is a time
@@ -81,6 +96,10 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     path = Path(path)
     if path.suffix.lower() == MAT:
         return _of_mat(path, time)
+    if (recording := of_control(path)) is not None and time is None:
+        columns = recording.read(recording.names)
+        return Series(columns.pop("time"), columns, {name: recording.units[name] for name in columns}, (), {},
+                      recording.notes)  # fmt: skip
     table = read_table(path, _heads, as_numbers=True)
     time_unit = None
     if time is not None and time not in table.names:
@@ -92,18 +111,21 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
         raise InputError(f"{table.head}: the time column {table.names[at]!r} is in {table.units[at]}, not {time_unit}")
     mark: Decimal = "."
     if table.decimal_comma and any("," in cell for column in table.columns for cell in column):
-        plain = [column for column in table.columns if not _is_text(column)]
+        plain = [column for i, column in enumerate(table.columns) if i not in table.dates and not _is_text(column)]
         mark = decimal_mark(plain, table.lines, table.where)
-    read = {i: _values(column, mark) for i, column in enumerate(table.columns)}
+    read = {i: _values(column, mark) for i, column in enumerate(table.columns) if i not in table.dates}
     if table.numbers is not None:
         read = dict(enumerate(table.numbers.T))
+    if at in table.dates:
+        read |= table.values([at])
+    read |= {i: None if isinstance(dates, InputError) else dates.seconds for i, dates in table.dates.items()}
     instants = read[at]
     if instants is None or not np.all(np.isfinite(instants)):
         row = 0 if instants is None else int(np.argmin(np.isfinite(instants)))
-        text = repr(table.columns[at][row]) if table.numbers is None else f"{table.numbers[row, at]}"
+        text = str(table.numbers[row, at]) if table.numbers is not None else shown(table.columns[at][row])
         raise InputError(
             f"{path}:{table.lines[row]}: {text} in the time column {table.names[at]!r}; "
-            "every instant must be a finite number"
+            f"every instant must be a finite number{instead_of(text)}"
         )
     seconds = instants * table.factor(at, "s", "time column", time_unit or "s")
     if (wrong := np.flatnonzero(np.diff(seconds) < 0)).size:
@@ -116,8 +138,8 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
         table.names[i]: fault for i, values in read.items() if values is None and (fault := _fault(table, i, mark))
     }
     skipped = tuple(table.names[i] for i, values in read.items() if values is None and table.names[i] not in broken)
-    of_columns = {name: table.units[table.names.index(name)] for name in columns}
-    return Series(seconds, columns, of_columns, skipped, broken)
+    of_columns = {name: unit for name, unit in zip(table.names, table.units, strict=True) if name in columns}
+    return Series(seconds, columns, of_columns, skipped, broken, table.notes)
 
 
 def _of_mat(path: Path, time: str | None) -> Series:
@@ -157,15 +179,8 @@ def _of_mat(path: Path, time: str | None) -> Series:
 def _heads(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names and units of a header."""
     pairs = [_head(cell.strip()) for cell in cells]
-    names = tuple(name for name, _ in pairs)
-    for i, name in enumerate(names):
-        if not name:
-            raise InputError(f"{where}: column {i + 1} has no name")
-        if name in names[:i]:
-            raise InputError(f"{where}: duplicate column {name!r} (columns {names.index(name) + 1} and {i + 1})")
-    if all(re.fullmatch(r"[-+0-9.,eE]+", name) for name in names):
-        raise InputError(f"{where}: the first line holds numbers; a header with the names is needed")
-    return names, tuple(unit for _, unit in pairs)
+    check_unlike([name for name, _ in pairs], where)
+    return tuple(name for name, _ in pairs), tuple(unit for _, unit in pairs)
 
 
 def _head(cell: str) -> tuple[str, str]:

@@ -36,7 +36,7 @@ def load(content: bytes, where: str) -> tuple[Table, str]:
             raise TypeError("unit, version, summary and resources must be texts")
         unit, version, summary, kind = texts
         scalars, axis_rows = (tuple(map(_row, read[key])) for key in ("scalars", "axis_rows"))
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{where}: not a table of variables: {type(error).__name__}: {error}") from error
     table = Table(unit=unit, summary=summary, scalars=scalars, axis_rows=axis_rows, resources=kind)
     return table, version

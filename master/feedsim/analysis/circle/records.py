@@ -21,7 +21,7 @@ from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.header import Told
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.files.spellings import spelled
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
@@ -38,7 +38,6 @@ WAYS = {
 }
 RADII = ("radius", "r", "length", "ballbar length", "radius length", "rayon")
 LEAST_RADIUS = 1e-3  # [m]; where a name does not say, what is never less is a radius and no deviation
-TIME_COLUMNS = ("time", "t", "zeit", "temps")
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
@@ -188,10 +187,10 @@ def _values(recording: Recording, name: str, unit: str) -> Array:
 
 
 def _time(recording: Recording) -> Array | None:
-    name = _column(recording, TIME_COLUMNS, "s")
-    if name is None:
+    if (clock := recording.clock()) is None:
         return None
-    time = _values(recording, name, "s")
+    name, factor = clock
+    time = recording.read([name])[name] * factor
     if (back := np.flatnonzero(np.diff(time) < 0)).size:
         row = int(back[0]) + 1
         raise InputError(
@@ -211,7 +210,7 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
         if deviation is None and radius is None:
             return angle, length, float(np.abs(_values(recording, length, "m")).min()) > LEAST_RADIUS
         return angle, length, deviation is None
-    has = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in recording.units.items())
+    has = few([f"{name} [{unit}]" if unit else name for name, unit in recording.units.items()], 20)
     if all(_plain(name) in (*units.UNIT_SYMBOLS, *units.ALIASES) for name in recording.names):
         raise InputError(
             f"{recording.header}: is a row of units, {has}; needed is one row of names with their units, such as "

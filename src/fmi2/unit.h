@@ -129,8 +129,8 @@ typedef struct Model {
 
     /* Real outputs that mostly nobody reads: value references `late_first` up to `late_end`, without the latter. step()
      * may leave them out (unit_leave_late()); show_late() then writes them from the state, when they are read or the
-     * state is saved. It depends on the state and on fixed parameters alone, and on the inputs where `late_reads_inputs`.
-     * NULL where there are none. */
+     * state is saved. It depends on the state and on fixed parameters alone, and on the inputs where
+     * `late_reads_inputs`. NULL where there are none. */
     unsigned late_first, late_end;
     bool late_reads_inputs;
     void (*show_late)(Unit *unit);

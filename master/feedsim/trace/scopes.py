@@ -189,16 +189,16 @@ def _grouped(
     columns, units, notes, unknown, scaled = {"time": time}, {"time": "s"}, [], [], []
     resampled: list[str] = []
     interpolated: list[str] = []
-    for own, held, (_, values) in zip(times, slower, groups, strict=True):
-        at = _at(own, time)
-        same = bool(np.all(np.abs(own[at] - time) <= MAX_CLOCK_DIFFERENCE + 1e-9 * np.abs(time)))
+    for own_time, held, (_, values) in zip(times, slower, groups, strict=True):
+        at = _at(own_time, time)
+        same = bool(np.all(np.abs(own_time[at] - time) <= MAX_CLOCK_DIFFERENCE + 1e-9 * np.abs(time)))
         for k, signal in values.items():
             name = titles[k]
             # What is on or off has no values in between.
             stepped = (
                 held or same or _cell(header, "Data-Type", k).upper() in FLAGS or bool(np.isin(signal, (0, 1)).all())
             )
-            columns[name] = signal[at] if stepped else np.interp(time, own, signal)
+            columns[name] = signal[at] if stepped else np.interp(time, own_time, signal)
             (resampled if stepped else interpolated).extend([] if same else [name])
             unit = _cell(header, "Unit", k)
             known = bool(unit) and known_unit(unit)

@@ -343,7 +343,9 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         blocks_of([entry.angle for entry in undone])[kept],
         rounded,
     )
-    wound = WOUND if len(circle.drag) == 2 else UNKNOWN_WOUND if circle.recorded else 0.0
+    wound = WOUND if len(circle.drag) == 2 else 0.0
+    if circle.recorded:  # nobody knows how a peak dies away: what it leaves behind its window looks like lost motion
+        wound = UNKNOWN_WOUND + math.exp(-window * circle.radius / circle.speed / (2 * SETTLES))
     return Fit(
         names=names,
         values=np.array([values[name] for name in names]),

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import Moved, TurnedPath
 from feedsim.analysis.circle.tails import Tails
-from feedsim.analysis.figures import Array, averaged
+from feedsim.analysis.figures import Array
 
 # Angles [deg]: over which means are compared for an edge, how far it may be off its place, how far apart places are
 # that are tried; an edge must exceed what lies between the reversals by this.
@@ -38,9 +38,9 @@ EDGE_FLOOR = 20e-9  # [m]
 # Where nothing shows them, what an axle off its centre adds to the angles (standard deviation of each part) [deg], and
 # how even a motion turns [deg]: feeds swing by a thousandth in a turn, at most.
 UNKNOWN_AXLE, EVEN_TURN = 0.3, 0.03
-# Orders of waves of the radius that may be there beside the terms, over how many of them their size is averaged, and
+# Orders of waves of the radius that may be there beside the terms, of how many of them the largest says their size, and
 # from how many times that of noise on they are looked at.
-FORM_ORDERS, FORM_NEIGHBOURS, FORM_SEEN = range(3, 17), 7, 2.0
+FORM_ORDERS, FORM_NEIGHBOURS, FORM_SEEN = range(3, 17), 7, 3.0
 
 
 class Offset(NamedTuple):
@@ -230,6 +230,7 @@ def form_waves(
     sizes = np.linalg.lstsq(matrix[rows], off, rcond=None)[0]
     noise = float(np.median(np.abs(off - matrix[rows] @ sizes))) / 0.6745 * math.sqrt(2 / max(int(rows.sum()), 1))
     power = (sizes.reshape(sides, len(FORM_ORDERS), 2) ** 2).mean(axis=2)
-    spread = np.sqrt([averaged(side, FORM_NEIGHBOURS) for side in power]).repeat(2)
+    around = np.pad(power, ((0, 0), (FORM_NEIGHBOURS // 2,) * 2))
+    spread = np.sqrt(np.lib.stride_tricks.sliding_window_view(around, FORM_NEIGHBOURS, axis=1).max(axis=2)).repeat(2)
     seen = spread > FORM_SEEN * noise
     return Tails(matrix[:, seen], spread[seen])

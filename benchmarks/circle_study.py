@@ -23,8 +23,8 @@ import numpy as np
 from compensation_study import scenarios
 
 from feedsim import cosim, nc, scenario
-from feedsim.analysis import Diagnosis
-from feedsim.analysis.circle import name
+from feedsim.analysis import Diagnosis, contour
+from feedsim.analysis.circle import CircleUnderTest, TurnedPath, diagnose, name
 from feedsim.analysis.circle_figures import FIGURE_UNITS, diagnosed
 from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.errors import FeedsimError
@@ -138,7 +138,66 @@ def diagnosis(drawn: Drawn, task: CircleTask, trace: Trace) -> Diagnosis | None:
     return diagnosed(trace, task.turns, task.pitch, task.gain, task.drag, columns, False, response, task.following)
 
 
-def judged(task: CircleTask, drawn: Drawn, found: Diagnosis) -> tuple[dict[str, bool], list[str]]:
+@dataclass(frozen=True)
+class Ballbar:
+    """What an instrument adds. pivot: its place off the centre [m]; axle: of the angle, as multiples of its cosine and
+    sine [rad]; apart: mean radius counterclockwise less that clockwise [m]; form: order -> amplitude [m], phase [rad],
+    and how it acts in the other direction, 1 or -1; step: of the radius [m]; timed: there is a column of time."""
+
+    pivot: tuple[float, float]
+    axle: tuple[float, float]
+    apart: float
+    form: dict[int, tuple[float, float, int]]
+    step: float
+    timed: bool
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Ballbar:
+        """One of each fault in about half of the instruments."""
+        axle, phase = rng.uniform(0, 9e-3) * (rng.random() < 0.6), rng.uniform(0, 2 * math.pi)
+        form = {
+            int(order): (float(rng.uniform(0.1e-6, 1.0e-6)), float(rng.uniform(0, 6)), int(rng.choice([1, 1, -1])))
+            for order in rng.choice(np.arange(5, 13), 2, replace=False)
+        }
+        return cls(
+            (float(rng.uniform(-30e-6, 30e-6)), float(rng.uniform(-30e-6, 30e-6))),
+            (axle * math.cos(phase), axle * math.sin(phase)),
+            float(rng.uniform(-5e-6, 5e-6)) * bool(rng.random() < 0.6),
+            form if rng.random() < 0.5 else {},
+            float(rng.choice([0.0, 0.1e-6, 1e-6], p=[0.3, 0.5, 0.2])),
+            bool(rng.random() < 0.5),
+        )
+
+    def recorded(self, angle: np.ndarray, deviation: np.ndarray, radius: float, sense: int) -> TurnedPath:
+        """A turn of the machine at constant speed, by its angle (N,) [rad] and deviation (N,) [m]."""
+        x, y = (
+            (radius + deviation) * np.cos(angle) - self.pivot[0],
+            (radius + deviation) * np.sin(angle) - self.pivot[1],
+        )
+        seen = np.arctan2(y, x)
+        off = np.hypot(x, y) - radius + sense * self.apart / 2
+        for order, (amplitude, phase, back) in self.form.items():
+            off += (1 if sense > 0 else back) * amplitude * np.cos(order * seen + phase)
+        written = seen + self.axle[0] * np.cos(seen) + self.axle[1] * np.sin(seen)
+        if self.step:
+            off = np.round(off / self.step) * self.step
+        clock = np.arange(len(angle)) * (2 * math.pi / len(angle)) if self.timed else None
+        return TurnedPath((written + math.pi) % (2 * math.pi) - math.pi, off, sense, None, clock)
+
+
+def by_ballbar(drawn: Drawn, task: CircleTask, trace: Trace, instrument: Ballbar) -> Diagnosis:
+    """What a report of the recorded circle says; nothing is known of the machine but its pitches."""
+    turn = task.turn
+    columns = tuple(f"tcp.x_{axis}" for axis in turn.axes) if drawn.at_tool else None
+    measured = [(contour(trace, each, columns), each.sense) for each in task.turns]
+    paths = [instrument.recorded(each.angle, each.deviation, turn.radius, sense) for each, sense in measured]
+    speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
+    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, task.pitch, recorded=True), paths, centred=True)
+
+
+def judged(
+    task: CircleTask, drawn: Drawn, found: Diagnosis, instrument: Ballbar | None = None
+) -> tuple[dict[str, bool], list[str]]:
     """Term -> whether its true value is in its interval; causes that are named and are not there."""
     R, speed = task.turn.radius, found.circle.speed
     true = {f"{key} {axis}": 0.0 for key in ("lost_motion", "pitch") for axis in task.turn.axes} | {"squareness": 0.0}
@@ -147,6 +206,9 @@ def judged(task: CircleTask, drawn: Drawn, found: Diagnosis) -> tuple[dict[str, 
         true |= {"scale": abs(first) - abs(second), "servo": float(np.angle(second / first)) * R / speed}
     for key, value in drawn.true.items():
         true[key] = true.get(key, 0.0) + value
+    if instrument is not None:
+        true |= {f"straightness {axis}": 0.0 for axis in task.turn.axes}
+        true |= {"third": 0.0, "drift": 0.0, "centres": 0.0, "radii": instrument.apart}
     terms = {f"{term.key} {term.axis} {term.order or ''}".strip(): term for term in found.terms}
     within = {key: abs(terms[key].value - value) <= terms[key].half for key, value in true.items() if key in terms}
     radial = {"scale": R / 2, "squareness": R / 2, "servo": speed / 2}
@@ -168,9 +230,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=281128)
     parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--ballbar", action="store_true", help="circles as an instrument records them")
     given = parser.parse_args()
     rng, hit, all_, put = np.random.default_rng(given.seed), Counter[str](), Counter[str](), [0, 0, 0]
-    asked = 0
+    asked, instruments = 0, np.random.default_rng(given.seed + 1)
     with TemporaryDirectory() as folder:
         files = dict(scenarios(Path(folder), ["default", "linear", "gantry"]))
         for number in range(given.count):
@@ -178,10 +241,14 @@ def main() -> int:
             drawn, loaded = draw(rng, files, cause)
             run = cosim.run(loaded)
             (task,) = (each for each in tasks(run.scenario, run.program) if isinstance(each, CircleTask))
-            found = diagnosis(drawn, task, run.trace)
+            instrument = Ballbar.drawn(instruments) if given.ballbar else None
+            if instrument is not None:
+                found: Diagnosis | None = by_ballbar(drawn, task, run.trace, instrument)
+            else:
+                found = diagnosis(drawn, task, run.trace)
             if found is None:
                 continue
-            within, invented = judged(task, drawn, found)
+            within, invented = judged(task, drawn, found, instrument)
             hit.update(key.split()[0] for key, inside in within.items() if inside)
             all_.update(key.split()[0] for key in within)
             put[0] += sum(within.get(key, False) for key in drawn.true)
@@ -191,7 +258,10 @@ def main() -> int:
             asked += sum(key.split()[1] in found.left_out for key in drawn.true if key not in within)
             missed += [f"{key} (not named)" for key in drawn.true if key not in within]
             if missed or invented:
-                where = f"{drawn.machine} {drawn.plane}, R {drawn.radius:.0f} mm, {drawn.feed:.1f} m/min, {drawn.cause}"
+                where = f"{instrument}, " if instrument else ""
+                where += (
+                    f"{drawn.machine} {drawn.plane}, R {drawn.radius:.0f} mm, {drawn.feed:.1f} m/min, {drawn.cause}"
+                )
                 print(f"{where}: outside: {', '.join(missed) or 'none'}; not there: {', '.join(invented) or 'none'}")
     print(", ".join(f"{key} {hit[key]} of {all_[key]}" for key in all_))
     print(

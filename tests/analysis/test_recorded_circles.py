@@ -11,7 +11,7 @@ import pytest
 from drawn_circles import Causes
 from recorded_circles import Seen, recorded
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, diagnose, further
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose, further
 from feedsim.analysis.circle.setup import angle_offset
 
 BALLBAR = CircleUnderTest(("X", "Z"), 0.1, 0.03, recorded=True)
@@ -137,3 +137,36 @@ def test_no_edge_leaves_the_angles_unknown() -> None:
     found = angle_offset(paths, [path.angle for path in paths], [path.deviation for path in paths], free)
     assert not found.seen
     assert math.degrees(found.deviation) == 2.5
+
+
+@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("degrees", [-100.0, -10.0, 50.0, 130.0])
+def test_an_axle_off_its_centre_makes_no_peak_of_lost_motion(degrees: float, every: int, timed: bool) -> None:
+    """7.7 mrad of it, which the edges of X or the time show; Z has lost motion alone, whose edge is off its place."""
+    seen = Seen(Causes(offset=(12e-6, -10e-6), lost=(0.0, 4e-6), peak=(8e-6, 0.0), noise=0.05e-6))
+    paths = []
+    for path in recorded(BALLBAR, seen, np.random.default_rng(5), 8000):
+        written = path.angle + 7.7e-3 * np.cos(path.angle + math.radians(degrees))
+        time = np.arange(len(written)) * (2 * math.pi / len(written))
+        clock = time[::every] if timed else None
+        paths.append(TurnedPath(written[::every], path.deviation[::every], path.sense, None, clock))
+    found = diagnose(BALLBAR, paths, centred=True)
+    assert not found["peaks Z"].shows
+    assert found["lost_motion Z"].value == pytest.approx(4e-6, abs=found["lost_motion Z"].half)
+    assert found["lost_motion Z"].half < 1e-6
+    assert found["peaks X"].shows
+    assert found["peaks X"].value > 3e-6  # 5.4 um at most, 0.5 deg wide, which few samples see
+    for key in ("scale", "squareness"):
+        assert abs(found[key].value) <= found[key].half
+
+
+@pytest.mark.parametrize("senses", [(1, -1), (-1, 1)])
+def test_a_radius_that_differs_by_direction_bends_no_guide(senses: tuple[int, ...]) -> None:
+    paths = recorded(BALLBAR, Seen(STEPS), np.random.default_rng(6), 1257, senses)
+    paths = [replace(path, deviation=np.round(path.deviation + path.sense * 2.25e-6, 6)) for path in paths]
+    found = diagnose(BALLBAR, paths, centred=True)
+    assert found["radii"].value == pytest.approx(4.5e-6, abs=found["radii"].half)
+    assert found["radii"].shows
+    for key in ("third", "straightness X", "straightness Z", "squareness"):
+        assert not found[key].shows

@@ -122,9 +122,12 @@ def _with_circles(source: Source, circles: Mapping[str, Sequence[Turn]]) -> Sour
 def _turns(source: Source, turn: Turn) -> tuple[tuple[Turn, ...], bool]:
     """Recorded turns of a circle, and whether they are about a centre of their own."""
     x, y = (np.asarray(source.curve(f"{axis}.x_a", "m")) for axis in turn.axes)
+    turns = read_circle([source.recording.path], turn.axes, radius=turn.radius).turns
+    if not all(recorded_turn.path.whole for recorded_turn in turns):
+        raise InputError(f"{source.recording.path}: holds {turns[0].name}; a full turn, 360 deg, is needed")
     spans = [
         (recorded_turn.path.sense, recorded_turn.begin, recorded_turn.begin + recorded_turn.duration)
-        for recorded_turn in read_circle([source.recording.path], turn.axes, radius=turn.radius).turns
+        for recorded_turn in turns
         if recorded_turn.begin is not None and recorded_turn.duration is not None
     ]
     inside = np.any([(source.time >= begin) & (source.time <= end) for _, begin, end in spans], axis=0)

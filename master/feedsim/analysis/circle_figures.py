@@ -23,7 +23,7 @@ MISLEADING, LEAST_MISLEADING = 0.2, 1e-6
 FIGURE_UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m"), "N.m": (1.0, "N.m")}
 FIGURE_ORDER = (
     "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "cogging", "straightness",
-    "third", "drift", "centres", "radius", "offset", "rest",
+    "third", "drift", "centres", "radii", "radius", "offset", "rest",
 )  # fmt: skip
 ANGLES = 720  # at which two directions are compared: every half degree
 
@@ -81,6 +81,8 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
         "third": f"straightness of third order at the edge of the circle, that of {first} less that of {second}",
         "drift": "way of the centre in a turn",
         "centres": "distance of the centres of both directions",
+        "radii": "mean radius of counterclockwise turns less that of clockwise ones, or that of the second turn less "
+        "that of the first",
         "rest": "what no cause explains, from peak to valley",
     }  # fmt: skip
     for term in sorted(diagnosis.terms, key=lambda term: (FIGURE_ORDER.index(term.key), term.axis, term.order)):
@@ -109,6 +111,7 @@ def figure_name(term: Term) -> str:
     """Name of a term's figure, without the plane's."""
     names = {"servo": "servo_mismatch", "scale": "scale_mismatch", "peaks": "peak", "radius": "radius_change"}
     names |= {"third": "straightness_third", "drift": "centre_drift", "centres": "centres_apart"}
+    names |= {"radii": "radii_apart"}
     order = f"_{term.order}" if term.order else ""
     return f"{names.get(term.key, term.key)}{'_' if term.axis else ''}{term.axis}{order}"
 

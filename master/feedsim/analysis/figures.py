@@ -108,3 +108,9 @@ def last_outside(time: Array, deviation: Array, band: float) -> float:
     edge = math.copysign(band, deviation[k])
     share = (deviation[k] - edge) / (deviation[k] - deviation[k + 1])
     return float(time[k] + share * (time[k + 1] - time[k]))
+
+
+def averaged(values: Array, count: int) -> Array:
+    """Mean over ``count`` neighbours; fewer at the ends."""
+    ones = np.ones(min(count, len(values)))
+    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))

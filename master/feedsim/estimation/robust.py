@@ -23,6 +23,7 @@ MAX_REWEIGHTINGS = 6
 HARMONICS = 3
 # Of normal noise the costs bend by 0.87 of what the weights say.
 LEAST_CURVATURE = 0.5
+MAX_SCALE = 1e6  # of a variance by samples over one by blocks, of which each has fewer samples by far
 CHANGE_FLOOR = 1e-13  # changes of a term below this [m] are rounding
 
 
@@ -37,15 +38,16 @@ class Robust(NamedTuple):
     shared: float
 
 
-def robust_fit(matrix: Array, deviation: Array, spread: Array, blocks: Array) -> Robust:
+def robust_fit(matrix: Array, deviation: Array, spread: Array, blocks: Array, floor: float = 0.0) -> Robust:
     """Values by least squares, each sample weighted by how well it fits.
 
-    spread: how large the last values may be (T,) [m], what is known of them beforehand; the others are free.
+    spread: how large the last values may be (T,) [m], what is known of them beforehand; the others are free. floor:
+    what a sample is worth at best beside that [m], as no model is exact.
     """
     weights = slopes = np.ones(len(deviation))
     known = _known(matrix, spread)
     _, block = np.unique(blocks, return_inverse=True) if len(spread) else (0, np.empty(0, dtype=np.int64))
-    shared = 0.0
+    shared = floor
     for _ in range(MAX_REWEIGHTINGS):
         normal = matrix.T @ (weights[:, None] * matrix) + shared**2 * known
         values = np.linalg.lstsq(normal, matrix.T @ (weights * deviation), rcond=None)[0]
@@ -55,7 +57,7 @@ def robust_fit(matrix: Array, deviation: Array, spread: Array, blocks: Array) ->
             break
         if len(spread):
             sums = np.bincount(block, np.clip(off, -BIWEIGHT * noise, BIWEIGHT * noise))
-            shared = max(noise, math.sqrt(float(sums @ sums) / len(off)))
+            shared = max(noise, math.sqrt(float(sums @ sums) / len(off)), floor)
         inner = np.clip(1 - (off / (BIWEIGHT * noise)) ** 2, 0.0, None)
         settled = float(np.abs(inner**2 - weights).max()) < 0.01
         weights, slopes = inner**2, inner * (5 * inner - 4)
@@ -141,7 +143,8 @@ def covariance_of(
     free = max(int(block.max()) + 1 - matrix.shape[1] + len(spread), 2)
     single = covariance.of_samples(matrix, influence)
     blockwise = covariance.of_blocks(matrix, influence, block, free)
-    scale = np.sqrt(np.maximum(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0))
+    # Of what is known beforehand alone, both are rounding.
+    scale = np.sqrt(np.clip(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0, MAX_SCALE))
     besides = robust.shared**2 * covariance.inverse @ known @ covariance.inverse
     if rounded.shape[1]:
         moved = covariance.inverse @ (matrix.T @ (robust.weights[:, None] * rounded))

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.cogging import fitted, without
-from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
-from feedsim.analysis.circle.model import Fit
+from feedsim.analysis.circle.geometry import ANGLES, CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.model import ESSENTIAL, Fit
 from feedsim.analysis.circle.setup import Offset
-from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
-from feedsim.analysis.figures import Array
+from feedsim.analysis.circle.vibration import Vibration, vibrations
+from feedsim.analysis.circularity import fitted_centre
+from feedsim.analysis.figures import Array, averaged
 from feedsim.estimation.interval import shows
+from feedsim.estimation.robust import CHANGE_FLOOR
 
 # A peak is seen where its mean over this angle [deg], or over half of it again and again down to the least count of
 # samples, exceeds this multiple of what noise makes of such means and of the fitted rest below them, and that multiple
@@ -26,8 +28,11 @@ PEAK_ANGLE, MIN_PEAK_SAMPLES, PEAK_SIGMAS, OFF_REVERSAL_RATIO, CHANCE_SHARE = 1.
 # Noise may change a height by this share: over so many samples it is averaged, and no more; nor over more than half of
 # the angle in which the peak falls to half its height on its steeper side, which would take from its height.
 BLUR = 0.015
+ANGLE_SIGMAS = 2.0  # of what written angles may be off by, behind a reversal, within which a step is no peak
 DEVIATION_FLOOR = 1e-9  # a deviation of less [m] is not worth a word
 FORM = (3, 4, 5)
+# Terms of which half an interval is as large as this [m] are not separated from this correlation on.
+TRADES, UNSEPARATED = 0.9, 0.5e-6
 SECTORS = 36  # of a turn, over whose means turns of one sense are compared
 
 
@@ -38,9 +43,11 @@ class Term:
     Attributes:
         key: "offset", "radius", "scale", "squareness", "servo", "squareness_or_servo", "lost_motion", "peaks", "pitch",
             "cogging" or "rest"; of records besides "straightness" (of second order), "third" (straightness of third
-            order, that of the first axis less that of the second), "drift" and "centres" (of both directions).
+            order, that of the first axis less that of the second), "drift", "centres" and "radii" (of both directions,
+            or of two turns in one).
         axis: the one it belongs to; "" where to the pair.
-        value: in ``unit`` (SI); scale, servo: what the first axis travels further, answers later than the second.
+        value: in ``unit`` (SI); scale, servo: what the first axis travels further, answers later than the second;
+            radii: what that of counterclockwise turns is larger. NaN where an arc does not determine it.
         half: half of its interval of 95 %; NaN where it has none.
         size: difference of the largest and the smallest radial deviation that it makes alone [m].
         share: of G: what it contributes where the deviation is largest, less where it is smallest, over G [1].
@@ -63,6 +70,11 @@ class Term:
         """Whether it differs from zero by more than its interval and rounding."""
         size = abs(self.value) if self.key == "radius" else self.size
         return size > DEVIATION_FLOOR and shows(self.value, self.half)
+
+    @property
+    def determined(self) -> bool:
+        """Whether there is a value."""
+        return math.isfinite(self.value)
 
 
 @dataclass(frozen=True)
@@ -89,7 +101,8 @@ class Diagnosis:
 
     Attributes:
         circle, senses: what was tested, and in which senses.
-        G: largest less smallest radial deviation of all turns [m].
+        arc: the angle that arcs cover [rad]; None of full turns.
+        G: largest less smallest radial deviation of all turns [m]; of arcs that about the circle that fits them.
         terms: those that are separated from zero first, by how much G falls without them, then by their size.
         peaks: of all reversals, in the order of the turns.
         vibrations: the strongest of each axis that stands out, of the radius where only that is known.
@@ -102,11 +115,13 @@ class Diagnosis:
         apart: how far turns of one sense contradict each other, from peak to valley [m]; 0 where each is the only one.
         angles: by how much the written angles of a record are larger than the machine's; None where it is none.
         hidden: part of the squareness's interval that guides bent in third order make [rad].
+        unseparated: of the centre, the radius and the ellipse, the keys of terms that arcs do not separate from others.
         rest: of every turn, what the model says without peaks: angle (N,) [rad], deviation (N,) [m].
     """
 
     circle: CircleUnderTest
     senses: tuple[int, ...]
+    arc: float | None
     G: float
     terms: tuple[Term, ...]
     peaks: tuple[Peak, ...]
@@ -120,6 +135,7 @@ class Diagnosis:
     apart: float
     angles: Offset | None
     hidden: float
+    unseparated: tuple[str, ...]
     rest: tuple[tuple[Array, Array], ...]
 
     def __getitem__(self, key: str) -> Term:
@@ -133,6 +149,10 @@ class Diagnosis:
     def vibration(self) -> Vibration | None:
         """The strongest; None where none stands out."""
         return self.vibrations[0] if self.vibrations else None
+
+    def reverses(self, axis: str) -> bool:
+        """Whether an axis reverses on the paths."""
+        return any(peak.axis == axis for peak in self.peaks)
 
     @property
     def both(self) -> bool:
@@ -159,10 +179,19 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         total = [e - part for e, part in zip(total, offset, strict=True)]
     e = np.concatenate(total)
     parts = {key: np.concatenate(part) for key, part in curves.items()}
+    peaks = tuple(peak for k, path in enumerate(paths) for peak in _peaks(circle, fit, k, path))
+    arc = None if all(path.whole for path in paths) else min(path.covered for path in paths)
+    terms = []
+    if arc is not None:
+        e, parts = _about_their_circle(np.concatenate([path.angle for path in paths]), e, parts)
+        for name in list(parts):
+            key, _, axis = name.partition(" ")
+            value, half, unit = _value(circle, fit, peaks, key, axis)
+            if math.isnan(value):
+                terms.append(Term(key, axis, value, half, unit, 0.0, 0.0))
+                del parts[name]
     parts["rest "] = e - sum(parts.values())
     G, high, low = float(np.ptp(e)), int(e.argmax()), int(e.argmin())
-    peaks = tuple(peak for k, path in enumerate(paths) for peak in _peaks(circle, fit, k, path.sense))
-    terms = []
     for name, part in parts.items():
         key, _, axis = name.partition(" ")
         order = 0
@@ -182,6 +211,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     return Diagnosis(
         circle=circle,
         senses=tuple(path.sense for path in paths),
+        arc=arc,
         G=G,
         terms=tuple(
             sorted(
@@ -200,12 +230,30 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         form=_form(fit),
         noise=fit.noise,
         left_out=fit.left_out,
-        centre=(fit["offset_0"], fit["offset_1"]),
+        centre=(fit["offset_0"], fit["offset_1"]) if arc is None else _centre(circle, paths),
         apart=_apart(paths),
         angles=fit.offset,
         hidden=2 / circle.radius * fit.hidden,
+        unseparated=() if arc is None else _unseparated(fit),
         rest=tuple((path.angle, path.deviation - residual) for path, residual in zip(paths, fit.residual, strict=True)),
     )
+
+
+def _about_their_circle(angle: Array, e: Array, parts: Mapping[str, Array]) -> tuple[Array, dict[str, Array]]:
+    """Deviations of arcs, and what each term makes of them (N,) [m], about the circle that fits them.
+
+    An arc shows centre and radius badly, and terms that cancel one another in them would all look large.
+    """
+    circle = np.linalg.qr(np.column_stack([np.ones(len(angle)), np.cos(angle), np.sin(angle)]))[0]
+    about, *shapes = (values - circle @ (circle.T @ values) for values in (e, *parts.values()))
+    return about, dict(zip(parts, shapes, strict=True))
+
+
+def _centre(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[float, float]:
+    """Of the circle that fits arcs, from the programmed one [m]."""
+    angle, deviation = (np.concatenate(values) for values in zip(*((p.angle, p.deviation) for p in paths), strict=True))
+    x, y = fitted_centre(angle, deviation, circle.radius).tolist()
+    return x, y
 
 
 def _lag(circle: CircleUnderTest) -> float | None:
@@ -253,8 +301,9 @@ def _set_up(circle: CircleUnderTest, made: Mapping[str, Array]) -> dict[str, Arr
     """What only records have: bent guides, and a centre that moves."""
     named = {f"straightness {axis}": made[f"bend_{i}"] for i, axis in enumerate(circle.axes)}
     named |= {"third ": made["third"], "drift ": made["drift_0"] + made["drift_1"]}
-    if any(name.startswith("centre_") for name in made):
-        named["centres "] = np.sum([curve for name, curve in made.items() if name.startswith("centre_")], axis=0)
+    for key, stem in (("centres ", "centre_"), ("radii ", "radius_")):
+        if several := [curve for name, curve in made.items() if name.startswith(stem)]:
+            named[key] = np.sum(several, axis=0)
     return named
 
 
@@ -267,8 +316,8 @@ def _value(circle: CircleUnderTest, fit: Fit, peaks: Sequence[Peak], key: str, a
     """Value of a term, half of its interval, and their unit."""
     number = circle.axes.index(axis) if axis else 0
     if key == "peaks":
-        own = max((peak for peak in peaks if peak.axis == axis), key=lambda peak: abs(peak.height))
-        return own.height, own.half, "m"
+        own = max((peak for peak in peaks if peak.axis == axis), key=lambda peak: abs(peak.height), default=None)
+        return (own.height, own.half, "m") if own else (math.nan, math.nan, "m")
     if key == "rest":
         return math.nan, math.nan, "m"
     names, factor, unit = {
@@ -284,21 +333,18 @@ def _value(circle: CircleUnderTest, fit: Fit, peaks: Sequence[Peak], key: str, a
         "third": (("third",), 1.0, "m"),
         "drift": (("drift_0", "drift_1"), 1.0, "m"),
         "centres": ((f"centre_{_other(fit)}_0", f"centre_{_other(fit)}_1"), 1.0, "m"),
+        "radii": ((f"radius_{_other(fit)}",), -float(fit.senses[0]), "m"),
     }[key]
+    if not fit.determined(*names):
+        return math.nan, math.nan, unit
     value = math.hypot(fit[names[0]], fit[names[1]]) if len(names) == 2 else fit[names[0]]
-    return factor * value, factor * fit.half(*names), unit
+    return factor * value, abs(factor) * fit.half(*names), unit
 
 
-def _peaks(circle: CircleUnderTest, fit: Fit, k: int, sense: int) -> list[Peak]:
+def _peaks(circle: CircleUnderTest, fit: Fit, k: int, path: TurnedPath) -> list[Peak]:
     """What stands out behind every reversal of path ``k``."""
-    rate = circle.speed / circle.radius
-    calm = _Calm(fit, k, sense)
-    per_sample = 2 * math.pi / len(fit.angle[k])
-    wide = max(1, round(math.radians(PEAK_ANGLE) / per_sample))
-    counts = [wide]
-    while counts[-1] // 2 >= MIN_PEAK_SAMPLES:
-        counts.append(counts[-1] // 2)
-    levels = {count: calm.level(count) for count in counts}
+    sense, per_sample = path.sense, path.covered / len(fit.angle[k])
+    calm = _Calm(fit, k, sense, max(1, round(math.radians(PEAK_ANGLE) / per_sample)))
     ellipse = math.hypot(fit["scale"], fit["squareness"] + sense * fit["servo"]) / circle.radius
     peaks = []
     for which in range(4):
@@ -307,34 +353,45 @@ def _peaks(circle: CircleUnderTest, fit: Fit, k: int, sense: int) -> list[Peak]:
         nothing = Peak(name, axis, sense, 0.0, math.nan, which * math.pi / 2, math.nan, math.nan)
         own = np.flatnonzero(fit.reversal[k] == which)
         own = own[np.argsort(fit.since[k][own])]
+        if not path.whole and not (len(own) and fit.since[k][own[0]] < 0):  # an arc on which the axis does not reverse
+            continue
         # Between two samples nobody knows on which side of a step of lost motion one is; nor within the angle from the
         # point that is given to the one that an ellipse makes of it, as instruments write the one or the other.
-        own = own[np.abs(fit.since[k][own]) > 1.5 * per_sample + ellipse]
-        if len(own) < 5 * wide:
-            peaks.append(nothing)
-            continue
-        since, off = fit.since[k][own], fit.residual[k][own]
-        clear, count = _clearest(off, levels)
-        if clear < 1:
-            peaks.append(replace(nothing, half=levels[wide]))
-            continue
-        curve, at, count = _sharpened(off, count, fit.noise)
-        height = float(curve[at])
-        # What averaging over as much again takes from it is not less than what averaging has taken already.
-        blur = float(averaged(off, 2 * count)[at]) - height if count > 1 else 0.0
-        relative = curve / height
-        begin, end = _falls(since, relative, at, 0.5, -1), _falls(since, relative, at, 0.5, 1)
-        peaks.append(
-            replace(
-                nothing,
-                height=height,
-                half=math.hypot(fit.quantile * calm.spread(count), blur),
-                angle=float(fit.angle[k][own[at]]) + (fit.offset.angle if fit.offset else 0.0),
-                width=float(end - begin) / rate,
-                decay=float(_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
-            )
-        )
+        near = 1.5 * per_sample + ellipse
+        peak = _peak(circle, fit, k, nothing, own[np.abs(fit.since[k][own]) > near], calm)
+        if fit.offset is not None and peak.height:
+            # Nor within what written angles may be off by: there a step looks like a peak of either sign.
+            near += ANGLE_SIGMAS * fit.offset.at_reversals[which]
+            off = _peak(circle, fit, k, nothing, own[np.abs(fit.since[k][own]) > near], calm).height
+            peak = replace(peak, half=max(peak.half, abs(peak.height - off)))
+            if off * peak.height <= 0:
+                peak = replace(nothing, half=peak.half)
+        peaks.append(peak)
     return peaks
+
+
+def _peak(circle: CircleUnderTest, fit: Fit, k: int, nothing: Peak, own: NDArray[np.intp], calm: _Calm) -> Peak:
+    """What stands out in the samples ``own`` of path ``k``, in their order; nothing: where that is none."""
+    if len(own) < 5 * calm.wide:
+        return nothing
+    since, off = fit.since[k][own], fit.residual[k][own]
+    clear, count = _clearest(off, calm.levels)
+    if clear < 1:
+        return replace(nothing, half=calm.levels[calm.wide])
+    curve, at, count = _sharpened(off, count, fit.noise)
+    height = float(curve[at])
+    # What averaging over as much again takes from it is not less than what averaging has taken already.
+    blur = float(averaged(off, 2 * count)[at]) - height if count > 1 else 0.0
+    relative, rate = curve / height, circle.speed / circle.radius
+    begin, end = _falls(since, relative, at, 0.5, -1), _falls(since, relative, at, 0.5, 1)
+    return replace(
+        nothing,
+        height=height,
+        half=math.hypot(fit.quantile * calm.spread(count), blur),
+        angle=float(fit.angle[k][own[at]]) + (fit.offset.angle if fit.offset else 0.0),
+        width=float(end - begin) / rate,
+        decay=float(_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
+    )
 
 
 def _clearest(off: Array, levels: Mapping[int, float]) -> tuple[float, int]:
@@ -373,19 +430,26 @@ def _top(off: Array, count: int) -> tuple[Array, int]:
 
 
 class _Calm:
-    """Means of neighbouring samples of path ``k`` where no axis reverses: what those behind a reversal compare with."""
+    """Means of neighbouring samples of path ``k`` where no axis reverses: what those behind a reversal compare with.
 
-    def __init__(self, fit: Fit, k: int, sense: int) -> None:
+    wide: over how many samples at most. levels: number of samples -> what such a mean must exceed to be a peak [m].
+    """
+
+    def __init__(self, fit: Fit, k: int, sense: int, wide: int) -> None:
         order = np.argsort(sense * fit.angle[k])
         self._off, self._free = fit.residual[k][order], (fit.reversal[k] < 0)[order]
         self._noise, self._rest = fit.noise, fit.rest_error
+        self.wide, counts = wide, [wide]
+        while counts[-1] // 2 >= MIN_PEAK_SAMPLES:
+            counts.append(counts[-1] // 2)
+        self.levels = {count: self._level(count) for count in counts}
 
     def spread(self, count: int) -> float:
         """Standard deviation of a mean over ``count`` samples behind a reversal [m]."""
         scatter = float(np.sqrt(np.mean(self._means(count) ** 2)))
         return math.hypot(max(self._noise / math.sqrt(count), scatter), self._rest)
 
-    def level(self, count: int) -> float:
+    def _level(self, count: int) -> float:
         """What such a mean must exceed to be a peak [m]; noise does not, nor what swings all the way round."""
         usual = float(np.quantile(np.abs(self._means(count)), 1 - CHANCE_SHARE))
         return max(
@@ -419,22 +483,44 @@ def _apart(paths: Sequence[TurnedPath]) -> float:
     Without its mean and its first order: the centre and the radius may drift from one turn to the next.
     """
     worst = 0.0
+    middle = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS) - math.pi
+    circle = np.column_stack([np.ones(SECTORS), np.cos(middle), np.sin(middle)])
     for one, other in combinations(paths, 2):
-        if one.sense == other.sense:
-            orders = np.fft.rfft(_coarse(one) - _coarse(other))
-            orders[:2] = 0
-            worst = max(worst, float(np.ptp(np.fft.irfft(orders, SECTORS))))
+        apart = _coarse(one) - _coarse(other)
+        of_both = np.isfinite(apart)
+        if one.sense == other.sense and of_both.sum() > circle.shape[1]:
+            apart, columns = apart[of_both], circle[of_both]
+            worst = max(worst, float(np.ptp(apart - columns @ np.linalg.lstsq(columns, apart, rcond=None)[0])))
     return worst
 
 
 def _coarse(path: TurnedPath) -> Array:
-    """Mean deviation in each of SECTORS of a turn (SECTORS,) [m]; 0 where there is no sample."""
+    """Mean deviation in each of SECTORS of a turn (SECTORS,) [m]; NaN where there is no sample."""
     part = np.floor((path.angle / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS
-    return np.bincount(part, path.deviation, SECTORS) / np.maximum(np.bincount(part, minlength=SECTORS), 1)
+    count = np.bincount(part, minlength=SECTORS)
+    return np.where(count > 0, np.bincount(part, path.deviation, SECTORS) / np.maximum(count, 1), math.nan)
+
+
+def _unseparated(fit: Fit) -> tuple[str, ...]:
+    """Keys of terms that trade with others: what the arcs leave of their correlations."""
+    spread = np.sqrt(np.maximum(np.diag(fit.covariance), CHANGE_FLOOR**2))
+    correlation = np.abs(fit.covariance / np.outer(spread, spread)) - np.eye(len(spread))
+    keys = {"offset_0": "offset", "offset_1": "offset"}
+    if "servo" not in fit.names:
+        keys["squareness"] = "squareness_or_servo"
+    lengths = [name not in ANGLES for name in fit.names]
+    rows = [
+        row
+        for row, name in enumerate(fit.names)
+        if name in ESSENTIAL and correlation[row, lengths].max() > TRADES and fit.half(name) > UNSEPARATED
+    ]
+    return tuple(dict.fromkeys(keys.get(fit.names[row], fit.names[row]) for row in rows))
 
 
 def _form(fit: Fit) -> dict[int, float]:
-    """Amplitude of the orders of FORM in what remains outside the windows [m]."""
+    """Amplitude of the orders of FORM in what remains outside the windows [m]; none of arcs, which mix them."""
+    if not fit.whole:
+        return {}
     free: list[NDArray[np.bool_]] = [which < 0 for which in fit.reversal]
     angle = np.concatenate([a[keep] for a, keep in zip(fit.angle, free, strict=True)])
     off = np.concatenate([r[keep] for r, keep in zip(fit.residual, free, strict=True)])

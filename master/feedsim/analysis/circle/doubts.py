@@ -183,7 +183,7 @@ def _step(values: Array) -> float:
     return step if float(np.abs(counts - np.round(counts)).max()) < 0.05 and len(steps) < 0.9 * len(values) else 0.0
 
 
-def _longest(same: NDArray[np.bool_]) -> tuple[int, int]:
+def longest_run(same: NDArray[np.bool_]) -> tuple[int, int]:
     """First row and length of the longest run of true."""
     edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(int)))
     if not edges.size:
@@ -195,7 +195,7 @@ def _longest(same: NDArray[np.bool_]) -> tuple[int, int]:
 
 def _clipped_position(axis: str, values: Array, other: Array, radius: float, step: float) -> Iterator[str]:
     for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
-        first, length = _longest(np.abs(values - end) <= FINEST)
+        first, length = longest_run(np.abs(values - end) <= FINEST)
         rows = slice(first, first + length)
         moves = np.sqrt(np.maximum(radius**2 - other[rows] ** 2, 0.0))
         if length >= STILL and (gone := float(np.ptp(moves))) > max(MOVED * step, 1e-6):
@@ -208,7 +208,7 @@ def _clipped_position(axis: str, values: Array, other: Array, radius: float, ste
 def _clipped_deviation(values: Array) -> Iterator[str]:
     for end, word, inner in ((float(values.max()), "largest", -1), (float(values.min()), "smallest", 1)):
         same = np.abs(values - end) <= FINEST
-        _, length = _longest(same)
+        _, length = longest_run(same)
         levels, counts = np.unique(values, return_counts=True)
         beside = counts[-6:-1] if inner < 0 else counts[1:6]
         if length >= STILL and len(levels) > 2 * STILL and same.sum() > 5 * np.median(beside):

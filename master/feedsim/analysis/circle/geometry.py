@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ PITCHES, FEWEST_PITCHES = 2.0, 0.5
 COURSE_POINTS = 1024
 # More samples of a turn add nothing to its shape.
 MAX_TURN_SAMPLES = 8000
+ANGLES = ("angle", "angle_cos", "angle_sin")  # terms that written angles may be larger by
+# A full turn may lack this share of it; files often end one sample ahead of the full turn.
+CLOSED = 0.01
 
 
 @dataclass(frozen=True)
@@ -48,8 +52,9 @@ class CircleUnderTest:
     response: Callable[[str, Array], NDArray[np.complex128]] | None = None
 
 
-# Displacements for 1 m of a term that follow from time and turn alone: name -> number of the axis, (N,) [m].
-Moved = Mapping[str, tuple[int, Array]]
+# What moves the points of a path for 1 m of a term, as it follows from time and turn alone: name -> number of the axis,
+# None where the radius grows, and the displacement (N,) [m].
+Moved = Mapping[str, tuple[int | None, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,18 +63,37 @@ class TurnedPath:
     (N,) [m], and its sense, +1 from the first axis towards the second, else -1. In the order of the motion.
 
     phase: where both axes' positions were measured over time, the angle by which the motion has turned (N,) [rad], from
-    0 on."""
+    0 on. clock: the same angle where an instrument has written an angle over time.
+    """
 
     angle: Array
     deviation: Array
     sense: int
     phase: Array | None = None
+    clock: Array | None = None
 
     def thinned(self) -> TurnedPath:
         """At most MAX_TURN_SAMPLES samples, evenly chosen."""
         step = -(-len(self.angle) // MAX_TURN_SAMPLES)
-        phase = None if self.phase is None else self.phase[::step]
-        return TurnedPath(self.angle[::step], self.deviation[::step], self.sense, phase)
+        phase, clock = (None if turned is None else turned[::step] for turned in (self.phase, self.clock))
+        return TurnedPath(self.angle[::step], self.deviation[::step], self.sense, phase, clock)
+
+    @cached_property
+    def turned(self) -> Array:
+        """The angle by which the path has turned (N,) [rad], by its angles."""
+        turned = self.sense * np.unwrap(self.angle)
+        return np.asarray(turned - turned[0])
+
+    @cached_property
+    def covered(self) -> float:
+        """The angle of the path [rad]: 2 pi of a full turn, less of an arc."""
+        covered = float(self.turned[-1])
+        return 2 * math.pi if covered > 2 * math.pi * (1 - CLOSED) else covered
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is a full turn."""
+        return self.covered == 2 * math.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +138,8 @@ def undo(
 ) -> Undone:
     """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse.
 
-    values: of the terms [m], and "angle", by which the written angles are larger [rad]. by_program: its angles are the
-    programmed ones, unless both axes' positions were measured. moved: what moved the centre.
+    values: of the terms [m]. by_program: its angles are the programmed ones, unless both axes' positions were measured.
+    moved: what moved the centre, and the radius.
     """
 
     def of(name: str) -> float:
@@ -127,23 +151,34 @@ def undo(
     # An axis is at its extreme where its row of the distortion points along u.
     turned = (math.atan2(q, 1 + r + k), math.atan2(1 + r - k, q))
     centre = np.array([[of("offset_0")], [of("offset_1")]])
-    angle = path.angle - of("angle")
+    angle = path.angle - sum(of(name) / circle.radius * wave for name, wave in angle_waves(path).items())
+    grown = sum(of(name) * change for name, (axis, change) in moved.items() if axis is None)
+    deviation = path.deviation - grown
+    ways = {name: (axis, way) for name, (axis, way) in moved.items() if axis is not None}
     if by_program and path.phase is None:
         programmed = circle.radius * np.array([np.cos(angle), np.sin(angle)])
         p = centre + distortion @ programmed
         own = displacements(circle, angle, programmed, path.sense, (0, math.pi / 2), values)
-        for name, (axis, displacement) in (own | dict(moved)).items():
+        for name, (axis, displacement) in (own | ways).items():
             p[axis] += of(name) * displacement
         angle = np.arctan2(p[1], p[0])
-    positions = (circle.radius + path.deviation) * np.array([np.cos(angle), np.sin(angle)])
+    positions = (circle.radius + deviation) * np.array([np.cos(angle), np.sin(angle)])
     p = positions - centre
     angle = np.arctan2(p[1], p[0])
     own = displacements(circle, angle, positions, path.sense, turned, values)
-    for name, (axis, displacement) in (own | dict(moved)).items():
+    for name, (axis, displacement) in (own | ways).items():
         p[axis] -= of(name) * displacement
     plain = np.linalg.solve(distortion, p)
     radius = np.hypot(plain[0], plain[1])
     return Undone(positions, np.arctan2(plain[1], plain[0]), radius - circle.radius, turned, moved)
+
+
+def angle_waves(path: TurnedPath) -> dict[str, Array]:
+    """What written angles may be larger by, 1 rad of each (N,): a constant, and what an axle of the instrument makes
+    that lies off its centre. Positions of both axes give the angle without such an axle."""
+    axle = 0.0 if path.phase is not None else 1.0
+    waves = np.ones(len(path.angle)), axle * np.cos(path.angle), axle * np.sin(path.angle)
+    return dict(zip(ANGLES, waves, strict=True))
 
 
 def displacements(
@@ -177,14 +212,40 @@ def displacements(
 
 
 def columns_of(
-    circle: CircleUnderTest, undone: Undone, sense: int, both: bool, values: Mapping[str, float]
+    circle: CircleUnderTest, path: TurnedPath, undone: Undone, both: bool, values: Mapping[str, float]
 ) -> dict[str, Array]:
     """Radial deviation for 1 m of every term; ``both`` senses are there to separate a delay from an angle."""
-    angle = undone.angle
+    angle, sense = undone.angle, path.sense
     along = np.cos(angle), np.sin(angle)
     result = {"offset_0": along[0], "offset_1": along[1], "radius": np.ones_like(angle), "scale": np.cos(2 * angle)}
     result["squareness"] = np.sin(2 * angle)
     if both:
         result["servo"] = sense * np.sin(2 * angle)
     moved = displacements(circle, angle, undone.positions, sense, undone.turned, values) | dict(undone.moved)
-    return result | {name: along[axis] * displacement for name, (axis, displacement) in moved.items()}
+    result |= {
+        name: displacement if axis is None else along[axis] * displacement
+        for name, (axis, displacement) in moved.items()
+    }
+    if circle.recorded:
+        slope = _slope(circle, sense, result, values)
+        result |= {name: -slope / circle.radius * wave for name, wave in angle_waves(path).items()}
+    return result
+
+
+def _slope(circle: CircleUnderTest, sense: int, columns: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+    """How the radial deviation changes with the angle by what is steepest of the model (N,) [m/rad]: the centre, the
+    ellipse and errors that repeat with a pitch."""
+
+    def of(name: str) -> float:
+        return values.get(name, 0.0)
+
+    cos, sin = columns["offset_0"], columns["offset_1"]
+    q = of("squareness") + sense * of("servo")
+    slope = of("offset_1") * cos - of("offset_0") * sin
+    slope += 2 * (q * columns["scale"] - of("scale") * columns["squareness"])
+    for i, way in enumerate((-sin, cos)):
+        if f"pitch_{i}_cos" in columns:
+            a, b = f"pitch_{i}_cos", f"pitch_{i}_sin"
+            rate = 2 * math.pi * circle.radius / circle.pitch[circle.axes[i]]
+            slope += rate * way * (of(b) * columns[a] - of(a) * columns[b])
+    return np.asarray(slope)

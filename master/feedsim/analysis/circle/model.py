@@ -30,12 +30,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import (
+    ANGLES,
     FEWEST_PITCHES,
     PITCHES,
     PLAY,
@@ -47,7 +49,7 @@ from feedsim.analysis.circle.geometry import (
     enough_pitches,
     undo,
 )
-from feedsim.analysis.circle.setup import Offset, angle_offset, centre_moves
+from feedsim.analysis.circle.setup import Offset, angle_offset, axle_by_clock, form_waves, set_up_moves
 from feedsim.analysis.circle.tails import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.figures import Array
 from feedsim.estimation.interval import pair_quantile, student
@@ -67,7 +69,8 @@ BLOCK_ANGLE = 6.0
 KNOWN = 0.1
 # Before it slides, friction is elastic, and no step at all: of a peak this share may look like lost motion. Between the
 # reversals it changes with the speed: of the largest peak this share may look like any term.
-WOUND, SPEED_SHARE = 0.02, 0.005
+# Where nothing is known of the drive, what winds up beside a peak may be this share of it.
+WOUND, SPEED_SHARE, UNKNOWN_WOUND = 0.02, 0.005, 0.1
 # Time in which a control that nobody knows lets a peak of friction fall to 1/e, or sooner [s].
 SETTLES = 0.05
 MAX_WINDOW_PASSES = 6
@@ -78,6 +81,11 @@ CLEAR_NOISE = 20e-9
 # Neither of two models need be right: a term may be off by so much of their difference, as a standard deviation.
 MODEL_DIFFERENCE_FACTOR = 1.5
 REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
+# Other terms than these an arc may not separate from them: what they may make of these is in the intervals, as large as
+# they may be (standard deviation) [m].
+ESSENTIAL, ARC_SPREAD = ("offset_0", "offset_1", "radius", "scale", "squareness", "servo"), 5e-6
+# Of that an arc leaves less where it shows such a term; and what the model leaves of any circle [m].
+KNOWN_SHARE, MODEL_ERROR = 0.5, 20e-9
 # The angle that is programmed and the one where the machine is differ by more than rounding from this deviation [m] on.
 PROGRAMMED_TOLERANCE = 5e-9
 
@@ -99,7 +107,7 @@ class Fit:
         left_out: pitch errors that the circle is too small for. senses: of the paths.
         wound: lost motion that friction at rest may make by itself, of "lost_0" and "lost_1" [m].
         unsure: what a term may be off by as the loops' response is not known better [m].
-        offset: of the written angles; None where they are those of the machine's own scales.
+        offset: of the written angles; None where they are those of the machine's own scales. whole: no path is an arc.
         tails: of every path, the columns of which ``tail`` is the sum (N, T).
     """
 
@@ -122,6 +130,7 @@ class Fit:
     offset: Offset | None = None
     tails: tuple[Array, ...] = ()
     free: int = 2
+    whole: bool = True
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
@@ -148,6 +157,13 @@ class Fit:
         zero = len(rows) == 2 and length < pair_quantile(self.free) * half / self.quantile
         return max(half, length) if zero else half
 
+    def determined(self, *names: str) -> bool:
+        """Whether the paths show a term, or an amplitude with two parts, at all: of arcs some are known beforehand."""
+        if self.whole or set(names) <= set(ESSENTIAL):
+            return True
+        rows = [self.names.index(name) for name in names]
+        return float(np.diag(self.covariance)[rows].max()) < (KNOWN_SHARE * ARC_SPREAD) ** 2
+
     @property
     def hidden(self) -> float:
         """What guides that are bent in third order may add to the squareness [m]; their sum does not show."""
@@ -165,26 +181,26 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     both which leaves less is taken.
     """
     if not circle.recorded:
-        return _told(circle, paths, 0.0)
-    wide = _fit(circle, paths, Left(*np.radians(EDGE_SEARCH_ANGLES)), Shape())
+        return _told(circle, paths, {})
+    still = dict.fromkeys(ANGLES, (0.0, CHANGE_FLOOR))
+    wide = _fit(circle, paths, Left(*np.radians(EDGE_SEARCH_ANGLES)), Shape(known=still))
     lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
     signals = [residual + step for residual, step in zip(wide.residual, lost, strict=True)]
-    offset = angle_offset(paths, wide.angle, signals, [which < 0 for which in wide.reversal])
-    result = _told(circle, paths, offset.angle)
-    # What the angles may be off by moves every term that turns with them.
-    more, less = (_told(circle, paths, offset.angle + side * offset.deviation) for side in (1, -1))
-    moved = np.array([(more[name] - less[name]) / 2 for name in result.names])
-    return replace(result, covariance=result.covariance + np.outer(moved, moved), offset=offset)
+    axle = axle_by_clock(paths, np.array([wide["offset_0"], wide["offset_1"]]), circle.radius)
+    offset = angle_offset(paths, wide.angle, signals, [which < 0 for which in wide.reversal], axle)
+    angles = (offset.angle, offset.deviation), *zip(offset.axle, offset.axle_deviation, strict=True)
+    lengths = [(circle.radius * value, circle.radius * deviation) for value, deviation in angles]
+    return replace(_told(circle, paths, dict(zip(still, lengths, strict=True))), offset=offset)
 
 
-def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], angle: float) -> Fit:
-    """With angles that are larger than those of the machine by ``angle`` [rad]."""
-    pitched = _pitched(circle, paths, Shape(angle=angle))
+def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], known: Known) -> Fit:
+    """With what is known of terms beforehand."""
+    pitched = _pitched(circle, paths, Shape(known=known))
     moved = sum(math.hypot(pitched[a], pitched[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
     moved += abs(pitched["squareness"])
     if all(path.phase is not None for path in paths) or moved**2 < circle.radius * PROGRAMMED_TOLERANCE:
         return pitched
-    other = _pitched(circle, paths, Shape(by_program=True, angle=angle))
+    other = _pitched(circle, paths, Shape(by_program=True, known=known))
     return other if other.noise < pitched.noise else pitched
 
 
@@ -195,15 +211,18 @@ class Left(NamedTuple):
     behind: float
 
 
+# What is known of terms beforehand: name -> value and standard deviation [m].
+Known = Mapping[str, tuple[float, float]]
+
+
 class Shape(NamedTuple):
     """by_program: the angles are the programmed ones. play: lost motion is used up first. pitches: errors that repeat
-    with a pitch are fitted even if they do not repeat between two windows. angle: by which the angles are larger than
-    those of the machine [rad]."""
+    with a pitch are fitted even if they do not repeat between two windows. known: of terms, beforehand."""
 
     by_program: bool = False
     play: bool = False
     pitches: bool = False
-    angle: float = 0.0
+    known: Known = MappingProxyType({})
 
 
 def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
@@ -256,7 +275,7 @@ def separating_radius(circle: CircleUnderTest, axes: Sequence[str]) -> float:
 
 def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape: Shape) -> Fit:
     window = out.behind
-    both = len({path.sense for path in paths}) == 2
+    both, whole = len({path.sense for path in paths}) == 2, all(path.whole for path in paths)
     asked = [axis for axis in circle.axes if axis in circle.pitch]
     # Where friction's response reaches far, an error must be seen to repeat between two windows.
     free = math.inf
@@ -269,51 +288,70 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
             axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free and enough_pitches(circle, axis, least)
         },
     )
-    values: dict[str, float] = {"angle": shape.angle} | ({PLAYED: 1.0} if shape.play else {})
-    moves = centre_moves(paths) if circle.recorded else [{} for _ in paths]
+    values = {name: value for name, (value, _) in shape.known.items()} | ({PLAYED: 1.0} if shape.play else {})
+    moves = set_up_moves(paths) if circle.recorded else [{} for _ in paths]
     ends = np.cumsum([len(path.angle) for path in paths])[:-1]
     tails = Tails(np.empty((sum(len(path.angle) for path in paths), 0)), np.empty(0))
     residual: Array = np.empty(0)
     for number in range(MAX_WINDOW_PASSES):
         undone = [undo(circle, path, values, shape.by_program, moved) for path, moved in zip(paths, moves, strict=True)]
-        parts = [columns_of(circle, value, path.sense, both, values) for value, path in zip(undone, paths, strict=True)]
+        parts = [columns_of(circle, path, value, both, values) for value, path in zip(undone, paths, strict=True)]
         windows = [_windows(value, path.sense, out) for value, path in zip(undone, paths, strict=True)]
-        names = tuple(parts[0])
+        arc = [name for name in parts[0] if name not in ESSENTIAL and not whole]
+        beforehand = dict.fromkeys(arc, (0.0, ARC_SPREAD)) | dict(shape.known)
+        names = tuple(sorted(parts[0], key=lambda name: name in beforehand))
+        known = np.array([beforehand[name] for name in names if name in beforehand]).reshape(-1, 2)
         matrix = np.concatenate([np.column_stack([part[name] for name in names]) for part in parts])
         deviation: Array = np.concatenate([entry.deviation for entry in undone])
         which, since = (np.concatenate(window) for window in zip(*windows, strict=True))
         kept = which < 0
         if number == 2:  # the ellipse is undone, so that the windows show the peaks alone
-            usual = _usual([entry.angle for entry in undone], np.split(residual, ends), [free for free, _ in windows])
+            angles, clear = [entry.angle for entry in undone], [reversal < 0 for reversal, _ in windows]
+            usual = _usual(angles, np.split(residual, ends), [reversal for reversal, _ in windows])
             tails = (
                 known_tails(circle, undone, paths, residual, which)
                 if all(axis in circle.drag for axis in circle.axes)
                 else fading_tails(undone, paths, what_is_left(residual, which, since, window, usual), window)
             )
-        fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
-        blocks = blocks_of([entry.angle for entry in undone])[kept] if len(tails.spread) else np.empty(0)
-        robust = robust_fit(fitted, deviation[kept], tails.spread, blocks)
-        step = robust.values[: len(names)]
+            if circle.recorded and whole:
+                waves = form_waves(angles, [path.sense for path in paths], np.split(residual, ends), clear)
+                tails = Tails(np.hstack([tails.columns, waves.columns]), np.concatenate([tails.spread, waves.spread]))
+        # Terms that are known are counted in what is known of them: else an angle looks like nothing beside a length.
+        unit = np.ones(len(names))
+        unit[len(names) - len(known) :] = known[:, 1] / ARC_SPREAD
+        fitted = (np.column_stack([unit * matrix, tails.columns]) if len(tails.spread) else unit * matrix)[kept]
+        spread = np.concatenate([np.full(len(known), ARC_SPREAD), tails.spread])
+        blocks = blocks_of([entry.angle for entry in undone])[kept] if len(spread) else np.empty(0)
+        # What is known is known of a term, not of its change.
+        past = np.zeros(len(names))
+        if len(known):
+            past[-len(known) :] = [values.get(name, 0.0) for name in names[-len(known) :]] - known[:, 0]
+        aim = deviation + matrix @ past if len(known) else deviation
+        robust = robust_fit(fitted, aim[kept], spread, blocks, MODEL_ERROR if len(known) else 0.0)
+        step = unit * robust.values[: len(names)] - past
         values |= {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
         residual = deviation - matrix @ step
         if number > 1 and float(np.abs(step).max()) < CHANGE_FLOOR:
             break
     tail = tails.columns @ robust.values[len(names) :]
     rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
-    covariance, free = covariance_of(
+    covariance, count = covariance_of(
         fitted,
         (residual - tail)[kept],
         robust,
-        tails.spread,
+        spread,
         blocks_of([entry.angle for entry in undone])[kept],
         rounded,
     )
+    wound = WOUND if len(circle.drag) == 2 else 0.0
+    if circle.recorded:  # nobody knows how a peak dies away: what it leaves behind its window looks like lost motion
+        wound = UNKNOWN_WOUND + math.exp(-window * circle.radius / circle.speed / (2 * SETTLES))
     return Fit(
         names=names,
         values=np.array([values[name] for name in names]),
-        covariance=covariance[: len(names), : len(names)],
-        quantile=student(free),
-        free=free,
+        covariance=unit[:, None] * covariance[: len(names), : len(names)] * unit,
+        quantile=student(count),
+        free=count,
         angle=tuple(entry.angle for entry in undone),
         residual=tuple(np.split(residual, ends)),
         reversal=tuple(which for which, _ in windows),
@@ -325,12 +363,13 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         left_out=tuple(axis for axis in asked if not enough_pitches(circle, axis)),
         senses=tuple(path.sense for path in paths),
         wound={
-            f"lost_{i}": WOUND * float(np.abs(residual[(which >= 0) & (which % 2 == i)]).max(initial=0.0))
+            f"lost_{i}": wound * float(np.abs(residual[(which >= 0) & (which % 2 == i)]).max(initial=0.0))
             for i in (0, 1)
-            if len(circle.drag) == 2
+            if wound
         },
         unsure=_unsure(circle, tail[kept], residual[~kept], window),
         tails=tuple(np.split(tails.columns, ends)),
+        whole=whole,
     )
 
 

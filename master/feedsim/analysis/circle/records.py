@@ -2,7 +2,8 @@
 
 A file has either positions of two axes, or angle and radius (or its deviation), of one turn after the other or of both
 directions beside each other. Full turns are found in it by the angle itself: where it turns round, a new direction
-begins; of each stretch the middle turn is taken, so that run-in and run-out stay outside.
+begins; of each stretch the middle turn is taken, so that run-in and run-out stay outside. Where no stretch is a full
+turn, as where a ballbar cannot swing round, arcs are taken, as far as they are driven evenly.
 """
 
 from __future__ import annotations
@@ -14,10 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedsim import units
-from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_feed, unusual_radius
-from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.doubts import (
+    OFF_FEED,
+    check_feed,
+    check_radius,
+    checked,
+    longest_run,
+    unusual_feed,
+    unusual_radius,
+)
+from feedsim.analysis.circle.geometry import CLOSED, CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.header import Told
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
@@ -40,14 +50,18 @@ RADII = ("radius", "r", "length", "ballbar length", "radius length", "rayon")
 LEAST_RADIUS = 1e-3  # [m]; where a name does not say, what is never less is a radius and no deviation
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
-# A full turn may lack this share of it; files often end one sample ahead of the full turn.
-CLOSED = 0.01
 # An axis that moves by less than this share of what the others do rests.
 RESTING = 0.05
 # Turns whose feeds differ by more than this share are of different circles: path lag and peaks grow with the feed.
 SAME_FEED = 0.02
-# A turn needs so many samples for its parts to be separated.
+# A turn needs so many samples for its parts to be separated, an arc its share of them.
 MIN_TURN_SAMPLES = 180
+# An arc below which a centre, a radius and an ellipse look alike [rad]; samples of one are compared with others over
+# this share of it, where it is to be seen whether it is driven evenly, and on the circle.
+MIN_ARC, ARC_PART = math.radians(60), 1 / 64
+# Positions are on an arc where they are off its circle by less than so many times the median of all that are, or by
+# less than this share of its radius; how often that is asked again.
+OFF_ARC, ON_ARC, MAX_ARC_FITS = 5.0, 2e-4, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,9 +261,12 @@ def _of_positions(
     x, y = positions
     _refuse_resting(recording, positions, axes)
     about, mean = fitted_circle(x, y)
-    for _ in range(2):  # the first fit may hold a way to the circle; the second one holds full turns alone
+    on = None
+    if not _whole(np.unwrap(np.arctan2(y - about[1], x - about[0]))):
+        about, on = _arc(x, y)
+    for _ in range(2):  # the first fit may hold a way to the circle; the second one holds turns alone
         u, w = x - about[0], y - about[1]
-        stretches = _turns(np.unwrap(np.arctan2(w, u)), str(recording.path))
+        stretches = _turns(np.unwrap(np.arctan2(w, u)), _time(recording), str(recording.path), on)
         rows = np.concatenate([np.arange(part.start, part.stop) for part, _ in stretches])
         about, mean = fitted_circle(x[rows], y[rows])
     check_radius(str(recording.path), radius, mean)
@@ -258,7 +275,19 @@ def _of_positions(
     nominal = radius if radius is not None else mean
     u, w = x - about[0], y - about[1]
     angle, deviation = np.arctan2(w, u), np.hypot(u, w) - nominal
-    return _named(recording, angle, deviation, _time(recording), nominal, axes), mean
+    return _named(recording, angle, deviation, _time(recording), nominal, axes, on), mean
+
+
+def _arc(x: Array, y: Array) -> tuple[tuple[float, float], NDArray[np.bool_]]:
+    """Centre of the circle that most positions are on, and which are (N,): the ways to an arc and from it are not."""
+    on = np.full(len(x), True)
+    for _ in range(MAX_ARC_FITS):
+        about, radius = fitted_circle(x[on], y[on])
+        off = np.abs(np.hypot(x - about[0], y - about[1]) - radius)
+        before, on = on, off < max(OFF_ARC * float(np.median(off[on])), ON_ARC * radius)
+        if (before == on).all():
+            break
+    return about, on
 
 
 def _refuse_resting(recording: Recording, positions: tuple[Array, Array], axes: tuple[str, str]) -> None:
@@ -332,11 +361,13 @@ def _named(
     time: Array | None,
     radius: float,
     axes: tuple[str, str] | None = None,
+    on: NDArray[np.bool_] | None = None,
 ) -> list[RecordedTurn]:
-    """axes: whose positions were measured; None: the radius alone was. radius: that the deviation is from [m]."""
+    """axes: whose positions were measured; None: the radius alone was. radius: that the deviation is from [m]. on:
+    which rows are on the circle (N,), where it is an arc; None: all."""
     recorded_turns = []
-    for rows, sense in _turns(np.unwrap(angle), str(recording.path)):
-        begin = duration = phase = None
+    for rows, sense in _turns(np.unwrap(angle), time, str(recording.path), on):
+        begin = duration = clock = None
         if time is not None:
             turned = np.abs(np.unwrap(angle[rows]) - angle[rows][0])
             passed = np.interp(np.linspace(0, turned[-1], TURN_PARTS + 1), turned, time[rows])
@@ -349,42 +380,78 @@ def _named(
                 )
             begin = float(time[rows][0])
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
-            phase = (time[rows] - begin) * (2 * math.pi / duration) if axes else None
+            clock = (time[rows] - begin) * (2 * math.pi / duration)
         reported = checked(angle[rows], deviation[rows], radius, axes is not None, axes or ("", ""))
         kept = reported.keep
+        clock = None if clock is None else clock[kept]
         path = TurnedPath(
             (angle[rows][kept] + math.pi) % (2 * math.pi) - math.pi,
             deviation[rows][kept],
             sense,
-            None if phase is None else phase[kept],
+            clock if axes else None,
+            None if axes else clock,
         )
-        name = f"a turn {SENSE_WORDS[sense]}, {rows.stop - rows.start} samples"
+        what = "a turn" if path.whole else f"an arc of {math.degrees(path.covered):.0f} deg"
+        name = f"{what} {SENSE_WORDS[sense]}, {rows.stop - rows.start} samples"
         recorded_turns.append(RecordedTurn(name, path, begin, duration, reported.doubts))
     return recorded_turns
 
 
-def _turns(angle: Array, where: str) -> list[tuple[slice, int]]:
-    """The middle full turn of every stretch in one direction, and its sense. angle: unwrapped (N,) [rad]."""
+def _whole(angle: Array) -> bool:
+    """Whether a stretch in one direction is a full turn. angle: unwrapped (N,) [rad]."""
+    most = max((abs(float(angle[last - 1] - angle[first])) for first, last in _stretches(angle)), default=0.0)
+    return most >= 2 * math.pi * (1 - CLOSED)
+
+
+def _turns(
+    angle: Array, time: Array | None, where: str, on: NDArray[np.bool_] | None = None
+) -> list[tuple[slice, int]]:
+    """The middle full turn of every stretch in one direction, or, where there is none, every stretch that is an arc;
+    and its sense. angle: unwrapped (N,) [rad]; time: (N,) [s]. on: which rows are on the circle (N,); None: all."""
+    whole = _whole(angle)
+    least_angle, most = 2 * math.pi * (1 - CLOSED) if whole else MIN_ARC, 0.0
     result = []
-    most = 0.0
     for first, last in _stretches(angle):
-        covered = abs(float(angle[last - 1] - angle[first]))
-        most = max(most, covered)
-        turns = math.floor(covered / (2 * math.pi) + CLOSED)
-        if turns < 1:
+        if on is not None and not whole:
+            begun, length = longest_run(on[first:last])
+            first, last = first + begun, first + begun + length
+        if last - first < 2:
             continue
         sense = 1 if angle[last - 1] > angle[first] else -1
         turned = np.maximum.accumulate(sense * (angle[first:last] - angle[first]))
-        begin = max((covered - 2 * math.pi) / 2, 0.0)
-        rows = np.flatnonzero((turned >= begin) & (turned < begin + 2 * math.pi))
-        if len(rows) < MIN_TURN_SAMPLES:
-            raise InputError(f"{where}: a turn has {len(rows)} samples; {MIN_TURN_SAMPLES} or more are needed")
+        begin, end = 0.0, float(turned[-1])
+        if whole:
+            begin = max((end - 2 * math.pi) / 2, 0.0)
+            end = min(end, begin + 2 * math.pi)
+        elif time is not None and end >= MIN_ARC:
+            begin, end = _even(turned, time[first:last])
+        most = max(most, end - begin)
+        if end - begin < least_angle:
+            continue
+        inside = turned < end if end == begin + 2 * math.pi else turned <= end
+        rows = np.flatnonzero((turned >= begin) & inside)
+        least = math.ceil(MIN_TURN_SAMPLES * (1.0 if whole else (end - begin) / (2 * math.pi)))
+        if len(rows) < least:
+            what = "a turn" if whole else f"an arc of {math.degrees(end - begin):.0f} deg"
+            raise InputError(f"{where}: {what} has {len(rows)} samples; {least} or more are needed")
         result.append((slice(first + int(rows[0]), first + int(rows[-1]) + 1), sense))
     if not result:
         raise InputError(
-            f"{where}: covers {math.degrees(most):.0f} deg in one direction; a full turn, 360 deg, is needed"
+            f"{where}: covers {math.degrees(most):.0f} deg in one direction at constant speed; a full turn, 360 deg, "
+            f"or an arc of {math.degrees(MIN_ARC):.0f} deg or more is needed"
         )
     return result
+
+
+def _even(turned: Array, time: Array) -> tuple[float, float]:
+    """Where an arc begins and ends [rad] that is driven at its usual speed: without the ways from rest and to rest.
+
+    turned: the angle that rises along the arc (N,) [rad].
+    """
+    at = np.linspace(0.0, float(turned[-1]), round(1 / ARC_PART) + 1)
+    passed = np.diff(np.interp(at, turned, time))
+    even = np.flatnonzero(np.abs(passed / np.median(passed) - 1) < EVEN_SPEED_SHARE)
+    return float(at[even[0]]), float(at[even[-1] + 1])
 
 
 def _stretches(angle: Array) -> list[tuple[int, int]]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath, enough_pitches
 from feedsim.analysis.circle.model import Fit
-from feedsim.analysis.figures import Array
+from feedsim.analysis.figures import Array, averaged
 
 AMPLITUDE_FLOOR = 10e-9  # an amplitude of less [m] is not reported: it may be a residual of the model
 # Lines of the spectrum that belong to one vibration, and how far their mean stands out of what is around them, and of
@@ -42,8 +42,11 @@ def vibrations(circle: CircleUnderTest, fit: Fit, paths: Sequence[TurnedPath]) -
     """
     best: dict[str, Vibration] = {}
     for k, path in enumerate(paths):
+        part = path.covered / (2 * math.pi)  # an arc is taken for a turn: its waves are counted over what it covers
         for axis, angle, off, free in _signals(circle, fit, k, path):
-            vibration = _strongest(circle, axis, angle, off, free, fit.quantile)
+            vibration = _strongest(
+                replace(circle, radius=part * circle.radius), axis, angle / part, off, free, fit.quantile
+            )
             if vibration is not None and (axis not in best or vibration.amplitude > best[axis].amplitude):
                 best[axis] = vibration
     return tuple(sorted(best.values(), key=lambda entry: -entry.amplitude))
@@ -54,7 +57,7 @@ Signal = tuple[str, Array, Array, NDArray[np.bool_]]
 
 def _signals(circle: CircleUnderTest, fit: Fit, k: int, path: TurnedPath) -> list[Signal]:
     """Axis, angle by which the motion has turned (N,) [rad], deviation (N,) [m], and what counts of it (N,)."""
-    if path.phase is None:
+    if path.phase is None or not path.whole:
         turned = path.sense * (np.unwrap(fit.angle[k]) - fit.angle[k][0])
         order = np.argsort(turned)
         return [("", turned[order], fit.residual[k][order], (fit.reversal[k] < 0)[order])]
@@ -102,12 +105,6 @@ def _strongest(
     half = quantile * noise * math.sqrt(2 / max(int(free.sum()), 1))
     frequency = order * circle.speed / (2 * math.pi * circle.radius)
     return Vibration(frequency, amplitude, half, axis) if amplitude > AMPLITUDE_FLOOR else None
-
-
-def averaged(values: Array, count: int) -> Array:
-    """Mean over ``count`` neighbours; fewer at the ends."""
-    ones = np.ones(min(count, len(values)))
-    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))
 
 
 def _floor(power: Array) -> Array:

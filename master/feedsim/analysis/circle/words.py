@@ -26,6 +26,8 @@ def answer(diagnosis: Diagnosis) -> str:
     """Why the circle is not round, in a sentence or two: what it means, whether it can be trusted, what to do next."""
     terms = worth_telling(diagnosis)
     G = f"circular deviation G {_um(diagnosis.G)}"
+    if diagnosis.arc is not None:
+        G = f"on {_arc(diagnosis)} the radial deviation ranges over {_um(diagnosis.G)}"
     if diagnosis.apart > CONTRADICT * diagnosis.G:
         return (
             f"{G}: turns that were read as one direction contradict each other by {_um(diagnosis.apart)}, so no cause "
@@ -63,6 +65,9 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
     first, second = diagnosis.circle.axes
     value, axis = term.value, term.axis
     amount = abs(value)
+    if not term.determined:
+        reverses = term.key == "peaks" or (term.key == "lost_motion" and not diagnosis.reverses(axis))
+        return f"{name(term)}: not determined{f', as {axis} does not reverse on the arc' if reverses else ''}"
     if not term.shows and term.key not in ("rest", "peaks"):
         return f"{name(term)}: cannot be distinguished from zero"
     match term.key:
@@ -125,8 +130,16 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
                 f"the centres of {'both directions' if diagnosis.both else 'two turns'} lie {_um(amount)} apart: an "
                 "eccentric pivot or probe, or drift between the turns"
             )
+        case "radii" if diagnosis.both:
+            return (
+                f"the mean radius of counterclockwise turns is {_um(amount)} {'larger' if value > 0 else 'smaller'} "
+                "than that of clockwise ones: feeds that differ, or an instrument that drifts or gives way between "
+                "the turns"
+            )
+        case "radii":
+            return f"the mean radii of two turns differ by {_um(amount)}: temperature, of machine or instrument"
     form = ", ".join(f"order {n}: {_um(a)}" for n, a in diagnosis.form.items())
-    return f"what no cause explains: {_um(term.size)} from peak to valley ({form})"
+    return f"what no cause explains: {_um(term.size)} from peak to valley{f' ({form})' if form else ''}"
 
 
 def further(diagnosis: Diagnosis) -> list[str]:
@@ -136,6 +149,8 @@ def further(diagnosis: Diagnosis) -> list[str]:
         return []
     of = {term.key: term for term in diagnosis.terms if not term.axis}
     result = []
+    if diagnosis.arc is not None:
+        result += _of_arc(diagnosis)
     if abs(diagnosis.angles.angle) > ANGLE:
         result.append(
             f"the angles of the record are {math.degrees(diagnosis.angles.angle):.1f} deg off, as the places of the "
@@ -167,6 +182,23 @@ def further(diagnosis: Diagnosis) -> list[str]:
             "them"
         )
     return [f"{text[0].upper()}{text[1:]}." for text in result]
+
+
+def _arc(diagnosis: Diagnosis) -> str:
+    return f"an arc of {math.degrees(diagnosis.arc or 0.0):.0f} deg"
+
+
+def _of_arc(diagnosis: Diagnosis) -> list[str]:
+    """What arcs do not determine, and what they do not separate."""
+    result = [f"{_arc(diagnosis)} is no full turn: figures of ISO 230-4 are not determined"]
+    if unknown := [name(term) for term in diagnosis.terms if not term.determined]:
+        result.append(f"not determined on this arc: {', '.join(unknown)}")
+    if len(trading := [name(term) for term in diagnosis.terms if term.key in diagnosis.unseparated]) > 0:
+        result.append(
+            f"this arc does not fully separate from other causes: {', '.join(trading)}; the intervals hold that, and a "
+            "longer arc makes them smaller"
+        )
+    return result
 
 
 def _lag(diagnosis: Diagnosis, change: float) -> str:
@@ -242,6 +274,7 @@ def name(term: Term) -> str:
         "straightness": f"straightness of {term.axis}", "third": "straightness of third order",
         "cogging": f"cogging of {term.axis}, {term.order} per turn",
         "drift": "drift of the centre", "centres": "distance of the centres",
+        "radii": "difference of the mean radii",
     }  # fmt: skip
     return names[term.key]
 

@@ -17,6 +17,7 @@ LEADER = 24.0  # distance of a label from its point from which a line leads to i
 FILL, BAND = 0.5, 0.18  # opacity of filled areas and bands
 DEPTH = 0.75  # opacity of the deepest cell
 CLOSED = 0.02  # of the outermost ring: ends of a turn as close as this are one
+NEXT = 0.05  # sine of half the angle between the ends of a turn, at most
 FAINT = 0.4  # opacity of faint curves
 RING_GAPS = {1: 0.36, 2: 0.24}  # between rings, by their number to either side; the programmed circle's radius is 1
 OUTER = 1.16  # outermost radius, in gaps beyond the outermost ring

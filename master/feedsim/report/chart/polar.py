@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from feedsim.report.chart.layout import CLOSED, OUTER
+from feedsim.report.chart.layout import CLOSED, NEXT, OUTER
 from feedsim.report.chart.model import Polar, extremes
 from feedsim.report.chart.scales import round_step, tick_text
 from feedsim.report.chart.shapes import BOLD, HALO, circle, fill, line, path, stroke, text
@@ -47,7 +47,9 @@ def draw_polar(panel: Polar, width: float, height: float, clip: str) -> str:
         if not len(angle):
             continue
         away = one * np.clip(1 + gap * deviation / panel.ring, 0.0, 2 * outer)
-        closed = "Z" if abs(deviation[-1] - deviation[0]) < CLOSED * reach else ""  # not with start or stop in it
+        # Not with start or stop in it, and no arc.
+        turned = abs(math.sin((angle[-1] - angle[0]) / 2)) < NEXT
+        closed = "Z" if turned and abs(deviation[-1] - deviation[0]) < CLOSED * reach else ""
         way = path(cx + away * np.cos(angle), cy - away * np.sin(angle))
         parts.append(f'<path d="{way}{closed}" {stroke(curve)}/>')
     parts.append("</g>")

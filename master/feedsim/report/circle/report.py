@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,12 @@ from feedsim.tune import of_circle
 FORMAT = 1
 DASHES: dict[int, Dash] = {1: "", -1: "dashed"}  # by the sense of the turn
 TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
+FULL_TURN_FIGURES = {
+    "G": "ISO 230-4 circular deviation",
+    "G_b": "ISO 230-4 bidirectional circular deviation",
+    "D": "ISO 230-4 mean bidirectional radial deviation",
+    "H": "ISO 230-4 circular hysteresis",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +59,15 @@ def figures_of(recorded: RecordedCircle, diagnosis: Diagnosis) -> dict[str, Figu
     circle = recorded.circle
     prefix = axis_letters(circle.axes)
     centre = "the fitted centre" if recorded.centred else "the programmed centre"
+    if diagnosis.arc is not None:
+        about_arc = (
+            f"range of the radial deviation on an arc of {math.degrees(diagnosis.arc):.0f} deg, about its circle"
+        )
+        figures = {
+            name: Figure(math.nan, "um", f"{meaning}: needs a full turn") for name, meaning in FULL_TURN_FIGURES.items()
+        }
+        figures["arc_range"] = Figure(diagnosis.G * 1e6, "um", about_arc)
+        return _prefixed(prefix, figures | cause_figures(diagnosis))
     figures = {"G": Figure(diagnosis.G * 1e6, "um", f"range of the radial deviation of all turns, about {centre}")}
     for sense in (1, -1):
         if sense not in diagnosis.senses:
@@ -76,12 +92,12 @@ def report_of(
     """Content of the report."""
     circle = recorded.circle
     prefix = axis_letters(circle.axes)
-    labels = {"G": TILES["G"]}
+    labels = {"G": TILES["G"]} if diagnosis.arc is None else {"arc_range": "range of the deviation on the arc"}
     peaks = {
         f"peak_{axis}": f"reversal peak, {axis} reverses" for axis in circle.axes if f"{prefix}.peak_{axis}" in figures
     }
     labels |= dict(sorted(peaks.items(), key=lambda entry: -abs(figures[f"{prefix}.{entry[0]}"].value)))
-    labels |= TILES
+    labels |= TILES if diagnosis.arc is None else {}
     own = {key: figures.get(f"{prefix}.{key}") for key in labels}
     tiles = [Tile(tile_value(figure), labels[key], typeset(figure.meaning)) for key, figure in own.items() if figure]
     rows = [
@@ -95,7 +111,9 @@ def report_of(
         answer=answers(diagnosis),
         warnings=list(recorded.doubts),
         tiles=tiles,
-        next_step=("Lay a simulated circle over it:\n", code(f"feedsim diff {typed(files[0])} FOLDER_OF_A_RUN")),
+        next_step=("Lay a simulated circle over it:\n", code(f"feedsim diff {typed(files[0])} FOLDER_OF_A_RUN"))
+        if diagnosis.arc is None
+        else "",
         main=[
             picture(circle, recorded, diagnosis),
             diagnosis_section(prefix, diagnosis),
@@ -162,6 +180,7 @@ def summary(
             "radius": quantity(circle.radius, "m"),
             "speed": quantity(circle.speed, "m/s"),
             "centre_fitted": recorded.centred,
+            "arc": None if diagnosis.arc is None else quantity(diagnosis.arc, "rad"),
             "turns": [turn.name for turn in recorded.turns],
         },
         "inputs": inputs_part(hashed([("record", file) for file in files])),

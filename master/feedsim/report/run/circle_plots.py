@@ -19,6 +19,7 @@ from feedsim.report.style import AT_TOOL, FRICTION, RESIDUAL_COLOUR, SIMULATED, 
 from feedsim.trace import Trace
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
+GAP = 5.0  # deg of a turn that is not recorded; curves break there
 HIGHER = 10e-9  # m; a peak that is higher by less has the same height for a reader
 
 
@@ -172,7 +173,11 @@ def unrolled(axes: tuple[str, str], curves: Sequence[Curve], marks: Sequence[Mar
     for curve in curves:
         angle = np.rad2deg(curve.x % (2 * math.pi))
         order = np.argsort(angle, kind="stable")
-        over.append(Curve(curve.name, angle[order], curve.y[order], curve.colour, curve.dash, curve.width))
+        angle, off = angle[order], curve.y[order]
+        gap = int(np.diff(angle, append=angle[-1]).argmax())
+        if angle[gap + 1 : gap + 2].size and angle[gap + 1] - angle[gap] > GAP:  # an arc: nothing is drawn across
+            angle, off = np.insert(angle, gap + 1, angle[gap]), np.insert(off, gap + 1, math.nan)
+        over.append(Curve(curve.name, angle, off, curve.colour, curve.dash, curve.width))
     return Panel(
         "Over the angle",
         Axis(f"angle from {axes[0]}+", "°", span=(0.0, 360.0)),

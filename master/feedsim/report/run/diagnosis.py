@@ -43,10 +43,10 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     peaks = [(minus(peak.name), SENSE_WORDS[peak.sense], *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
     peak_note = "Peaks stand over the fitted rest of the circle; 0: nothing stands out of the noise."
-    return Section(
-        f"{prefix}: why the circle is not round",
-        [Table("lrrrp", heads, rows, note), Table("llrrrr", peak_heads, peaks, peak_note)],
-    )
+    tables = [Table("lrrrp", heads, rows, note)]
+    if peaks:  # none on an arc without reversals
+        tables.append(Table("llrrrr", peak_heads, peaks, peak_note))
+    return Section(f"{prefix}: why the circle is not round", tables)
 
 
 def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "answer": answer(diagnosis),
         "directions": [SENSE_WORDS[sense] for sense in diagnosis.senses],
-        "G": quantity(diagnosis.G, "m"),
+        **({"G": quantity(diagnosis.G, "m")} if diagnosis.arc is None else {"arc_range": quantity(diagnosis.G, "m")}),
         "causes": [
             {
                 "name": name(term),
@@ -110,6 +110,8 @@ def _of_records(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _value(term: Term) -> str:
     """To the digits that its interval leaves it."""
+    if not term.determined:
+        return "not determined"
     factor, unit = FIGURE_UNITS[term.unit]
     value, half = factor * term.value, factor * term.half
     if not math.isfinite(half) or half <= 0:

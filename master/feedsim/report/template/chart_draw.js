@@ -238,7 +238,8 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   for (const curve of shown) {
     const angle = values(curve.x), deviation = values(curve.y), n = angle.length;
     const points = Array.from(angle, (entry, k) => place(entry, deviation[k]).map(value => Math.round(10 * value) / 10).join(" ")).filter((point, k, all) => point !== all[k - 1]);
-    const ends = n ? Math.abs(deviation[n - 1] - deviation[0]) < CLOSED * reach : false;
+    const turned = n && Math.abs(Math.sin((angle[n - 1] - angle[0]) / 2)) < NEXT;
+    const ends = turned && Math.abs(deviation[n - 1] - deviation[0]) < CLOSED * reach;
     make("path", { ...styled(curve), d: n ? `M${points.join("L")}${ends ? "Z" : ""}` : "" }, field);
   }
   for (const mark of panel.marks) {

@@ -58,7 +58,7 @@ def test_a_click_leads_to_its_heading(task: str) -> None:
     ids=lambda page: str(page.relative_to(ROOT)),
 )  # fmt: skip
 def test_commands_do_what_the_page_says(page: Path, fmus: Path, tmp_path: Path) -> None:
-    if "feedsim page " in page.read_text(encoding="utf-8") and not (fmus / "machine.wasm").is_file():
+    if "feedsim export " in page.read_text(encoding="utf-8") and not (fmus / "machine.wasm").is_file():
         pytest.skip("no module of the machine (make page-module)")
     assert commands.execute(page, commands.prepared(tmp_path / "reader", fmus), slow=EVERY) == []
 

@@ -38,8 +38,8 @@ def replay(options: Namespace) -> None:
     finish(options.quiet, result.findings, head, *result.lines)
 
 
-def identify_drive(options: Namespace) -> None:
-    """feedsim identify-drive."""
+def identify_drive(options: Namespace) -> int:
+    """feedsim identify-drive; the exit code."""
     from feedsim.jobs.identify_drive import identify_drive
 
     out: Path = options.out or Path("results") / f"drive_{options.record.stem}"
@@ -52,6 +52,7 @@ def identify_drive(options: Namespace) -> None:
         else []
     )
     finish(options.quiet, result.findings, head, *result.lines, *written)
+    return result.exit_code
 
 
 _RECORD = Option("record", "RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)", type=Path)

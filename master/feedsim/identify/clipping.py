@@ -74,7 +74,8 @@ def without_clipped(
     models: list[list[_Needed]] = []
     if simulated is not None:  # another machine than that of the record needs another torque everywhere
         off = [(torque - each.torque)[~each.clipped] for each, torque in zip(trial, simulated, strict=True)]  # type: ignore[operator]
-        left = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+        # Where no row is beside the limits, nothing says how well the machine's torque is that of the record.
+        left = float(np.sqrt(np.mean(rest**2))) if len(rest := np.concatenate(off)) else np.inf
         models.append([_Needed(torque, np.zeros(len(torque))) for torque in simulated])
     else:
         slow = REST_SPEED_SHARE * max((float(np.max(np.abs(smooth_speed(record)))) for record in records), default=0.0)
@@ -120,6 +121,7 @@ def _heap(record: Record, side: float) -> _Heap:
     # Of a peak the rows beside it may lie below every mean.
     limit = min(float(np.median(torque[mean >= np.max(mean) - 2 * reach])), float(np.max(mean)))
     wide = np.convolve((mean >= limit - reach).astype(np.float64), np.ones(MEAN), "same") > 0.5
+    wide &= not np.all(wide)  # a torque that never changes ends at no limit
     return _Heap(side, limit, reach, wide)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.arguments import spelt
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.findings import Note
+from feedsim.findings import Note, Wrong
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.replay.compare import Comparison
@@ -56,6 +56,7 @@ class DriveReport:
     name: str
     settings: Mapping[str, str]
     marks: Sequence[Mark]
+    unread: Sequence[str] = ()  # notes on columns
 
     @property
     def comparisons(self) -> Sequence[Comparison]:
@@ -76,7 +77,11 @@ class DriveReport:
     @property
     def warnings(self) -> list[str]:
         """What a user should know."""
-        reported = dict.fromkeys(text for source in self.sources for text in source.warnings)
+        reported: dict[str, None] = dict.fromkeys(
+            Wrong(f"axis {axis} has no drive: {reason}") for axis, reason in self.found.refused.items()
+        )
+        reported |= dict.fromkeys(text for source in self.sources for text in source.warnings)
+        reported |= dict.fromkeys(self.unread)
         reported |= dict.fromkeys(self.found.clipped)
         for axis, lines in self.found.outside.items():
             if lines:
@@ -285,6 +290,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
             }
             for axis, one in report.found.drives.items()
         },
+        **({"refused": dict(report.found.refused)} if report.found.refused else {}),
         **({"beside_the_machine_file": beside_part(_beside(report))} if report.subject is not None else {}),
         "figures": figures_part(report.figures),
         "software": software(),

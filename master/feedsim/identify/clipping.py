@@ -28,6 +28,9 @@ MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the h
 CLIPPING_SIGMAS = 4.0  # standard deviations that pass for noise
 MIN_HEAP_ROWS = 5  # rows of a heap that determine whether it is one
 CLIPPED_EXCESS = 0.05  # of the limit: what inertia and friction must need beyond it; the simple friction is not better
+# Rows in motion that lie at one value to the last digit, and how many more they are than at any other value.
+MIN_TIED_ROWS, TIED_RATIO = 10, 5.0
+LIMIT_ROWS_SHARE = 0.02  # share of the rows that lie at a limit of the drive, at least
 MOST_SHOWN = 3  # stretches of time that the message names
 
 
@@ -102,6 +105,34 @@ def without_clipped(
         result.append(replace(record, clipped=np.any([heap.rows for heap in kept], axis=0)))
         said.append(_words(result[-1], kept, [needed[k] for needed in models], left_out))
     return tuple(result), tuple(said)
+
+
+def tied_at_limit(record: Record) -> tuple[Record, float]:
+    """The record with rows marked as cut off whose torque is the largest one to the last digit, and that share [1].
+
+    No torque of a motion repeats itself so. Whether the range of the record or the drive ends there is open.
+    """
+    speed = np.abs(smooth_speed(record))
+    moving = speed > REST_SPEED_SHARE * np.max(speed)
+    tied = np.zeros(len(record), dtype=bool)
+    for value in (np.max(record.torque), np.min(record.torque)):
+        rows = record.torque == value
+        counts = np.unique(record.torque[moving & ~rows], return_counts=True)[1]
+        most = max(MIN_TIED_ROWS, TIED_RATIO * float(np.max(counts, initial=0)))
+        tied |= rows & (np.count_nonzero(rows & moving) >= most)
+    if not np.any(tied):
+        return record, 0.0
+    marked = tied if record.clipped is None else record.clipped | tied
+    return replace(record, clipped=marked), float(np.mean(tied))
+
+
+def limit_shown(record: Record) -> float | None:
+    """Largest torque [N.m], where so many rows lie at it that a drive may have its limit there; None: it is a peak."""
+    if not record.driven:
+        return None
+    side = 1.0 if np.max(record.torque) >= -np.min(record.torque) else -1.0
+    heap = _heap(record, side)
+    return heap.limit if np.count_nonzero(heap.rows) > LIMIT_ROWS_SHARE * len(record) else None
 
 
 def _smooth(record: Record) -> Array:

@@ -206,6 +206,7 @@ def replayed(
     # A drive of another maker need not say when it is at its limit.
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
     with Replay(machine, records, fmus=fmus) as replay:
+        replay.preload(machine)
         result = replay.follow(machine, signals, per_row)
     every = {**(beside or {}), **records}
     J = {axis: checked_modes(machine).J_tot(axis) for axis in records}

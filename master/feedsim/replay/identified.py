@@ -14,6 +14,7 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
+from feedsim.identify.clipping import tied_at_limit
 from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
@@ -40,6 +41,10 @@ from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.structure import checked_modes
 
 OF_MACHINE = "of the machine"
+TIED = (
+    "axis {}: the torque lies at {:.4g} N.m to the last digit in {:.2g} % of the rows, where the range of the record "
+    "or the drive ends; these rows are left out of the fit. Record with a wider range, or drive more gently"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +107,11 @@ def identify_drives(
             _refuse_implausible(each)
             J = _rigid_inertia(each, machine)
             whole, said = unclipped(each, "the torque of these rows is left out of the fit", J)
+            if whole.record.driven:
+                marked, share = tied_at_limit(whole.record)
+                whole = replace(whole, record=marked)
+                if share and not said:
+                    said = (TIED.format(axis, float(np.max(np.abs(marked.torque))), 100 * share),)
             own, lines = without_outside(whole, J)
             begins[axis] = _begin(own) if machine is None else None
             fitted[axis], outside[axis] = own, lines

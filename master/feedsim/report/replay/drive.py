@@ -20,6 +20,7 @@ from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.replay.outside import in_words
+from feedsim.replay.rivals import ERROR_RATE
 from feedsim.report.content import FOLDER, Paragraph, Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
@@ -40,6 +41,11 @@ FRICTION_PARTS = (
 )
 
 
+STRUCTURES = (
+    "The fit is tried again with each of these: gain of the logarithm of the likelihood, and what it has to be for a "
+    f"test that errs in {100 * ERROR_RATE:.0f} % of the records. Intervals include the values with a structure that is "
+    "not taken."
+)
 MODES_TEXT = (
     "Shapes are relative to the rigid motion. A mode stays where a fit to three quarters of the motion predicts the "
     "fourth one better with it."
@@ -171,6 +177,7 @@ def report_of(report: DriveReport) -> Report:
             *(_parameters(axis, one) for axis, one in drives.items()),
             *pictures,
             *(_parts(axis, one) for axis, one in drives.items() if one.parts),
+            *(_structures(axis, one) for axis, one in drives.items() if one.rivals),
             *(_modes(axis, one) for axis, one in drives.items() if one.modes_predicted or one.modes),
             figures_section(report.figures),
             control_section(machine_of(report)),
@@ -224,6 +231,15 @@ def _parts(axis: str, one: DriveFound) -> Section:
     return Section(f"What the friction of {axis} needs", [Paragraph(FRICTION_PARTS), table])
 
 
+def _structures(axis: str, one: DriveFound) -> Section:
+    rows = [
+        (rival.name, minus(f"{rival.gain:+.1f}"), f"{rival.least:.1f}", "taken" if rival.taken else "")
+        for rival in one.rivals
+    ]
+    heads = ("Structure of the drive", "Gain", "Needed", "")
+    return Section(f"What else the drive of {axis} may have", [Paragraph(STRUCTURES), Table("lrrl", heads, rows)])
+
+
 def _at_others(mode: ElasticMode) -> list[str]:
     """What a mode does at the scales of other axes, over the rigid motion of its own."""
     return [f"{entry.axis} {entry.shape:.2g} (+-{NORMAL_95 * entry.sigma:.2g})" for entry in mode.beside]
@@ -272,6 +288,10 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
                 },
                 "parts": {
                     part: {"gain": finite(gain), "taken": part in one.chosen} for part, gain in one.parts.items()
+                },
+                "structures": {
+                    rival.name: {"gain": rival.gain, "needed": rival.least, "taken": rival.taken}
+                    for rival in one.rivals
                 },
                 "predicted": {
                     "position": {"value": one.predicted[0], "unit": "m"},

@@ -86,11 +86,15 @@ class AxisRecord:
         return np.ones(len(self.record), dtype=bool) if clipped is None else ~clipped
 
     @property
+    def first_moving(self) -> int:
+        """Row at which the setpoint moves first; their number where it never does."""
+        speed = np.abs(np.gradient(self.setpoint, self.record.interval))
+        return int(np.argmax(np.append(speed > MOVES * np.max(speed), True)))
+
+    @property
     def at_rest(self) -> Rows:
         """Rows ahead of the first motion whose torque counts; few or none where the record begins in motion."""
-        speed = np.abs(np.gradient(self.setpoint, self.record.interval))
-        first = int(np.argmax(np.append(speed > MOVES * np.max(speed), True)))
-        rows = np.arange(min(first, max(round(REST_TIME / self.record.interval), MIN_REST_ROWS)))
+        rows = np.arange(min(self.first_moving, max(round(REST_TIME / self.record.interval), MIN_REST_ROWS)))
         return np.asarray(rows[self.counted[rows]] if self.record.driven else rows[:0])
 
     @property

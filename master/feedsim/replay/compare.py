@@ -66,6 +66,7 @@ class Comparison:
         open_loop: whether the recorded torque drives the axis, in place of a drive.
         outside: lines of the record that come from outside the axis, at rest. moving_lines: others while it moves.
         clipped: sentences on torque that the record cuts off: its rows count in no figure of the torque.
+        preloaded: whether the run begins with the torque at rest of the record.
     """
 
     axis: str
@@ -81,6 +82,7 @@ class Comparison:
     outside: Sequence[Line] = ()
     moving_lines: Sequence[Line] = ()
     clipped: Sequence[str] = ()
+    preloaded: bool = False
 
     @property
     def findings(self) -> list[str]:
@@ -128,6 +130,8 @@ class Comparison:
                 float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{reported}, largest magnitude"
             )
         still = self.each.rows & ~self.each.moving & self.each.counted
+        if self.preloaded:  # it begins with that torque, which shows nothing then
+            still &= np.arange(len(still)) >= self.each.first_moving
         if "torque" in self.channels and np.count_nonzero(still) >= LEAST_STILL:
             result[f"{self.axis}.torque_standstill_rms"] = Figure(
                 rms(self.channels["torque"].error[still]), "N.m",
@@ -206,7 +210,7 @@ def replayed(
     # A drive of another maker need not say when it is at its limit.
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
     with Replay(machine, records, fmus=fmus) as replay:
-        replay.preload(machine)
+        preloaded = replay.preload(machine)
         result = replay.follow(machine, signals, per_row)
     every = {**(beside or {}), **records}
     J = {axis: checked_modes(machine).J_tot(axis) for axis in records}
@@ -214,7 +218,9 @@ def replayed(
         axis: compared(axis_record, result[axis], per_row, limits.get(axis, inf), J[axis])
         for axis, axis_record in records.items()
     }
-    return {axis: _with_moving_lines(one, every, J[axis]) for axis, one in comparisons.items()}
+    return {
+        axis: replace(_with_moving_lines(one, every, J[axis]), preloaded=preloaded) for axis, one in comparisons.items()
+    }
 
 
 def _with_moving_lines(comparison: Comparison, records: Mapping[str, AxisRecord], J: float) -> Comparison:

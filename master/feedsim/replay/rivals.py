@@ -93,9 +93,10 @@ def with_rivals(problem: Problem, fit: Tuned, far: bool) -> tuple[Tuned, list[Tr
             if far or one.gain > FITTED_SHARE * one.least:
                 other = _best_fit(problem, fit, rival, far)
                 gain = 0.5 * float(np.sum(fit.residuals**2) - np.sum(other.residuals**2)) if other is not None else 0.0
-                one = replace(one, gain=gain, values=other.values if other is not None else {})
-                if other is not None and gain > max(one.least, best[0].gain if best is not None else 0.0):
-                    best = replace(one, taken=True, values={}), other, problem.machine, problem.start
+                if other is not None and gain > 0:  # else it has ended elsewhere: the fit is one of it in the limit
+                    one = replace(one, gain=gain, values=other.values)
+                    if gain > max(one.least, best[0].gain if best is not None else 0.0):
+                        best = replace(one, taken=True, values={}), other, problem.machine, problem.start
             tried[rival.name] = one
         problem.machine, problem.start = machine, start
         if best is None:

@@ -65,6 +65,11 @@ class Kind:
     coupled: float = 0.0  # shape of the first mode at the scale of Y, over the rigid motion of X
     repeats: int = 1  # logs of a machine, each of other moves
     signals: str = "x_s, x_a, x_e, n_s, n_ffw, M_a"
+    changes: tuple[str, ...] = ()  # of the axis, as --set has them; {name} is drawn, lognormal about its value in drawn
+    drawn: tuple[tuple[str, float], ...] = ()
+    limit_of_load: float = 0.0  # torque limit of the drive, over its load
+    limit_of_peak: float = 0.0  # the same over the largest torque without it
+    encoder: float = 0.0  # step of the recorded position [m]
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -85,6 +90,18 @@ KINDS = (
          noise="M_a: 5 %, x_a: 0.1 um"),
     Kind("coupled axes", modes=(ElasticMode(24.0, 0.03, 0.2, 0.2),), noise="M_a: 2 %, x_a: 0.05 um", coupled=0.1),
     Kind("repeats", repeats=2),
+    Kind("current loop", drawn=(("f", 700.0),), changes=(
+        "drive.ideal_current_loop=false", "drive.current={{K_p: {K_p} V/A, T_n: 11.1 ms}}", "drive.u_max=2 kV",
+        "drive.R=0.45 Ohm", "drive.L_d=5 mH", "drive.L_q=5 mH", "drive.p=5",
+    )),
+    Kind("reference model", drawn=(("omega_0", 900.0), ("D", 1.2)), changes=(
+        "drive.reference_model=true", "drive.omega_0={omega_0} rad/s", "drive.D={D}",
+    )),
+    Kind("play behind the encoder", changes=("play=10 um", "drive.measuring={{indirect: true}}")),
+    Kind("torque over position", changes=("drive.cogging_1={{order: 0.3, amplitude: 0.2 N.m}}",)),
+    Kind("torque limit near the peak", limit_of_peak=1.0),
+    Kind("torque limit near the weight", axis="Y", limit_of_load=1.0),
+    Kind("encoder of some um", encoder=2.2e-6),
 )  # fmt: skip
 
 
@@ -219,7 +236,13 @@ def identified(
         changes = [f"machine.modes={elastic.modes}", *changes[1:]]
     log = run(load(folder / "moves.yaml", changes)).log
     assert log is not None
-    M = f"{kind.axis}.M_a"
+    M, x = f"{kind.axis}.M_a", f"{kind.axis}.x_a"
+    if limit := limit_of(kind, known, float(np.max(np.abs(log.columns[M])))):
+        log = run(load(folder / "moves.yaml", [*changes, f"machine.axes.{kind.axis}.drive.M_max={limit} N.m"])).log
+        assert log is not None
+    if kind.encoder:
+        step = kind.encoder * spread(np.random.default_rng(len(log.time)))
+        log = replace(log, columns={**log.columns, x: step * np.round(log.columns[x] / step)})
     if kind.torque_limit:
         most = kind.torque_limit * float(np.max(np.abs(log.columns[M])))
         log = replace(log, columns={**log.columns, M: np.clip(log.columns[M], -most, most)})
@@ -259,6 +282,12 @@ def identified(
     return estimated
 
 
+def limit_of(kind: Kind, known: Machine, peak: float) -> float:
+    """Torque limit of the drive [N.m], 0.9 to 1.1 of the load or of the peak; 0: none."""
+    shares = np.random.default_rng(round(1e6 * peak)).uniform(0.9, 1.1)
+    return float(shares * (kind.limit_of_load * known.axes[kind.axis].M_0 + kind.limit_of_peak * peak))
+
+
 def spread(random: np.random.Generator) -> float:
     """A factor about 1."""
     return float(FACTOR ** random.uniform(-1, 1))
@@ -274,6 +303,9 @@ def changed(own: Machine, kind: Kind, random: np.random.Generator) -> list[str]:
     friction["F_S"] = friction["F_C"]
     found += [f"{prefix}.friction.{name}={value:.9g} {FRICTION.get(name, 'N.m')}" for name, value in friction.items()]
     found.append(f"{prefix}.constant_load={(20.0 if kind.axis == 'Y' else 0.2) * spread(random):.9g} N.m")
+    drawn = {name: value * spread(random) for name, value in kind.drawn}
+    drawn["K_p"] = 5e-3 * 2 * np.pi * drawn.get("f", 0.0)  # of the current controller, by its bandwidth
+    found += [f"{prefix}.{change.format_map(drawn)}" for change in kind.changes]
     return [*found, f"{prefix}.max_acceleration=10 m/s^2", f"machine.cycles.position={kind.position_cycle}"]
 
 

@@ -19,7 +19,7 @@ from feedsim.files.columns import load_columns
 from feedsim.identify import Record
 from feedsim.replay.closed_loop import AxisRecord, read_axes
 from feedsim.replay.drive import feedforward_of
-from feedsim.replay.identified import _refuse_own_setpoint
+from feedsim.replay.identified import _refuse_implausible
 from feedsim.scenario import load, load_machine
 from feedsim.structure import checked_modes
 from feedsim.trace import write_csv
@@ -171,10 +171,10 @@ def test_an_axis_at_rest_is_not_its_own_setpoint() -> None:
     time = 1e-3 * np.arange(100)
     still = Record("made", time=time, torque=np.zeros(100), angle=np.ones(100), setpoint=np.ones(100))
     each = AxisRecord("X", still, 1.0, np.ones(100, dtype=bool))
-    _refuse_own_setpoint(each)
+    _refuse_implausible(each)
     moved = replace(each, record=replace(still, angle=time, setpoint=time))
     with pytest.raises(InputError, match="axis X: the position setpoint is the recorded position"):
-        _refuse_own_setpoint(moved)
+        _refuse_implausible(moved)
 
 
 def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -141,3 +143,31 @@ def test_intervals_of_stretches_overlap(tmp_path: Path) -> None:
         assert [one["status"] for one in both] == ["estimated"] * 2, name
         assert abs(both[0]["value"] - both[1]["value"]) <= NORMAL_95 * (both[0]["sigma"] + both[1]["sigma"]), name
     assert {one["M_0"]["status"] for one in stretches} == {"undetermined"}
+
+
+def numbers_of(file: Path) -> tuple[list[str], list[float]]:
+    """What a file says without its comments at the head, and its numbers, those of remarks included."""
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    number = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+    text = "\n".join(lines)
+    return number.sub("#", text).split(), [float(one) for one in number.findall(text)]
+
+
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
+def test_the_shipped_machine_is_what_its_command_makes(tmp_path: Path) -> None:
+    """The command that stands in its file: values, intervals and modes, within a fifth of the digits that are shown of
+    an interval (another processor's rounding ends a fit elsewhere)."""
+    shipped = MACHINES / "sinumerik_840d"
+    (command,) = re.findall(r"#   feedsim (.*) --out", (shipped / "machine.yaml").read_text(encoding="utf-8"))
+    words = shlex.split(command.replace("capture.json", shlex.quote(os.environ["FEEDSIM_CAPTURE"])))
+    assert main([*words, "--quiet", "--out", str(tmp_path / "made")]) == 0
+    for name in ("drive_X.yaml", "drive_Y.yaml", "friction_X.yaml", "friction_Y.yaml", "modes.csv"):
+        (text, numbers), (said, made) = numbers_of(shipped / name), numbers_of(tmp_path / "made" / name)
+        assert said == text, name
+        assert made == pytest.approx(numbers, rel=0.02, abs=0.02 if "friction" in name else 1e-9), name
+    one, other = load_machine(shipped), load_machine(tmp_path / "made")
+    for axis in ("X", "Y"):
+        for key in ("pitch", "travel", "max_speed", "max_acceleration", "M_0"):
+            assert getattr(other.axes[axis], key) == pytest.approx(getattr(one.axes[axis], key), rel=0.02, abs=0.01), (
+                key
+            )

@@ -61,6 +61,16 @@ def test_a_line_is_found_in_every_motion(frequency: float) -> None:
         assert line.torque == pytest.approx(0.2, rel=0.2)
 
 
+def test_harmonics_of_what_lies_along_the_way_are_no_lines() -> None:
+    """Speeds of 53 and 27 turns/s, one twice the other: the second order of the slow motion has the frequency of the
+    first one of the fast. Waves of 2.3 per turn, as magnets of a motor or balls have, follow the speed as well."""
+    both = axis(((0.4, 1.0), (-0.4, 2.0)))
+    turn = both.position / (2 * np.pi * I_P)
+    for orders in ((1.0, 2.0), (0.37, 0.74)):
+        along = sum(0.3e-6 * np.sin(2 * np.pi * order * turn + 0.5) for order in orders)
+        assert not found(both, noise(both) + along), orders
+
+
 def test_two_lines_in_errors_of_friction() -> None:
     """A slow error of some micrometres does not hide them."""
     slow = 3e-6 * np.sign(np.gradient(FAST.setpoint)) + 2e-6 * np.sin(2 * np.pi * 1.3 * FAST.record.time)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,24 @@ def test_a_line_through_both_rests_is_found_and_taken_out() -> None:
     assert clean.record.torque[within] == pytest.approx(np.full(np.count_nonzero(within), 3.0), abs=0.01)
     assert "27.3 Hz" in one.text
     assert "0.1 N.m" in one.text
+
+
+def test_what_the_record_drives_is_not_from_outside() -> None:
+    """Harmonics of a recorded load, and a torque that moves the inertia: the same lines without that are."""
+    square = np.sign(np.sin(2 * np.pi * 7.0 * TIME + 0.3))
+    noise = 0.05e-6 * np.random.default_rng(1).standard_normal(len(TIME))
+    position = 0.5e-6 * np.sin(2 * np.pi * 7.0 * TIME) + 0.3e-6 * np.sin(2 * np.pi * 21.0 * TIME + 1.0) + noise
+    each = record(position)
+    assert {round(line.frequency) for line in without_outside(each)[1]} == {7, 21}
+    loaded = replace(each, record=replace(each.record, load=5.0 * square))
+    clean, lines = without_outside(loaded)
+    assert (clean, lines) == (loaded, ())
+    # J [kg.m2] times the acceleration of the line; a drive that holds the axis has another torque.
+    J, wave = 0.02, 0.5e-6 * np.sin(2 * np.pi * 30.0 * TIME)
+    driving = -J * (2 * np.pi * 30.0) ** 2 * wave
+    assert not without_outside(record(wave + noise, driving), J)[1]
+    assert without_outside(record(wave + noise, 0.3 * driving), J)[1]
+    assert without_outside(record(wave + noise, -driving), J)[1]
 
 
 def test_a_note_names_the_first_lines() -> None:

@@ -127,6 +127,34 @@ logging:
 """
 
 
+def test_an_axis_that_is_refused_does_not_take_another_along(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """X moves both ways, Y stands still or is not in the record: X is written as by itself, the status is 1, and the
+    reason is there."""
+    monkeypatch.setattr("feedsim.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, []))
+    text = GENTLE.format(machine=MACHINES / "sinumerik_840d", seed=1).replace("axes: [X]", "axes: [X, Y]")
+    (tmp_path / "moves.yaml").write_text(text)
+    log = run(load(tmp_path / "moves.yaml", ["machine.axes.X.max_acceleration=10 m/s^2"])).log
+    assert log is not None
+    write_csv(tmp_path / "log.csv", log)
+    (tmp_path / "columns.yaml").write_text(COLUMNS.replace("axis: X\n", "").replace("deviation: {column: X.x_e}\n", ""))
+    record = [str(tmp_path / "log.csv"), "--position-cycle", "125us", "--quiet"]
+    own = ["--columns", str(tmp_path / "columns.yaml"), "--out", str(tmp_path / "X")]
+    assert main(["identify", "drive", *record, "--axes", "X", *own]) == 0
+    machine = ["--machine", str(MACHINES / "sinumerik_840d")]
+    assert main(["identify", "drive", *record, "--axes", "X,Y", *machine, "--out", str(tmp_path / "known")]) == 1
+    known = json.loads((tmp_path / "known" / "summary.json").read_text())
+    assert list(known["axes"]) == ["X"]
+    assert not (tmp_path / "known" / "drive_Y.yaml").exists()
+    said = capsys.readouterr().err
+    assert f"WRONG: axis Y has no drive: {known['refused']['Y']}" in said
+    assert "axis Y" in known["refused"]["Y"]
+    # Without the machine the record lacks the pitch of both: nothing is written.
+    assert main(["identify", "drive", *record, "--axes", "X,Y", "--out", str(tmp_path / "none")]) == 2
+    assert not (tmp_path / "none").exists()
+
+
 @pytest.mark.parametrize(("by", "feed"), [(-3.0, 350.0), (-30.0, 6000.0), (60.0, 18000.0), (5.0, 600.0)])
 def test_motion_of_a_loaded_axis_in_one_direction(
     by: float, feed: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]

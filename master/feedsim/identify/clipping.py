@@ -28,6 +28,9 @@ MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the h
 CLIPPING_SIGMAS = 4.0  # standard deviations that pass for noise
 MIN_HEAP_ROWS = 5  # rows of a heap that determine whether it is one
 CLIPPED_EXCESS = 0.05  # of the limit: what inertia and friction must need beyond it; the simple friction is not better
+# Rows in motion that lie at one value to the last digit, and how many more they are than at any other value.
+MIN_TIED_ROWS, TIED_RATIO = 10, 5.0
+LIMIT_ROWS_SHARE = 0.02  # share of the rows that lie at a limit of the drive, at least
 MOST_SHOWN = 3  # stretches of time that the message names
 
 
@@ -74,7 +77,8 @@ def without_clipped(
     models: list[list[_Needed]] = []
     if simulated is not None:  # another machine than that of the record needs another torque everywhere
         off = [(torque - each.torque)[~each.clipped] for each, torque in zip(trial, simulated, strict=True)]  # type: ignore[operator]
-        left = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+        # Where no row is beside the limits, nothing says how well the machine's torque is that of the record.
+        left = float(np.sqrt(np.mean(rest**2))) if len(rest := np.concatenate(off)) else np.inf
         models.append([_Needed(torque, np.zeros(len(torque))) for torque in simulated])
     else:
         slow = REST_SPEED_SHARE * max((float(np.max(np.abs(smooth_speed(record)))) for record in records), default=0.0)
@@ -103,6 +107,34 @@ def without_clipped(
     return tuple(result), tuple(said)
 
 
+def tied_at_limit(record: Record) -> tuple[Record, float]:
+    """The record with rows marked as cut off whose torque is the largest one to the last digit, and that share [1].
+
+    No torque of a motion repeats itself so. Whether the range of the record or the drive ends there is open.
+    """
+    speed = np.abs(smooth_speed(record))
+    moving = speed > REST_SPEED_SHARE * np.max(speed)
+    tied = np.zeros(len(record), dtype=bool)
+    for value in (np.max(record.torque), np.min(record.torque)):
+        rows = record.torque == value
+        counts = np.unique(record.torque[moving & ~rows], return_counts=True)[1]
+        most = max(MIN_TIED_ROWS, TIED_RATIO * float(np.max(counts, initial=0)))
+        tied |= rows & (np.count_nonzero(rows & moving) >= most)
+    if not np.any(tied):
+        return record, 0.0
+    marked = tied if record.clipped is None else record.clipped | tied
+    return replace(record, clipped=marked), float(np.mean(tied))
+
+
+def limit_shown(record: Record) -> float | None:
+    """Largest torque [N.m], where so many rows lie at it that a drive may have its limit there; None: it is a peak."""
+    if not record.driven:
+        return None
+    side = 1.0 if np.max(record.torque) >= -np.min(record.torque) else -1.0
+    heap = _heap(record, side)
+    return heap.limit if np.count_nonzero(heap.rows) > LIMIT_ROWS_SHARE * len(record) else None
+
+
 def _smooth(record: Record) -> Array:
     """(N,) torque, averaged over MEAN rows."""
     spread = np.pad(record.torque, MEAN // 2, mode="edge")
@@ -120,6 +152,7 @@ def _heap(record: Record, side: float) -> _Heap:
     # Of a peak the rows beside it may lie below every mean.
     limit = min(float(np.median(torque[mean >= np.max(mean) - 2 * reach])), float(np.max(mean)))
     wide = np.convolve((mean >= limit - reach).astype(np.float64), np.ones(MEAN), "same") > 0.5
+    wide &= not np.all(wide)  # a torque that never changes ends at no limit
     return _Heap(side, limit, reach, wide)
 
 

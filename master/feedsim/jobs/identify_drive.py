@@ -64,6 +64,11 @@ class DriveResult(Result):
         return self.drives.warnings
 
     @property
+    def exit_code(self) -> int:
+        """0, or 1 where an axis that was asked for has no drive."""
+        return int(bool(self.drives.found.refused))
+
+    @property
     def answers(self) -> Sequence[str]:
         """How near what was found comes to the record, how far it is to be trusted, and what to do next."""
         return page.answers(self.drives)
@@ -159,7 +164,8 @@ def identify_drive(
         feedsim identify drive log.csv --axes Z --machine machines/test_centre
 
     Raises:
-        InputError: a faulty file, no such axis, no such window, a record that does not excite an axis.
+        InputError: a faulty file, no such window; of no axis a drive follows from the record. Of some axes: the others
+            are in the result, with the reason among its findings.
         SimulationError: a unit failed.
         OutputError: `out` cannot be written.
 
@@ -176,12 +182,12 @@ def identify_drive(
     archives = None if fmus is None else Path(fmus)
     with kept(out, partial(page.check_writable, asked.axes), watch, asked.inputs, asked.asked_for, force=force):
         watch.progress("reading", 0, 1)
-        records = asked.records
+        read, records, refused = asked.each_axis()
         if asked.machine is not None:
             announce(watch, asked.machine, archives)
         head = page.head(path, asked.window, date.today().isoformat())
         drives_found = identify_drives(
-            asked.read,
+            read,
             records,
             asked.machine,
             head,
@@ -192,9 +198,11 @@ def identify_drive(
             cycle,
             count,
             asked.recording.control,
+            refused,
         )
-        sources = [recorded.provenance for recorded in asked.read.values()]
-        done = DriveReport(drives_found, sources, asked.subject, title, asked.settings, asked.marks)
+        sources = [recorded.provenance for recorded in read.values()]
+        unread = asked.unread(read)
+        done = DriveReport(drives_found, sources, asked.subject, title, asked.settings, asked.marks, unread)
         result = DriveResult(done, asked.inputs)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)

@@ -8,15 +8,18 @@ from functools import cached_property
 from pathlib import Path
 
 from feedsim.arguments import Changes, given, listed, settings, spelt
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.fields import no_axis
 from feedsim.files.columns import Columns, load_columns
+from feedsim.findings import Note
 from feedsim.identify import Recorded
 from feedsim.jobs.parameters import File
 from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
 from feedsim.replay.window import window as window_of
 from feedsim.scenario import Machine, Subject, load_subject
 from feedsim.trace import Mark, Recording, read_recording
+
+MOST_NAMED = 20  # columns that a note names
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,33 @@ class Asked:
     def records(self) -> dict[str, AxisRecord]:
         """Axis -> the stretch of its record that holds the window."""
         return {axis: windowed(axis, recorded, self.window) for axis, recorded in self.read.items()}
+
+    def each_axis(self) -> tuple[dict[str, Recorded], dict[str, AxisRecord], dict[str, str]]:
+        """`read` and `records` of the axes that have them, and why another one has none.
+
+        Raises InputError: none of them has.
+        """
+        read: dict[str, Recorded] = {}
+        records: dict[str, AxisRecord] = {}
+        refused: dict[str, str] = {}
+        for axis in self.axes:
+            try:
+                recorded = read_axes(self.recording, [axis], self.machine, self.mapping)[axis]
+                records[axis], read[axis] = windowed(axis, recorded, self.window), recorded
+            except InputError as error:
+                refused[axis] = str(error)
+        if not read:
+            raise InputError.of(f"{self.recording.path}", dict.fromkeys(refused.values()))
+        return read, records, refused
+
+    def unread(self, read: Mapping[str, Recorded]) -> list[str]:
+        """A note on the columns of the file that none of the axes is read from; those of the axes come first."""
+        used = {column for recorded in read.values() for column in recorded.provenance.columns.values()}
+        numbers = {name.rpartition("|")[2] for name in used if "|" in name}  # of the axes of a capture
+        used |= {f"POWER|{number}" for number in numbers}  # which their pitch is by
+        others = [name for name in self.recording.names if name not in used]
+        names = sorted(others, key=lambda name: name.rpartition("|")[2] not in numbers)
+        return [Note(f"{self.recording.path}: columns that are not read: {few(names, MOST_NAMED)}")] if names else []
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[str, ...]:

@@ -172,6 +172,7 @@ def replay(
         results = [finding for comparison in comparisons for finding in comparison.findings]
         settings = {**asked.settings, **({"open_loop": "yes"} if open_loop else {})}
         findings = dict.fromkeys([*results, *(text for source in sources for text in source.warnings)])
+        findings |= dict.fromkeys(asked.unread(asked.read))
         done = Replayed(
             comparisons, asked.subject, sources, asked.marks, settings, [*findings], _proposals(own, asked.axes)
         )

@@ -1,9 +1,10 @@
 """A record's setpoints through the simulated axes: the same motion asked for, by the units in closed loop.
 
 The run begins ahead of the record. An axis stands where the record begins, until friction has taken up the constant
-load and the speed controller carries the rest; where the record begins in motion, a run-in from rest leads to its
-speed. What is compared lies within a window of the record; the run covers the record from BEFORE ahead
-of it, so that the state of drive and friction there is what the motion before has made it.
+load and the speed controller carries the rest, or until it rests with the torque of the record (preload.py). Where the
+record begins in motion, a run-in from rest leads to its speed. What is compared lies within a window of the record; the
+run covers the record from BEFORE ahead of it, so that the state of drive and friction there is what the motion before
+has made it.
 """
 
 from __future__ import annotations
@@ -27,12 +28,14 @@ from feedsim.identify.read import read_records
 from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
 from feedsim.owned import Closing
-from feedsim.scenario import Coupling, Machine
+from feedsim.replay.preload import run_in
+from feedsim.scenario import Coupling, Friction, Machine
 from feedsim.scenario.loads import MotorLoad, SlideLoad
 from feedsim.trace import Recording, read_recording
 from feedsim.trace.trace import Array
 
 Mask = NDArray[np.bool_]
+Rows = NDArray[np.int64]
 
 SETTLING_TIME = 0.6  # [s] at rest ahead of the record
 BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
@@ -41,6 +44,8 @@ START_TRANSIENT = 0.1  # [s]
 CYCLES_BEHIND = 4  # position cycles that the program goes on behind the last row
 # The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.
 MOVES, FOLLOWS = 1e-4, 0.02  # share, [s]
+CLEARLY_NEARER = 0.5  # of the sum of squares that is off
+REST_TIME, MIN_REST_ROWS = 0.1, 3  # [s] of the torque ahead of the first motion, whose mean counts; rows of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +84,18 @@ class AxisRecord:
         """(N,) bool: rows whose torque counts, as it is not cut off."""
         clipped = self.record.clipped
         return np.ones(len(self.record), dtype=bool) if clipped is None else ~clipped
+
+    @property
+    def first_moving(self) -> int:
+        """Row at which the setpoint moves first; their number where it never does."""
+        speed = np.abs(np.gradient(self.setpoint, self.record.interval))
+        return int(np.argmax(np.append(speed > MOVES * np.max(speed), True)))
+
+    @property
+    def at_rest(self) -> Rows:
+        """Rows ahead of the first motion whose torque counts; few or none where the record begins in motion."""
+        rows = np.arange(min(self.first_moving, max(round(REST_TIME / self.record.interval), MIN_REST_ROWS)))
+        return np.asarray(rows[self.counted[rows]] if self.record.driven else rows[:0])
 
     @property
     def moving(self) -> Mask:
@@ -190,6 +207,8 @@ class Replay(Closing):
     Attributes:
         records: axis -> its record; all over the same time.
         lead: time that the run begins ahead of the first row [s].
+        preloaded: whether axes rest with the torque of their records ahead of the first motion; else friction takes up
+            what the constant load leaves it.
 
     Raises InputError: rows that no control cycle meets; records over unlike times.
     """
@@ -229,6 +248,12 @@ class Replay(Closing):
             self.pose[axis] = float(value.setpoint[0]) - self._into[axis].distance
         run_in = max(change.duration for change in self._into.values())
         self.lead = self.interval * np.ceil((SETTLING_TIME + run_in) / self.interval)
+        self.preloaded = False
+        self._torques = {
+            axis: float(np.mean(value.record.torque[rows]))
+            for axis, value in records.items()
+            if len(rows := value.at_rest) >= MIN_REST_ROWS and isinstance(machine.axes[axis].friction, Friction)
+        }
         self._programs: dict[float, Program] = {}
         self._loads = [
             self._load(axis_record) for axis_record in records.values() if axis_record.record.load is not None
@@ -249,12 +274,38 @@ class Replay(Closing):
             return Acting(place, SlideLoad.model_construct(axis=axis_record.axis), time, -torque / axis_record.I_P)
         return Acting(place, MotorLoad.model_construct(axis=axis_record.axis), time, torque)
 
-    def program(self, machine: Machine) -> Program:
-        """The setpoints at the position cycle of a machine."""
+    def preload(self, machine: Machine, scale: float = 1.0) -> bool:
+        """Decide on `preloaded`: whether the torques at rest are clearly nearer to those of the records so."""
+        if not self._torques:
+            return False
+        self.preloaded = False
+        by_itself = self._off_at_rest(machine, scale)
+        self.preloaded = True
+        self.preloaded = self._off_at_rest(machine, scale) < CLEARLY_NEARER * by_itself
+        return self.preloaded
+
+    def _off_at_rest(self, machine: Machine, scale: float) -> float:
+        """Sum of squares [(N.m)2] of what the torques ahead of the first motion are off."""
+        simulated = self.follow(machine, ("M_a",), scale=scale)
+        return sum(
+            float(np.sum((scale * simulated[axis]["M_a"] - value.record.torque)[value.at_rest] ** 2))
+            for axis, value in self.records.items()
+        )
+
+    def program(self, machine: Machine, scale: float = 1.0) -> Program:
+        """The setpoints at the position cycle of a machine. scale: as of :meth:`follow`."""
         T_pos = machine.cycles.T_pos
         if T_pos not in self._programs:
             self._programs[T_pos] = self._planned(machine, T_pos)
-        return self._programs[T_pos]
+        program = self._programs[T_pos]
+        if not self.preloaded:
+            return program
+        x_s, n_ffw = dict(program.x_s), dict(program.n_ffw)
+        for axis, torque in self._torques.items():
+            own, friction = machine.axes[axis], machine.shipped_friction(axis, "a replay from a torque at rest")
+            angle = run_in(friction, torque / scale - own.M_0, program.time / self.lead)
+            x_s[axis], n_ffw[axis] = x_s[axis] + own.I_P * angle, n_ffw[axis] + np.gradient(angle, T_pos)
+        return Program(program.time, x_s, n_ffw)
 
     def _planned(self, machine: Machine, T_pos: float) -> Program:
         length = float(self.time[-1] - self.time[0])
@@ -288,7 +339,9 @@ class Replay(Closing):
         machine = machine.model_copy(update={"pose": machine.pose | self.pose})
         columns = [f"{axis}.{signal}" for axis in self.records for signal in signals]
         loads = [replace(load, values=load.values / scale) for load in self._loads]
-        trace = self._follower.follow(machine, self.program(machine), columns, self.interval / per_row, loads=loads)
+        trace = self._follower.follow(
+            machine, self.program(machine, scale), columns, self.interval / per_row, loads=loads
+        )
         first = round(self.lead / self.interval) * per_row
         rows = slice(first, first + (len(self.time) - 1) * per_row + 1)
         return {

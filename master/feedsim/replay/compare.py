@@ -19,7 +19,9 @@ from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_de
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of, same_time, unclipped
 from feedsim.replay.moving_lines import lines_in_motion
 from feedsim.replay.outside import Line, in_words, same_line, without_outside
+from feedsim.replay.plausible import implausible
 from feedsim.scenario import Drive, Machine
+from feedsim.structure import checked_modes
 from feedsim.trace.trace import Array
 
 TO_RPM = 30 / np.pi
@@ -28,6 +30,7 @@ LATEST = 5e-3  # [s]: no channel of a control is later than that against another
 NEAR_TORQUE_LIMIT = 0.98  # of a torque limit: what the record shows of it, behind its filters
 LEAST_STILL = 10  # rows at standstill that make a figure
 HELPS = 0.99  # of what is left without a delay
+MAX_WAY_SHARE = 0.05  # of the setpoint's way: what is off by more is another axis, whatever its lag
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ class Comparison:
         open_loop: whether the recorded torque drives the axis, in place of a drive.
         outside: lines of the record that come from outside the axis, at rest. moving_lines: others while it moves.
         clipped: sentences on torque that the record cuts off: its rows count in no figure of the torque.
+        preloaded: whether the run begins with the torque at rest of the record.
     """
 
     axis: str
@@ -78,11 +82,12 @@ class Comparison:
     outside: Sequence[Line] = ()
     moving_lines: Sequence[Line] = ()
     clipped: Sequence[str] = ()
+    preloaded: bool = False
 
     @property
     def findings(self) -> list[str]:
         """Why the replay may say nothing of the record, and what is left that is not the axis' own."""
-        result: list[str] = []
+        result: list[str] = [] if self.open_loop else [Wrong(text) for text in implausible(self.each)]
         torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
         recorded = float(np.max(np.abs(torque), initial=0.0))
         if self.limited and not NEAR_TORQUE_LIMIT * self.limit < recorded < self.limit / NEAR_TORQUE_LIMIT:
@@ -91,11 +96,17 @@ class Comparison:
                 f"{100 * self.limited:.2g} % of the rows, and that of the record is not; give the limit that the "
                 f"drive has (axes.{self.axis}.drive.M_max)"
             ))  # fmt: skip
-        off = rms(self.channels["position"].error[self.each.moving])
-        if off > self.lag and not self.open_loop:
+        moving = self.each.moving
+        off, way = rms(self.channels["position"].error[moving]), float(np.ptp(self.each.setpoint[self.each.rows]))
+        if not self.open_loop and off > min(self.lag, MAX_WAY_SHARE * way):
+            beside = (
+                f"than the recorded one is behind its setpoint ({1e6 * self.lag:.4g} um)"
+                if off > self.lag
+                else f"than {100 * MAX_WAY_SHARE:.0f} % of the way of {1e3 * way:.4g} mm"
+            )
             result.append(Wrong(
-                f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) than the recorded "
-                f"one is behind its setpoint ({1e6 * self.lag:.4g} um): this is not the machine of the record"
+                f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) {beside}: this is "
+                "not the machine of the record"
             ))  # fmt: skip
         result += self.clipped
         if self.outside:
@@ -119,6 +130,8 @@ class Comparison:
                 float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{reported}, largest magnitude"
             )
         still = self.each.rows & ~self.each.moving & self.each.counted
+        if self.preloaded:  # it begins with that torque, which shows nothing then
+            still &= np.arange(len(still)) >= self.each.first_moving
         if "torque" in self.channels and np.count_nonzero(still) >= LEAST_STILL:
             result[f"{self.axis}.torque_standstill_rms"] = Figure(
                 rms(self.channels["torque"].error[still]), "N.m",
@@ -197,28 +210,37 @@ def replayed(
     # A drive of another maker need not say when it is at its limit.
     signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
     with Replay(machine, records, fmus=fmus) as replay:
+        preloaded = replay.preload(machine)
         result = replay.follow(machine, signals, per_row)
     every = {**(beside or {}), **records}
-    return {
-        axis: _with_moving_lines(compared(axis_record, result[axis], per_row, limits.get(axis, inf)), every)
+    J = {axis: checked_modes(machine).J_tot(axis) for axis in records}
+    comparisons = {
+        axis: compared(axis_record, result[axis], per_row, limits.get(axis, inf), J[axis])
         for axis, axis_record in records.items()
+    }
+    return {
+        axis: replace(_with_moving_lines(one, every, J[axis]), preloaded=preloaded) for axis, one in comparisons.items()
     }
 
 
-def _with_moving_lines(comparison: Comparison, records: Mapping[str, AxisRecord]) -> Comparison:
+def _with_moving_lines(comparison: Comparison, records: Mapping[str, AxisRecord], J: float) -> Comparison:
     """The axis with the lines of its motion that its record at rest does not have."""
     errors = {name: -channel.error for name, channel in comparison.channels.items()}
     axes = [one for one in records.values() if same_time({comparison.axis: comparison.each, one.axis: one})]
-    lines = lines_in_motion(comparison.each, errors["position"], errors.get("torque"), axes)
+    lines = lines_in_motion(comparison.each, errors["position"], errors.get("torque"), axes, J)
     further = [line for line in lines if not any(same_line(line, other) for other in comparison.outside)]
     return replace(comparison, moving_lines=further)
 
 
 def compared(
-    axis_record: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1, limit: float = inf
+    axis_record: AxisRecord,
+    simulated: Mapping[str, Array],
+    per_row: int = 1,
+    limit: float = inf,
+    J: float | None = None,
 ) -> Comparison:
     """An axis beside its record. simulated: x_a [m], M_a [N.m] and where it is known torque_limited [1], `per_row`
-    samples from row to row; limit: of the drive's torque [N.m]."""
+    samples from row to row; limit: of the drive's torque [N.m]. J: inertia [kg.m2]."""
     record = axis_record.record
     assert record.setpoint is not None
     taps = speed = None
@@ -245,7 +267,7 @@ def compared(
     limited = limited[np.repeat(axis_record.rows, per_row)[per_row - 1 :]]
     return Comparison(
         axis_record.axis, axis_record, channels, taps, speed, lag, delay, limit, float(np.mean(limited)),
-        outside=without_outside(axis_record)[1], clipped=clipped,
+        outside=without_outside(axis_record, J)[1], clipped=clipped,
     )  # fmt: skip
 
 

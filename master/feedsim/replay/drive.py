@@ -23,6 +23,7 @@ from typing import TypeVar
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.identify.averages import white
 from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import (
     Constant,
@@ -40,6 +41,8 @@ from feedsim.replay.closed_loop import AxisRecord, Replay
 from feedsim.replay.cycle import OtherCycle, other_cycle
 from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.estimates import (
+    beside_line,
+    contradicts_line,
     correlation_of,
     elastic_modes,
     estimates_of,
@@ -48,6 +51,7 @@ from feedsim.replay.estimates import (
     with_undecided,
 )
 from feedsim.replay.parameters import TABLE
+from feedsim.replay.rivals import Tried, with_rivals
 from feedsim.replay.selection import (
     BLOCKS,
     FOLDS,
@@ -69,6 +73,7 @@ EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 # Standard deviations of a delay [s], and of K_v over itself, below which a regression is better than a fit of the axis.
 DELAY_SIGMA, GAIN_SIGMA = 10e-6, 0.01
 MIN_MOVING_ROWS = 50  # in which the axis moves
+MISSED, FINEST = 3.0, 0.1e-6  # of the noise of a position, [m] at least: a fit that leaves more lacks something
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
 WEIGHT_TOLERANCE = 0.01  # change of a weight that moves no value by what its interval shows
 
@@ -87,6 +92,7 @@ class DriveFound:
         predicted: the same, of every quarter of the motion by a fit to the other three.
         other: a fit with another cycle of the position loop; None where the machine's is known.
         runs: of the units.
+        rivals: structures of the drive that were tried besides.
         modes: elastic ones. modes_predicted: number of modes -> rms of the position [m] of every quarter of the motion,
             by a fit to the other three. correlation: of the estimates that have an interval.
     """
@@ -106,6 +112,7 @@ class DriveFound:
     modes: tuple[ElasticMode, ...] = ()
     modes_predicted: Mapping[int, float] = field(default_factory=dict)
     correlation: Correlation | None = None
+    rivals: Sequence[Tried] = ()
 
 
 def identify_drive(
@@ -170,17 +177,30 @@ def identify_drive(
     free += ["omega_0", "D"] if drive.reference_model else []
     progress("first fit", 0, 2 + len(BLOCKS))
     parts: dict[str, float] = {}
-    undecided: list[Tuned] = []
+    may_be: Sequence[Tuned | Tried] = ()
+    rivals: Sequence[Tried] = ()
     chosen: tuple[str, ...] = ()
     if structure_known:
         own = {name for name, block in BLOCKS.items() if driven and _has(problem.start, block)}
         chosen = tuple(name for name in BLOCKS if name in own)
         free += [name for part in chosen for name in BLOCKS[part]]
-        found = problem.first(free)
+        found = _preloaded(problem, problem.first(free))
     else:
         found = _best_start(problem, free, candidates)
+        if not (begin is not None and begin.one_way):  # then what friction holds at rest is all that shows the load
+            found = _preloaded(problem, found)
         chosen, parts, found, undecided = friction_parts(problem, found, progress)
+        progress("rival structures", 1 + len(BLOCKS), 2 + len(BLOCKS))
+        found, rivals = with_rivals(problem, found, far=_misses(problem, found))
+        if any(one.taken for one in rivals):  # parts of the friction law may have made up for the structure
+            of_parts = [name for part in chosen for name in BLOCKS[part]]
+            found = problem.fitted([name for name in found.names if name not in of_parts], problem.start)
+            problem.weigh(found)
+            chosen, parts, found, undecided = friction_parts(problem, found, progress)
+            found, further = with_rivals(problem, found, far=False)
+            rivals = [*(one for one in rivals if one.taken), *further]
         without = found
+        may_be = [*undecided, *(one for one in rivals if not one.taken)]
     elastic: Mapping[int, float] = {}
     if modes != 0 and not structure_known:
         progress("elastic modes", 1 + len(BLOCKS), 2 + len(BLOCKS))
@@ -200,8 +220,10 @@ def identify_drive(
     if not each.record.driven:
         predicted = predicted[0], nan
     estimates = estimates_of(problem, found, unseen, delay, gain, structure_known)
-    if undecided:
-        estimates = with_undecided(estimates, without, undecided)
+    if may_be:
+        estimates = with_undecided(estimates, without, may_be)
+    if not structure_known:
+        estimates = beside_line(each, problem.machine, estimates)
     if begin is not None and begin.one_way:
         estimates = one_way(each, estimates, begin.one_way)
 
@@ -213,7 +235,7 @@ def identify_drive(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
         rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, other, problem.runs,
         elastic_modes(problem, found, unseen), elastic,
-        correlation_of(problem, found, unseen, delay, gain, estimates),
+        correlation_of(problem, found, unseen, delay, gain, estimates), rivals,
     )  # fmt: skip
 
 
@@ -286,6 +308,20 @@ def start_of(machine: Machine, axis: str) -> dict[str, float]:
 def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
     """Whether the friction has the part that a block is of."""
     return values[block[0]] != 0
+
+
+def _misses(problem: Problem, fit: Tuned) -> bool:
+    """Whether a fit leaves more than noise of the position, or has an inertia that the torque line contradicts."""
+    noise = max(white(problem.each.position), FINEST)
+    return rms(fit.position) > MISSED * noise or contradicts_line(problem.each, problem.machine, fit.values["J"])
+
+
+def _preloaded(problem: Problem, fit: Tuned) -> Tuned:
+    """The fit from the torque at rest of the record, where what was found does not come to rest with it by itself."""
+    if problem.replay.preload(*problem.tuned(fit.values)):
+        fit = problem.fitted(fit.names, fit.values, fit)
+        problem.weigh(fit)
+    return fit
 
 
 def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict[str, float]]) -> Tuned:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import hypot, nan
+from typing import Protocol
 
 import numpy as np
 
@@ -17,12 +18,14 @@ from feedsim.errors import InputError
 from feedsim.estimation.covariance import Covariance, correlation_length, stretched
 from feedsim.estimation.interval import NORMAL_95, half_width
 from feedsim.estimation.jackknife import between_groups
+from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS, estimate, inner_to_outer
 from feedsim.identify.position_loop import Constant, rms
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.elastic import KEYS, ElasticMode, modes_of
 from feedsim.replay.tuning import Problem, Tuned
+from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
 
 MAX_RESIDUAL_SHARE = 0.3  # share of the torque, or of the lag, that a fit may leave
@@ -35,8 +38,17 @@ _CONTROLLER = variables.parameters("controller")
 ON_THE_MODEL = "{} it rests on an axis that is taken to be rigid"
 SHARED_LAG = "{} only the lag shows, T_dyn + T_sym + (1 - k_ffw)/K_v, and it may be shared otherwise"
 SHARING = ("T_sym", "k_ffw")
-ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s",
-         "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
+LINE_SHARE = 0.02  # standard deviation of a line's inertia, and of its load over the friction, besides its own
+BESIDE_LINE = "{} is {:.4g} +- {:.2g} {} by the torque line of rigid motion, which needs no model of the drive"
+ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "filter_1.f", "J", "M_0", "F_C",
+         "F_S", "v_s", "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
+
+
+class _Valued(Protocol):
+    """What has values by name."""
+
+    @property
+    def values(self) -> Mapping[str, float]: ...
 
 
 def refuse_poor(each: AxisRecord, found: Tuned) -> None:
@@ -193,20 +205,68 @@ def shared_lag(estimates: Mapping[str, Estimate], without: str) -> dict[str, Est
     return {**estimates, **wider}
 
 
-def with_undecided(estimates: Mapping[str, Estimate], found: Tuned, undecided: Sequence[Tuned]) -> dict[str, Estimate]:
-    """Estimates whose intervals include what they would be with a part of the friction law that the record neither
-    asks for nor excludes: it is a part of what is not known.
+def with_undecided(
+    estimates: Mapping[str, Estimate], found: _Valued, undecided: Sequence[_Valued]
+) -> dict[str, Estimate]:
+    """Estimates whose intervals include what they would be with a part of the friction law, or of the drive, that the
+    record neither asks for nor excludes: it is a part of what is not known.
 
-    found: the fit without such parts. undecided: a fit with each of them.
+    found: a fit without such parts. undecided: with each of them.
     """
     wider = dict(estimates)
+
+    def value(values: Mapping[str, float], name: str) -> float:
+        if name == "T_n" and values.keys() >= {"K_p", "K_i"}:
+            return values["K_p"] / values["K_i"]
+        return values.get(name, nan)
+
     for name, one in estimates.items():
-        moved = max(
-            (abs(each.values[name] - found.values[name]) for each in undecided if name in found.names), default=0
-        )
+        moved = np.nanmax([0.0, *(abs(value(other.values, name) - value(found.values, name)) for other in undecided)])
         if moved > 0:
             wider[name] = replace(one, sigma=hypot(one.sigma, moved / NORMAL_95)).judged()
     return wider
+
+
+def _line_of(each: AxisRecord, machine: Machine) -> dict[str, Estimate]:
+    """Inertia and constant load by the torque line of rigid motion; none where the record has no such line, or has the
+    torque at one phase of the position cycle alone (start.of_cycle)."""
+    if machine.cycles.T_pos > 0.5 * each.record.interval:
+        return {}
+    rows = np.flatnonzero(each.rows)
+    try:
+        line = inertia([each.record.between(int(rows[0]), int(rows[-1]) + 1)])
+    except InputError:
+        return {}
+    # A simple friction and a rigid axis are not all that there is.
+    further = {"J": LINE_SHARE * line.J.value, "M_0": LINE_SHARE * line.estimates["F_C"].value}
+    return {
+        name: replace(one, sigma=hypot(one.sigma, abs(share)))
+        for name, share in further.items()
+        if (one := line.estimates[name]).status == "estimated"
+    }
+
+
+def contradicts_line(each: AxisRecord, machine: Machine, J: float) -> bool:
+    """Whether an inertia is none that the torque line of rigid motion allows for, whatever the drive."""
+    line = _line_of(each, machine).get("J")
+    return line is not None and not line.interval[0] <= J <= line.interval[1]
+
+
+def beside_line(each: AxisRecord, machine: Machine, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Estimates held against what needs no structure of the drive: where the torque line of rigid motion says something
+    else, an interval includes that. What rests on such an inertia is not determined."""
+    result = dict(estimates)
+    for name, line in _line_of(each, machine).items():
+        one = result[name]
+        apart, allowed = abs(one.value - line.value), half_width(one.sigma) + half_width(line.sigma)
+        if apart <= allowed:
+            continue
+        said = BESIDE_LINE.format(name, line.value, half_width(line.sigma), line.unit)
+        result[name] = replace(one, sigma=(apart + half_width(line.sigma)) / NORMAL_95).judged()
+        for other in (name, *(("K_p", "T_n") if name == "J" else ())):
+            if other != name or result[name].status == "undetermined":
+                result[other] = replace(result[other], status="undetermined", reason=said)
+    return result
 
 
 def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:

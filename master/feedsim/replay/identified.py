@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -12,6 +14,7 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
+from feedsim.identify.clipping import tied_at_limit
 from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
@@ -32,12 +35,16 @@ from feedsim.replay.machine_files import (
     simple_drive,
 )
 from feedsim.replay.outside import Line, without_outside
+from feedsim.replay.plausible import implausible
 from feedsim.replay.start import Begin, limits, of_cycle, start_values
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.structure import checked_modes
 
 OF_MACHINE = "of the machine"
-SETPOINT_ROUNDING = 1e-7  # of the way: a setpoint and a position that differ by rounding alone
+TIED = (
+    "axis {}: the torque lies at {:.4g} N.m to the last digit in {:.2g} % of the rows, where the range of the record "
+    "or the drive ends; these rows are left out of the fit. Record with a wider range, or drive more gently"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +54,8 @@ class DrivesFound:
     drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
     machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis. outside: axis -> lines
     from outside the axis, which were taken out of what was fitted. clipped: sentences on torque that is cut off.
-    undecided_cycle: whether the record speaks for no cycle of the position loop, and nobody has given one.
+    undecided_cycle: whether the record speaks for no cycle of the position loop, and nobody has given one. refused:
+    axis -> why it has no drive.
     """
 
     drives: Mapping[str, DriveFound]
@@ -56,6 +64,7 @@ class DrivesFound:
     outside: Mapping[str, Sequence[Line]] = field(default_factory=dict)
     clipped: Sequence[str] = ()
     undecided_cycle: bool = False
+    refused: Mapping[str, str] = field(default_factory=dict)
 
 
 def identify_drives(
@@ -70,8 +79,9 @@ def identify_drives(
     position_cycle: float | None = None,
     modes: int | None = 0,
     control: str = "",
+    refused: Mapping[str, str] | None = None,
 ) -> DrivesFound:
-    """Identify the drive of every axis.
+    """Identify the drive of every axis; one that is refused does not take the others along.
 
     Args:
         read, records: axis -> all of its record, and the stretch that is fitted.
@@ -81,23 +91,35 @@ def identify_drives(
             for it.
         modes: elastic ones of each rigid axis; None: as many as the record asks for.
         control: that the record is of, as machine files name it; empty: not known.
+        refused: further axes, and why they have no record.
 
-    Raises InputError: of an axis, what :func:`identify_drive` refuses; neither a torque nor a machine.
+    Raises InputError: every axis is refused: by :func:`identify_drive`, for its record is implausible, or because there
+        is neither a torque nor a machine.
     """
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
     fitted, outside = {}, {}
+    begins: dict[str, Begin | None] = {}
     clipped: list[str] = []
+    refusals = dict(refused or {})
     for axis, each in records.items():
-        _refuse_own_setpoint(each)
-        whole, said = _without_clipped(each, machine)
-        clipped += said
-        fitted[axis], outside[axis] = without_outside(whole)
-    begins = {axis: _begin(each) if machine is None else None for axis, each in fitted.items()}
+        with _refusing(axis, refusals):
+            _refuse_implausible(each)
+            J = _rigid_inertia(each, machine)
+            whole, said = unclipped(each, "the torque of these rows is left out of the fit", J)
+            if whole.record.driven:
+                marked, share = tied_at_limit(whole.record)
+                whole = replace(whole, record=marked)
+                if share and not said:
+                    said = (TIED.format(axis, float(np.max(np.abs(marked.torque))), 100 * share),)
+            own, lines = without_outside(whole, J)
+            begins[axis] = _begin(own) if machine is None else None
+            fitted[axis], outside[axis] = own, lines
+            clipped += said
     interval = next(iter(records.values())).record.interval
 
-    def drives(cycle: float) -> dict[str, DriveFound]:
-        found = {}
+    def drives(cycle: float) -> tuple[dict[str, DriveFound], dict[str, str]]:
+        found, failed = {}, dict(refusals)
         for axis, each in fitted.items():
 
             def tell(what: str, done: int, total: int, axis: str = axis) -> None:
@@ -108,6 +130,7 @@ def identify_drives(
                 begin = replace(begin, starts=[of_cycle(start, cycle, interval) for start in begin.starts])
             axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
             with (
+                _refusing(axis, failed),
                 _begun(machine, name, note, axes, interval, cycle) as own,
                 Replay(own, {axis: each}, fmus=fmus) as replay,
             ):
@@ -115,15 +138,17 @@ def identify_drives(
                     own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
                     beside_cycle=_other(cycle, interval) if machine is None else None, modes=modes, progress=tell,
                 )  # fmt: skip
-        return found
+        return found, failed
 
     # A drive that closes the position loop itself (DSC) does so in its own cycle; a control, in that of its rows.
     cycle = position_cycle or control_cycle(interval)
-    found, undecided = drives(cycle), False
+    (found, failed), undecided = drives(cycle), False
+    if not found:
+        raise InputError.of("no drive is identified", dict.fromkeys(failed.values()))
     if position_cycle is None and machine is None and (speaks := _speaks_for_other(found)) >= 0:
         # Fits that begin with either cycle must agree on it.
-        if speaks > 0 and _speaks_for_other(anew := drives(_other(cycle, interval))) < 0:
-            cycle, found = _other(cycle, interval), anew
+        if speaks > 0 and _speaks_for_other((anew := drives(_other(cycle, interval)))[0]) < 0:
+            cycle, (found, failed) = _other(cycle, interval), anew
         else:
             undecided = True
             found = {
@@ -144,7 +169,8 @@ def identify_drives(
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle, control)
-        beside = _beside(files, {axis: one.modes for axis, one in found.items()}, fitted, fmus)
+        own_modes = {axis: one.modes for axis, one in found.items()}
+        beside = _beside(files, own_modes, {axis: fitted[axis] for axis in found}, fmus)
         if any(modes != found[axis].modes for axis, modes in beside.items()):
             found = {axis: replace(one, modes=beside[axis]) for axis, one in found.items()}
             rigid = {axis: replace(each, modes=beside[axis]) for axis, each in rigid.items()}
@@ -154,17 +180,30 @@ def identify_drives(
         comparisons = [
             replace(replayed(made[axis], {axis: each}, fmus, records)[axis], clipped=())
             for axis, each in records.items()
+            if axis in found
         ]
-    return DrivesFound(found, comparisons, files, outside, clipped, undecided)
+    return DrivesFound(found, comparisons, files, outside, clipped, undecided, failed)
 
 
-def _without_clipped(each: AxisRecord, machine: Machine | None) -> tuple[AxisRecord, Sequence[str]]:
-    """The record with the rows marked at which its torque is cut off, and a sentence on them."""
-    J = checked_modes(machine).J_tot(each.axis) if machine is not None else None
-    if J is None and each.record.driven:
-        with suppress(InputError):  # where a torque is cut off, it comes out too small: what needs more, does
-            J = inertia([each.record]).J.value
-    return unclipped(each, "the torque of these rows is left out of the fit", J)
+@contextmanager
+def _refusing(axis: str, refused: dict[str, str]) -> Iterator[None]:
+    """A block in which an axis may be refused: then the reason is kept."""
+    try:
+        yield
+    except InputError as error:
+        refused[axis] = str(error)
+
+
+def _rigid_inertia(each: AxisRecord, machine: Machine | None) -> float | None:
+    """Inertia [kg.m2] of the machine, or of the rigid line; None where neither gives one.
+
+    Where a torque is cut off, that of the line is too small: what needs more than it, does.
+    """
+    if machine is not None:
+        return checked_modes(machine).J_tot(each.axis)
+    with suppress(InputError):
+        return inertia([each.record]).J.value if each.record.driven else None
+    return None
 
 
 def _beside(
@@ -202,16 +241,12 @@ def _begin(each: AxisRecord) -> Begin:
     return start_values(each)
 
 
-def _refuse_own_setpoint(each: AxisRecord) -> None:
-    """Raises InputError: the setpoint is the position itself, in which no lag shows a drive."""
-    way = float(np.ptp(each.position[each.rows]))
-    off = float(np.max(np.abs(each.setpoint - each.position)[each.rows]))
-    if way > 0 and off <= SETPOINT_ROUNDING * way:
+def _refuse_implausible(each: AxisRecord) -> None:
+    """Raises InputError: the record is not that of an axis that follows its setpoint."""
+    if reasons := implausible(each):
         raise InputError(
-            f"{each.record.name}, axis {each.axis}: the position setpoint is the recorded position (largest difference "
-            f"{1e9 * off:.3g} nm of a way of {1e3 * way:.4g} mm). The distance between them shows the drive, and a fit "
-            "without it gives a wrong load and friction. Name the column of the setpoint, or identify inertia and "
-            "friction alone: feedsim identify friction"
+            f"{'; '.join(reasons)}. No drive is identified; feedsim identify friction finds inertia and friction without a "
+            "setpoint"
         )
 
 
@@ -227,11 +262,15 @@ def _other(position_cycle: float, interval: float) -> float:
 
 @contextmanager
 def _folder(files: Mapping[str, str]) -> Iterator[Path]:
-    """A temporary folder with files."""
+    """A temporary folder with files. A message names them as what the record gives."""
     with TemporaryFolder() as folder:
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
-        yield folder
+        try:
+            yield folder
+        except InputError as error:
+            here = re.compile(rf"{re.escape(str(folder))}{re.escape(os.sep)}([\w.]+)(:\d+)?")
+            raise InputError(here.sub(r"\1, as the record gives it", str(error))) from None
 
 
 @contextmanager

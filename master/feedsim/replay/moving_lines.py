@@ -7,7 +7,8 @@ A line is a sine of one frequency, amplitude and phase over a motion in one dire
 * all thirds of the motion show it with about the same amplitude and phase, and no other line is beside it: a transient
   of the motion has a band;
 * it takes more than a resonance does that the setpoints of all axes of the record drive;
-* its frequency does not follow the speed, as that of cogging, of the screw and of its balls does.
+* its frequency does not follow the speed, as that of cogging, of the screw and of its balls does;
+* neither the record's known load nor its torque drives it.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from scipy.stats import f as f_distribution
 
 from feedsim.replay.closed_loop import MOVES, AxisRecord
 from feedsim.replay.elastic import DAMPING, resonator
-from feedsim.replay.outside import MIN_AMPLITUDE, Line, same_line, waves
+from feedsim.replay.outside import MIN_AMPLITUDE, Line, driven_by_record, same_line, waves
 from feedsim.trace.trace import Array
 
 Rows = NDArray[np.int64]
@@ -52,33 +53,40 @@ MAX_UNPREDICTED = 0.7  # share of that which a resonance leaves at most
 DRIVEN_SHARE = 0.01  # share of what an axis' setpoint drives in all of the record
 TRIED_RESONANCES = 5  # frequencies within a line width at which a resonance is tried
 UNDECIDED_GAIN, ORDER_GAIN = 0.8, 1.1  # gain of a sine over the angle, of the one over time
+SEPARATED = 0.25  # orders that a line width is at most where whole orders are separated
 TREND_COLUMNS = 4  # columns of a polynomial over the motion
 
 
 @dataclass(frozen=True)
 class _MotionLine:
-    """A line of a motion: Hz, probability under noise alone, speed [turns/s] and whether it may be an order of it."""
+    """A line of a motion: Hz, probability under noise alone, speed [turns/s], whether it may be a whole order of it,
+    and whether the motion separates orders."""
 
     line: Line
     chance: float
     turns: float
     order: bool
+    separated: bool
 
 
 def lines_in_motion(
-    axis_record: AxisRecord, error: Array, torque_error: Array | None, axes: Sequence[AxisRecord]
+    axis_record: AxisRecord,
+    error: Array,
+    torque_error: Array | None,
+    axes: Sequence[AxisRecord],
+    J: float | None = None,
 ) -> tuple[Line, ...]:
     """Lines in an axis' motion that no axis drives, by time and frequency.
 
     Args:
         error: (N,) recorded position less that of the simulation [m]. torque_error: (N,) the same of the torque [N.m].
-        axes: all that were recorded over the same time, this one included.
+        axes: all that were recorded over the same time, this one included. J: inertia [kg.m2], where it is known.
     """
     if RATE_SHARE / axis_record.record.interval <= MIN_FREQUENCY:  # the rows are too far apart for any line
         return ()
     longest = sorted(_one_way(axis_record), key=len)[-MAX_MOTIONS:]
     every = [
-        _Motion(axis_record, rows, error, torque_error, axes) for rows in sorted(longest, key=lambda rows: rows[0])
+        _Motion(axis_record, rows, error, torque_error, axes, J) for rows in sorted(longest, key=lambda rows: rows[0])
     ]
     motions = [motion for motion in every if motion.duration >= MIN_MOTION_TIME]
     lines = [
@@ -88,16 +96,22 @@ def lines_in_motion(
         if one.chance * len(motions) < MAX_CHANCE
     ]
 
-    def at_another_speed(one: _MotionLine) -> bool:
-        """Whether the frequency is the same in a motion of another speed: then it is no order of the turns."""
-        return any(
-            same_line(one.line, other.line)
-            and abs(other.turns / one.turns - 1) * one.line.frequency * (one.line.end - one.line.begin) > 1
+    def no_order(one: _MotionLine) -> bool:
+        """Whether motions of other speeds leave it open, or show, that the frequency does not follow the turns."""
+        others = [
+            other
             for other in lines
-            if other is not one
+            if one.turns and abs(other.turns / one.turns - 1) * one.line.frequency * one.line.duration > 1
+        ]
+        if any(same_line(one.line.at(one.line.frequency * other.turns / one.turns), other.line) for other in others):
+            return False
+        # Of two speeds that are whole multiples, different orders have the same frequency.
+        return not one.order or any(
+            same_line(one.line, other.line) and not (other.order and other.separated and one.separated)
+            for other in others
         )
 
-    return tuple(one.line for one in lines if not one.order or at_another_speed(one))
+    return tuple(one.line for one in lines if no_order(one))
 
 
 def _one_way(axis_record: AxisRecord) -> Iterator[Rows]:
@@ -134,6 +148,7 @@ class _Motion:
     error: Array
     torque_error: Array | None
     axes: Sequence[AxisRecord]
+    J: float | None
 
     def __post_init__(self) -> None:
         own = self.axis_record.record.interval  # [s] of the rows of the record
@@ -251,12 +266,14 @@ class _Motion:
         apart = [one for one in kept if abs(one - f) * self.duration > BAND_PRODUCT]
         if self._driven(f, self._remaining(apart), others):
             return None
-        over_angle, near, turns = self._over_angle(f, z)
+        over_angle, near, separated, turns = self._over_angle(f, z)
         if over_angle > ORDER_GAIN * gain:
             return None
-        force = 0.0 if self.force is None else float(np.hypot(*_fit(W, self.force)))
-        line = Line(f, size, force, float(self.time[0]), float(self.time[-1]))
-        return _MotionLine(line, self._chance(kept, k), turns, near and over_angle > UNDECIDED_GAIN * gain)
+        force = np.zeros(2) if self.force is None else _fit(W, self.force)
+        if driven_by_record(self.axis_record, f, [self.rows], c, force, self.J):
+            return None
+        line = Line(f, size, float(np.hypot(*force)), float(self.time[0]), float(self.time[-1]))
+        return _MotionLine(line, self._chance(kept, k), turns, near and over_angle > UNDECIDED_GAIN * gain, separated)
 
     def near(self, f: float) -> Array:
         """(2 BAND_TAPERS, N) orthonormal: what a signal over the rows has in a band about a frequency."""
@@ -290,16 +307,17 @@ class _Motion:
                 return _square(own - near @ best[other.rows]) < MAX_UNPREDICTED * _square(own)
         return True
 
-    def _over_angle(self, f: float, z: Array) -> tuple[float, bool, float]:
-        """What a sine over the motor's angle takes of z, whether it may be a whole order, and turns per second."""
+    def _over_angle(self, f: float, z: Array) -> tuple[float, bool, bool, float]:
+        """What a sine over the motor's angle takes of z, whether it may be a whole order, whether the motion is long
+        enough to separate orders, and turns per second."""
         turn = self.axis_record.position[self.rows] / (2 * np.pi * self.axis_record.I_P)
         rates = np.abs(np.gradient(turn, self.h))
         turns = float(np.median(rates)) or float(np.mean(rates))  # a coarse encoder repeats its value in most rows
         if not turns:  # the setpoint moves, the axis does not: no order
-            return 0.0, False, 0.0
+            return 0.0, False, False, 0.0
         order, width = f / turns, 1 / (turns * self.duration)
         gains = []
         for own in order + width * np.linspace(-1, 1, 21):
             W = _without_trend(waves(turn, own))
             gains.append(_square(W @ _fit(W, z)))
-        return max(gains), abs(order - round(order)) < width, turns
+        return max(gains), abs(order - round(order)) < width, width < SEPARATED, turns

@@ -4,6 +4,8 @@ A spindle or a pump shakes an axis whether it moves or not. No drive and no mode
 a fit takes it for elasticity of its own if one is near. It is found where the axis stands still, ahead of a motion and
 behind it: a sine of one frequency, amplitude and phase over both, so that either side predicts the other. Between them
 it is taken to go on as it was.
+
+A line that the record's known load has, or by which its torque moves the axis, is the axis' own.
 """
 
 from __future__ import annotations
@@ -30,6 +32,9 @@ MOST_LINES = 3
 MAX_NAMED_LINES = 4  # in a note
 SAME_LINE = 1.0  # by how many line widths frequencies of one line differ at most
 MIN_AMPLITUDE = 1e-8  # [m] amplitude: less is the digits of a record
+# Of a known load: frequencies beside a line, in line widths, and the share of their power that the line has to have.
+BAND_WIDTHS, LOAD_SHARE = 3, 0.5
+MOVED_BY_TORQUE = 0.3  # of the amplitude: how near the axis comes to what its torque does to its inertia
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,15 @@ class Line:
     end: float
 
     @property
+    def duration(self) -> float:
+        """[s]"""
+        return self.end - self.begin
+
+    def at(self, frequency: float) -> Line:
+        """The same of another frequency [Hz]."""
+        return replace(self, frequency=frequency)
+
+    @property
     def text(self) -> str:
         """In words, without the name of the axis."""
         torque = f" and {self.torque:.2g} N.m" if self.torque else ""
@@ -53,8 +67,11 @@ class Line:
         )
 
 
-def without_outside(axis_record: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
-    """The record without lines from outside, and those lines; the record itself where there are none."""
+def without_outside(axis_record: AxisRecord, J: float | None = None) -> tuple[AxisRecord, tuple[Line, ...]]:
+    """The record without lines from outside, and those lines; the record itself where there are none.
+
+    J: inertia of the axis [kg.m2], where it is known.
+    """
     position, torque = axis_record.position.copy(), axis_record.record.torque.copy()
     time, clean = axis_record.record.time, 0  # clean: rows ahead of it have lost their lines
     lines: list[Line] = []
@@ -74,6 +91,8 @@ def without_outside(axis_record: AxisRecord) -> tuple[AxisRecord, tuple[Line, ..
             own[whole] -= wave @ sine
             force = _sine(time, beside, frequency, before, after) if axis_record.record.driven else np.zeros(2)
             beside[whole] -= wave @ force
+            if driven_by_record(axis_record, frequency, (before, after), sine, force, J):
+                continue
             sizes = float(np.hypot(*sine)), float(np.hypot(*force))
             lines.append(Line(frequency, *sizes, float(time[rows[0]]), float(time[rows[-1]])))
         if len(lines) > count:
@@ -139,6 +158,32 @@ def _both(time: Array, signal: Array, frequency: float, before: Rows, after: Row
     return tuple(np.concatenate([detrended(of, rows) for rows in sides]) for of in (wave, signal))  # type: ignore[return-value]
 
 
+def driven_by_record(
+    axis_record: AxisRecord, frequency: float, stretches: Sequence[Rows], sine: Array, force: Array, J: float | None
+) -> bool:
+    """Whether a line is the axis' own: the known load has it, or the torque moves the inertia so.
+
+    The torque of a drive that answers to a line from outside has another size and phase.
+
+    Args:
+        stretches: rows over which the line is. sine, force: (2,) cosine and sine of position [m] and torque [N.m].
+    """
+    record = axis_record.record
+    if record.load is not None:
+        time, width = record.time, 1 / (record.time[stretches[-1][-1]] - record.time[stretches[0][0]])
+        band = [frequency, *(frequency + side * k * width for k in range(1, BAND_WIDTHS + 1) for side in (-1, 1))]
+        every = np.column_stack([waves(time, one) for one in band if one > 0])
+        columns, load = (np.concatenate([detrended(of, rows) for rows in stretches]) for of in (every, record.load))
+        line, whole = (part @ np.linalg.lstsq(part, load, rcond=None)[0] for part in (columns[:, :2], columns))
+        if line @ line > LOAD_SHARE * (whole @ whole):
+            return True
+    if J is None:
+        return False
+    angle = sine / axis_record.I_P
+    off = angle + force / (J * (2 * np.pi * frequency) ** 2)
+    return bool(np.hypot(*off) < MOVED_BY_TORQUE * np.hypot(*angle))
+
+
 def waves(time: Array, frequency: float) -> Array:
     """(N, 2) cosine and sine of 2 pi `frequency` `time`."""
     phase = 2 * np.pi * frequency * time
@@ -165,7 +210,7 @@ def in_words(axis: str, lines: Sequence[Line], moving: bool = False) -> str:
 
 def same_line(one: Line, other: Line) -> bool:
     """Whether two lines have the same frequency, as far as the shorter one determines it."""
-    return abs(one.frequency - other.frequency) * min(one.end - one.begin, other.end - other.begin) < SAME_LINE
+    return abs(one.frequency - other.frequency) * min(one.duration, other.duration) < SAME_LINE
 
 
 def _by_frequency(lines: Sequence[Line]) -> list[Line]:
@@ -177,7 +222,7 @@ def _by_frequency(lines: Sequence[Line]) -> list[Line]:
             result.append(line)
             continue
         both = line, result[k]
-        longer = max(both, key=lambda one: one.end - one.begin)
+        longer = max(both, key=lambda one: one.duration)
         begin, end = min(one.begin for one in both), max(one.end for one in both)
         result[k] = Line(
             longer.frequency, max(one.position for one in both), max(one.torque for one in both), begin, end

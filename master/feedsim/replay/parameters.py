@@ -48,6 +48,7 @@ TABLE: Mapping[str, Row] = {
     "K_v": Row(1.0, log=True),
     "omega_0": Row(0.7, log=True),
     "D": Row(0.5, log=True),
+    "filter_1.f": Row(0.7, log=True),  # of the low-pass that stands for a current loop
     "k_ffw": Row(0.5, lower=0.0, upper=1.5),
     "T_sym": Row(3e-3, lower=0.0, upper=0.02),
     "T_dyn": Row(10e-3, lower=0.0, upper=0.1),

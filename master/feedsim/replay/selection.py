@@ -21,7 +21,8 @@ from feedsim.trace.trace import Array
 
 Progress = Callable[[str, int, int], None]
 
-# Parts of the friction law that an axis may do without, in the order in which they are tried.
+# Parts of the friction law that an axis may do without, in the order in which they are taken: what acts at speed
+# carries over to other motion, what acts behind a reversal explains that one alone.
 BLOCKS: Mapping[str, tuple[str, ...]] = {
     "logarithmic rise": ("F_log",),
     "engaging zone": ("W", "gamma"),
@@ -60,12 +61,12 @@ def friction_parts(
             by = _predicted(problem, tried[part]) - score
             # Both partitions ask for it: what one gains at the other's cost is no law.
             gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
-        gain, part = max((gains[part], part) for part in tried)
-        if not gain >= BETTER:
+        asked = [part for part in tried if gains[part] >= BETTER]
+        if not asked:
             undecided = [value for part, value in tried.items() if gains[part] > -BETTER]
             break
-        chosen.append(part)
-        tuned = tried[part]
+        chosen.append(asked[0])
+        tuned = tried[asked[0]]
         problem.weigh(tuned)
     return tuple(chosen), gains, tuned, undecided
 

@@ -108,6 +108,9 @@ class Problem:
                 **{name: values[name] for name in ("omega_0", "D") if shipped.reference_model},
             }
         )  # fmt: skip
+        if "filter_1.f" in values:
+            low_pass = drive.filter_1.model_copy(update={"f": values["filter_1.f"]})
+            drive = drive.model_copy(update={"filter_1": low_pass})
         torques = {name: values[name] / scale for name in ("F_C", "sigma_0", "sigma_1", "sigma_2", "F_log")}
         friction = self.machine.shipped_friction(self.each.axis, "the identification of a drive").model_copy(
             update={
@@ -213,6 +216,17 @@ class Problem:
         """The same with its Jacobian by differences, which cross-validation and intervals are taken from."""
         problem = self._least_squares(fit.names)
         return self._tuned(problem, problem.exact(fit.point, central))
+
+    def residuals(self, names: Sequence[str], values: Mapping[str, float]) -> Array:
+        """(2 N + M,) as those of a fit, without one."""
+        problem = self._least_squares(tuple(names))
+        x = problem.position(values)
+        return problem.weighted(x, problem.errors(x))
+
+    def moved(self, fit: Tuned, step: Array) -> dict[str, float]:
+        """The values of a fit after a step (P,) in usual deviations, within the bounds."""
+        problem = self._least_squares(fit.names)
+        return problem.values(np.clip(fit.point.x + step, problem.low, problem.high))
 
     def _least_squares(self, names: tuple[str, ...]) -> LeastSquares:
         """The sum of squares over both channels in their weights and over how far every parameter is off its start."""

@@ -10,7 +10,7 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.arguments import spelt
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.findings import Note
+from feedsim.findings import Note, Wrong
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.replay.compare import Comparison
@@ -20,6 +20,7 @@ from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.replay.outside import in_words
+from feedsim.replay.rivals import ERROR_RATE
 from feedsim.report.content import FOLDER, Paragraph, Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
@@ -40,6 +41,11 @@ FRICTION_PARTS = (
 )
 
 
+STRUCTURES = (
+    "The fit is tried again with each of these: gain of the logarithm of the likelihood, and what it has to be for a "
+    f"test that errs in {100 * ERROR_RATE:.0f} % of the records. Intervals include the values with a structure that is "
+    "not taken."
+)
 MODES_TEXT = (
     "Shapes are relative to the rigid motion. A mode stays where a fit to three quarters of the motion predicts the "
     "fourth one better with it."
@@ -56,6 +62,7 @@ class DriveReport:
     name: str
     settings: Mapping[str, str]
     marks: Sequence[Mark]
+    unread: Sequence[str] = ()  # notes on columns
 
     @property
     def comparisons(self) -> Sequence[Comparison]:
@@ -76,7 +83,11 @@ class DriveReport:
     @property
     def warnings(self) -> list[str]:
         """What a user should know."""
-        reported = dict.fromkeys(text for source in self.sources for text in source.warnings)
+        reported: dict[str, None] = dict.fromkeys(
+            Wrong(f"axis {axis} has no drive: {reason}") for axis, reason in self.found.refused.items()
+        )
+        reported |= dict.fromkeys(text for source in self.sources for text in source.warnings)
+        reported |= dict.fromkeys(self.unread)
         reported |= dict.fromkeys(self.found.clipped)
         for axis, lines in self.found.outside.items():
             if lines:
@@ -166,6 +177,7 @@ def report_of(report: DriveReport) -> Report:
             *(_parameters(axis, one) for axis, one in drives.items()),
             *pictures,
             *(_parts(axis, one) for axis, one in drives.items() if one.parts),
+            *(_structures(axis, one) for axis, one in drives.items() if one.rivals),
             *(_modes(axis, one) for axis, one in drives.items() if one.modes_predicted or one.modes),
             figures_section(report.figures),
             control_section(machine_of(report)),
@@ -219,6 +231,15 @@ def _parts(axis: str, one: DriveFound) -> Section:
     return Section(f"What the friction of {axis} needs", [Paragraph(FRICTION_PARTS), table])
 
 
+def _structures(axis: str, one: DriveFound) -> Section:
+    rows = [
+        (rival.name, minus(f"{rival.gain:+.1f}"), f"{rival.least:.1f}", "taken" if rival.taken else "")
+        for rival in one.rivals
+    ]
+    heads = ("Structure of the drive", "Gain", "Needed", "")
+    return Section(f"What else the drive of {axis} may have", [Paragraph(STRUCTURES), Table("lrrl", heads, rows)])
+
+
 def _at_others(mode: ElasticMode) -> list[str]:
     """What a mode does at the scales of other axes, over the rigid motion of its own."""
     return [f"{entry.axis} {entry.shape:.2g} (+-{NORMAL_95 * entry.sigma:.2g})" for entry in mode.beside]
@@ -268,6 +289,10 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
                 "parts": {
                     part: {"gain": finite(gain), "taken": part in one.chosen} for part, gain in one.parts.items()
                 },
+                "structures": {
+                    rival.name: {"gain": rival.gain, "needed": rival.least, "taken": rival.taken}
+                    for rival in one.rivals
+                },
                 "predicted": {
                     "position": {"value": one.predicted[0], "unit": "m"},
                     "torque": {"value": finite(one.predicted[1]), "unit": "N.m"},
@@ -285,6 +310,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
             }
             for axis, one in report.found.drives.items()
         },
+        **({"refused": dict(report.found.refused)} if report.found.refused else {}),
         **({"beside_the_machine_file": beside_part(_beside(report))} if report.subject is not None else {}),
         "figures": figures_part(report.figures),
         "software": software(),

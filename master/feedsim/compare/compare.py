@@ -256,7 +256,7 @@ def _light(variables: Sequence[Variable]) -> tuple[Variable, ...]:
 
 def _unused(result: Series, reference: Series, tolerances: Tolerances, options: Options) -> list[str]:
     """Columns that are not read. InputError: rules that match nothing."""
-    notes = []
+    notes: list[str] = []
     own = [pattern for pattern, _ in tolerances.rules if pattern not in tolerances.shared]
     for what, patterns, names in (
         ("tolerance", own, reference.all_names),

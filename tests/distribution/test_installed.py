@@ -134,6 +134,7 @@ def test_every_way_of_use(installed: Installation) -> None:
         "friction",
         "friction",
         "friction",
+        "friction",
         "constant/log.csv",
         "--axes",
         "Z",

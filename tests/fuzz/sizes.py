@@ -1,8 +1,8 @@
 """Files of a size that a machine or a vandal makes: nested, long, wide, or many of one thing. A row for each.
 
 Every file is answered in time that grows with its size alone: `SIZE` bytes in `SECONDS` of a processor, of which a
-reader takes some tenths to two, and one that grows with the square many more. `files` makes the
-rows of a kind (kinds.py) into content.
+reader takes some tenths to two, and one that grows with the square many more. `files` makes content of the rows of a
+kind (kinds.py).
 """
 
 from __future__ import annotations

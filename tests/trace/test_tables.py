@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
+from feedsim.structure.modes import read_modes
+from feedsim.sweep.table import read_table
 from feedsim.trace import convert, read_csv, read_recording, read_series
 
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 VALUES = [1.25, 2.5, 4.0]
 ROWS = ["0,1.25", "0.002,2.5", "0.004,4.0"]
 
@@ -59,6 +62,22 @@ def test_the_same_table_in_other_forms(tmp_path: Path, lines: list[str]) -> None
     out = tmp_path / "out.csv"
     convert(path, [], out)
     np.testing.assert_array_equal(read_csv(out)["x"], VALUES)
+
+
+def test_tables_of_studies_and_modes_may_have_an_index(tmp_path: Path) -> None:
+    """As pandas writes one ahead where such a table was read and written again."""
+
+    def indexed(text: str) -> Path:
+        head, *rows = text.splitlines()
+        return file(tmp_path, "\n".join([f",{head}", *(f"{k},{row}" for k, row in enumerate(rows))]) + "\n")
+
+    study = read_table(indexed("run,seed,Z.F_C [N.m],status,seconds\n0,1,0.5,ok,0.5\n1,1,0.75,ok,0.5\n"))
+    assert list(study.columns) == ["run", "seed", "Z.F_C", "status", "seconds"]
+    assert study.columns["Z.F_C"].tolist() == [0.5, 0.75]
+    modes = (SCENARIOS / "machines" / "test_centre" / "modes.csv").read_text()
+    axes = ("X", "Y", "Z")
+    plain = read_modes(SCENARIOS / "machines" / "test_centre" / "modes.csv", axes)
+    np.testing.assert_array_equal(read_modes(indexed(modes), axes).frequency, plain.frequency)
 
 
 def test_a_column_without_a_name_is_reported(tmp_path: Path) -> None:

@@ -245,8 +245,8 @@ def _refuse_implausible(each: AxisRecord) -> None:
     """Raises InputError: the record is not that of an axis that follows its setpoint."""
     if reasons := implausible(each):
         raise InputError(
-            f"{'; '.join(reasons)}. No drive is identified; feedsim identify friction finds inertia and friction without a "
-            "setpoint"
+            f"{'; '.join(reasons)}. No drive is identified; feedsim identify friction finds inertia and friction "
+            "without a setpoint"
         )
 
 

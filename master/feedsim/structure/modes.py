@@ -21,6 +21,7 @@ from feedsim.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import Floats
 from feedsim.trace.files import written_whole
+from feedsim.trace.layout import named_columns, twice
 
 MODE, FREQUENCY, DAMPING = "mode", "frequency [Hz]", "damping ratio [1]"
 TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")
@@ -100,7 +101,7 @@ def read_modes(file: Path, axes: Sequence[str]) -> Modes:
 @lru_cache(maxsize=8)  # a run asks several times, many runs of a machine ask for the same
 def _read(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
     try:
-        rows = list(csv.reader(io.StringIO(text, newline="")))
+        rows = named_columns(list(csv.reader(io.StringIO(text, newline=""))))
     except csv.Error as error:
         raise InputError(f"{file}: cannot be read as a table of modes: {error}") from error
     ports = [f"{quantity}_{axis}" for quantity in ("n", "x") for axis in axes] + list(TOOL_PORTS)
@@ -150,7 +151,7 @@ def _header_problems(file: Path, header: Sequence[str], needed: Sequence[str]) -
     there = ", ".join(header)
     problems = [f"{file}:1: column '{name}' is missing; there is {there}" for name in needed if name not in header]
     problems += [f"{file}:1: column '{name}' belongs to no axis here" for name in header if name not in needed]
-    problems += [f"{file}:1: column '{name}' occurs twice" for name in dict.fromkeys(header) if header.count(name) > 1]
+    problems += [f"{file}:1: column '{name}' occurs twice" for name in twice(header)]
     return problems
 
 

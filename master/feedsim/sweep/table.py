@@ -26,6 +26,7 @@ from feedsim.sheets import read_rows, write_rows
 from feedsim.sweep.design import Design, Outcome
 from feedsim.trace import matches
 from feedsim.trace.files import written_whole
+from feedsim.trace.layout import named_columns, twice
 
 if TYPE_CHECKING:
     import pandas
@@ -245,14 +246,14 @@ def _cell(value: Any) -> str:
 def _read_csv(path: Path) -> Table:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in read_rows(file) if row]
+            rows = named_columns([row for row in read_rows(file) if row])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path} cannot be read: {error}") from None
     if not rows or "run" not in rows[0] or "status" not in rows[0]:
         raise InputError(f"{path}:1: not the table of a study: it has no columns run and status")
     heads = [_head(text) for text in rows[0]]
     names = [name for name, _ in heads]
-    if doubled := [name for name in names if names.count(name) > 1]:
+    if doubled := twice(names):
         raise InputError(f"{path}:1: two columns are called {doubled[0]!r}")
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(heads):

@@ -22,6 +22,7 @@ from feedsim.errors import InputError
 from feedsim.files import regular
 from feedsim.trace.capture_axes import CaptureAxis, axes_of
 from feedsim.trace.json_stream import JsonStream
+from feedsim.trace.layout import twice
 from feedsim.trace.trace import MAX_MAGNITUDE, Array, recorded
 
 SUFFIX = ".json"
@@ -233,7 +234,7 @@ def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
         )
     if COUNTER not in names:
         raise InputError(f"{path}: Header.SignalListHFData has no {COUNTER}, the counter that is the clock")
-    if doubled := [name for name in names if names.count(name) > 1]:
+    if doubled := twice(names):
         raise InputError(f"{path}: Header.SignalListHFData has {doubled[0]!r} twice")
     return names
 

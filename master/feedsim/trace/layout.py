@@ -9,7 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from feedsim.errors import InputError
@@ -116,6 +117,19 @@ def split_cells(line: str, separator: str) -> list[str]:
     if depth:  # a bracket that does not end
         return [cell for part in result for cell in part]
     return [separator.join(part) for part in result]
+
+
+def named_columns(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Rows of a table without its columns whose head, in the first row, is blank; rows of other lengths as they are."""
+    named = [i for i, head in enumerate(rows[0]) if head.strip()] if rows else []
+    if not named or len(named) == len(rows[0]):
+        return [list(row) for row in rows]
+    return [[row[i] for i in named] if len(row) == len(rows[0]) else list(row) for row in rows]
+
+
+def twice(names: Iterable[str]) -> list[str]:
+    """Names that are there more than once, each once."""
+    return [name for name, count in Counter(names).items() if count > 1]
 
 
 def titles(heads: Sequence[str]) -> list[str]:

@@ -171,34 +171,21 @@ def _grouped(
         )
     order = [k for _, own in groups for k in own]
     titles = dict(zip(order, unique(channels[k] for k in order), strict=True))
-    whole = base.since(base)
-    times = [own_clock.since(base) for own_clock, _ in groups]
-    # Of a clock that ticks less often every instant is one of the base, and a value lasts until the next one.
-    slower = [
-        bool(np.all(np.abs(whole[_at(whole, own)] - own) <= MAX_CLOCK_DIFFERENCE + 1e-9 * np.abs(own))) for own in times
-    ]
-    begin = max(own[0] for own in times)
-    end = min(own[-1] + (_usual_step(own) - _usual_step(whole) if held else 0.0)
-              for own, held in zip(times, slower, strict=True))  # fmt: skip
-    shared = (whole >= begin - MAX_CLOCK_DIFFERENCE) & (whole <= end + MAX_CLOCK_DIFFERENCE)
-    if shared.sum() < 2:
-        spans = [f"{titles[min(own)]} {time[0]:.6g} to {time[-1]:.6g} s"
-                 for time, (_, own) in zip(times, groups, strict=True)]  # fmt: skip
-        raise InputError(f"{path}: its channels have no time in common: {few(spans, 4)}")
-    time = whole[shared]
+    times = [clock.since(base) for clock, _ in groups]
+    time, slower = _one_time(path, base.since(base), times, [titles[min(own)] for _, own in groups])
     columns, units, notes, unknown, scaled = {"time": time}, {"time": "s"}, [], [], []
     resampled: list[str] = []
     interpolated: list[str] = []
-    for own_time, held, (_, values) in zip(times, slower, groups, strict=True):
-        at = _at(own_time, time)
-        same = bool(np.all(np.abs(own_time[at] - time) <= MAX_CLOCK_DIFFERENCE + 1e-9 * np.abs(time)))
+    for instants, held, (_, values) in zip(times, slower, groups, strict=True):
+        at = _at(instants, time)
+        same = _alike(instants[at], time)
         for k, signal in values.items():
             name = titles[k]
             # What is on or off has no values in between.
             stepped = (
                 held or same or _cell(header, "Data-Type", k).upper() in FLAGS or bool(np.isin(signal, (0, 1)).all())
             )
-            columns[name] = signal[at] if stepped else np.interp(time, own_time, signal)
+            columns[name] = signal[at] if stepped else np.interp(time, instants, signal)
             (resampled if stepped else interpolated).extend([] if same else [name])
             unit = _cell(header, "Unit", k)
             known = bool(unit) and known_unit(unit)
@@ -206,7 +193,7 @@ def _grouped(
             unknown += [name] if unit and not known and unit.strip("()").lower() not in ("none", "-") else []
             factor = _cell(header, "ScaleFactor", k).replace(",", ".")
             scaled += [name] if factor not in ("", "1", "1.0") else []
-    if time.size < whole.size or any(own[0] < begin - MAX_CLOCK_DIFFERENCE for own in times):
+    if time.size < base.instants.size or any(instants[0] < time[0] - MAX_CLOCK_DIFFERENCE for instants in times):
         notes.append(
             f"{path}: its channels begin or end at different times; read are {time[0]:.6g} to {time[-1]:.6g} s, where "
             f"all are recorded, counted from the first value of {titles[min(channels_of_base)]}"
@@ -244,6 +231,29 @@ def _clock(path: Path, rows: Sequence[tuple[int, Sequence[str]]], column: int) -
         line, before, after = rows[int(back[0]) + 1][0], times[back[0]], times[back[0] + 1]
         raise InputError(f"{path}:{line}: the time {after:.15g} follows {before:.15g}; it must increase")
     return _Clock(instants, TICK if dates else MS)
+
+
+def _one_time(path: Path, base: Array, times: Sequence[Array], names: Sequence[str]) -> tuple[Array, list[bool]]:
+    """Instants of the base at which all of several clocks run, and which of these tick less often at the same instants.
+
+    names: of a channel of every clock. InputError: they have no time in common.
+    """
+    slower = [_alike(base[_at(base, instants)], instants) for instants in times]
+    begin = max(instants[0] for instants in times)
+    # A value of what ticks less often lasts until the next one.
+    lasting = [_usual_step(instants) - _usual_step(base) if held else 0.0
+               for instants, held in zip(times, slower, strict=True)]  # fmt: skip
+    end = min(instants[-1] + more for instants, more in zip(times, lasting, strict=True))
+    time = base[(base >= begin - MAX_CLOCK_DIFFERENCE) & (base <= end + MAX_CLOCK_DIFFERENCE)]
+    if time.size < 2:
+        spans = [f"{name} {own[0]:.6g} to {own[-1]:.6g} s" for name, own in zip(names, times, strict=True)]
+        raise InputError(f"{path}: its channels have no time in common: {few(spans, 4)}")
+    return time, slower
+
+
+def _alike(one: Array, other: Array) -> bool:
+    """Whether instants of two clocks are the same."""
+    return bool(np.all(np.abs(one - other) <= MAX_CLOCK_DIFFERENCE + 1e-9 * np.abs(other)))
 
 
 def _at(instants: Array, time: Array) -> NDArray[np.intp]:

@@ -18,6 +18,7 @@ from feedsim.fields import did_you_mean
 from feedsim.structure.assembly import Floats, Integers, few
 from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw
 from feedsim.structure.modes import TOOL_PORTS
+from feedsim.trace.layout import named_columns, twice
 
 MOST_PROBLEMS = 20
 
@@ -41,7 +42,8 @@ def read_table(file: Path, what: str, headers: Sequence[Sequence[str]], optional
     """
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            lines = [(number, [cell.strip() for cell in row]) for number, row in enumerate(csv.reader(stream), 1)]
+            rows = named_columns([[cell.strip() for cell in row] for row in csv.reader(stream)])
+            lines = list(enumerate(rows, 1))
     except FileNotFoundError:
         raise InputError(f"{file}: no such file ({what})") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -56,8 +58,7 @@ def read_table(file: Path, what: str, headers: Sequence[Sequence[str]], optional
     problems = [
         f"{file}:1: unknown column {name!r}{did_you_mean(name, known)}" for name in columns if name not in known
     ]
-    twice = [name for name in dict.fromkeys(columns) if columns.count(name) > 1]
-    problems += [f"{file}:1: column {name!r} occurs twice" for name in twice]
+    problems += [f"{file}:1: column {name!r} occurs twice" for name in twice(columns)]
     problems += [
         f"{file}:{number}: {len(row)} cells; the header has {len(columns)}"
         for number, row in lines[1:]

@@ -54,8 +54,8 @@ def test_the_walk_through_the_house_meets_files_that_are_there() -> None:
 def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What they run is only opened, with what they set; one file, the smaller one, serves all."""
     page = (ROOT / "docs" / "ssp.md").read_text(encoding="utf-8")
-    commands = [shlex.split(found) for found in re.findall(r"(?m)(?:^|`)feedsim ((?:ssp|run) [^`\n]*)", page)]
-    assert {command[0] for command in commands} == {"ssp", "run"}
+    commands = [shlex.split(found) for found in re.findall(r"(?m)(?:^|`)feedsim ((?:export|run) [^`\n]*)", page)]
+    assert {command[0] for command in commands} == {"export", "run"}
     assert sum("--set" in command for command in commands) == 2
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenarios").symlink_to(ROOT / "scenarios", target_is_directory=True)
@@ -63,13 +63,13 @@ def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypat
     assert cli.main(["export", "scenarios/z_positioning.yaml", "--out", str(written)]) == 0
     for command in commands:
         options = cli.parser().parse_args(command)
-        if command[0] == "ssp":
-            scenario.load(options.scenario, options.set)
+        if command[0] == "export":
+            scenario.load(options.subject, vars(options).get("set", ()))
             options.out.symlink_to(written)
             continue
         if options.scenario.name == "x.ssp":  # what the page calls any such file
             options.scenario = written
-        with ssp.opened(options.scenario, options.set) as found:
+        with ssp.opened(options.scenario, vars(options).get("set", ())) as found:
             assert found.scenario.machine.axes
 
 

@@ -41,7 +41,7 @@ def end_program(program: Callable[[], object]) -> None:
     arrived: list[int] = []
     raised: list[weakref.ref[Ended]] = []
     dead: list[weakref.ref[Ended]] = []
-    main, shown, told = threading.main_thread().ident or 0, sys.unraisablehook, sys.excepthook
+    main, shown, hook = threading.main_thread().ident or 0, sys.unraisablehook, sys.excepthook
 
     def end(number: int, frame: FrameType | None) -> None:
         arrived.append(number)
@@ -77,7 +77,7 @@ def end_program(program: Callable[[], object]) -> None:
 
     def tell(*error: Any) -> None:
         if not arrived:  # else it is most likely what a library has made of Ended
-            told(*error)
+            hook(*error)
 
     def leave() -> None:
         if arrived:

@@ -25,7 +25,7 @@ FIGURE_ORDER = (
     "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "cogging", "straightness",
     "third", "drift", "centres", "radii", "radius", "offset", "rest",
 )  # fmt: skip
-ANGLES = 720  # at which two directions are compared: every half degree
+COMPARED_ANGLES = 720  # at which two directions are compared: every half degree
 
 
 def diagnosed(
@@ -144,7 +144,7 @@ def both_directions(turns: Sequence[tuple[Array, Array]], radius: float, axes: t
     """The same of two turns by their angles [rad] and deviations of the radius [m]."""
     centre = fitted_centre(np.concatenate([a for a, _ in turns]), np.concatenate([e for _, e in turns]), radius)
     around = [about(angle, deviation, radius, centre) for angle, deviation in turns]
-    even: Array = np.arange(ANGLES, dtype=np.float64) * (2 * math.pi / ANGLES) - math.pi
+    even: Array = np.arange(COMPARED_ANGLES, dtype=np.float64) * (2 * math.pi / COMPARED_ANGLES) - math.pi
     there, again = (_at(even, angle, deviation) for angle, deviation in around)
     letters = axis_letters(axes)
     both = np.concatenate([deviation for _, deviation in around])

@@ -182,7 +182,7 @@ def _tightest(every: Sequence[tuple[Archive, Entry]], own: Sequence[tuple[Archiv
             return Sought(every, None, f"{entry.text[:20]!r} of {entry.section} ({where}) is no number")
         if limits.setdefault(entry.section, limit) != limit:
             return Sought(every, None, f"{entry.section} has several values, the last in {where}")
-    chosen = min(own, key=lambda each: each[1].sense * limits[each[1].section])
+    chosen = min(own, key=lambda pair: pair[1].sense * limits[pair[1].section])
     others = [f"{entry.section} has {entry.text}" for _, entry in own
               if limits[entry.section] != limits[chosen[1].section]]  # fmt: skip
     note = f"{chosen[1].text} of {chosen[1].section} acts, {', '.join(dict.fromkeys(others))}" if others else ""

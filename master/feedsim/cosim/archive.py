@@ -112,11 +112,11 @@ class Archive(Closing):
         """What a user should know of it, a sentence each."""
         if not self.problems:
             return []
-        told = "; ".join(problem.strip()[:MAX_PROBLEM] for problem in self.problems[:MAX_PROBLEMS])
+        listed = "; ".join(problem.strip()[:MAX_PROBLEM] for problem in self.problems[:MAX_PROBLEMS])
         more = len(self.problems) - MAX_PROBLEMS
         return [
             f"{self.path.name}: its modelDescription.xml is not what FMI 2.0 demands, and was read as well as it can "
-            f"be: {told}{f'; {more} more like these' if more > 0 else ''}"
+            f"be: {listed}{f'; {more} more like these' if more > 0 else ''}"
         ]
 
     def unknown_unit(self, name: str) -> str | None:

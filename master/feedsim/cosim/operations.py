@@ -290,8 +290,8 @@ class Executor:
         count = len(self._operations)
         for i in ((at + 1 + k) % count for k in range(count - 1)):
             operation = self._operations[i]
-            found = operation.kind in ("get_real", "get_slopes") and operation.when is None
-            if found and (fault := not_finite(operation.names, operation.y)):
+            is_output = operation.kind in ("get_real", "get_slopes") and operation.when is None
+            if is_output and (fault := not_finite(operation.names, operation.y)):
                 return i, f"slope of {fault}" if operation.kind == "get_slopes" else fault
         return None
 

@@ -176,14 +176,14 @@ def _grouped(
     columns, units, notes, unknown, scaled = {"time": time}, {"time": "s"}, [], [], []
     resampled: list[str] = []
     interpolated: list[str] = []
-    for instants, held, (_, values) in zip(times, slower, groups, strict=True):
+    for instants, keeps, (_, values) in zip(times, slower, groups, strict=True):
         at = _at(instants, time)
         same = _alike(instants[at], time)
         for k, signal in values.items():
             name = titles[k]
             # What is on or off has no values in between.
             stepped = (
-                held or same or _cell(header, "Data-Type", k).upper() in FLAGS or bool(np.isin(signal, (0, 1)).all())
+                keeps or same or _cell(header, "Data-Type", k).upper() in FLAGS or bool(np.isin(signal, (0, 1)).all())
             )
             columns[name] = signal[at] if stepped else np.interp(time, instants, signal)
             (resampled if stepped else interpolated).extend([] if same else [name])
@@ -241,8 +241,8 @@ def _one_time(path: Path, base: Array, times: Sequence[Array], names: Sequence[s
     slower = [_alike(base[_at(base, instants)], instants) for instants in times]
     begin = max(instants[0] for instants in times)
     # A value of what ticks less often lasts until the next one.
-    lasting = [_usual_step(instants) - _usual_step(base) if held else 0.0
-               for instants, held in zip(times, slower, strict=True)]  # fmt: skip
+    lasting = [_usual_step(instants) - _usual_step(base) if keeps else 0.0
+               for instants, keeps in zip(times, slower, strict=True)]  # fmt: skip
     end = min(instants[-1] + more for instants, more in zip(times, lasting, strict=True))
     time = base[(base >= begin - MAX_CLOCK_DIFFERENCE) & (base <= end + MAX_CLOCK_DIFFERENCE)]
     if time.size < 2:

@@ -22,7 +22,7 @@ from feedsim.uncertainty.draws import Cloud, Known, draw_named, drawn_friction, 
 from feedsim.uncertainty.spread import interval, share_of
 
 Array = NDArray[np.float64]
-ANGLES = 1440  # points of a contour
+CONTOUR_POINTS = 1440  # points of a contour
 STOP_POINTS, TIME_BEHIND_STOP = 600, 0.3  # points of a stop, and the time behind it [s] that they lie in
 
 
@@ -168,10 +168,10 @@ def curves_of(result: Result) -> dict[tuple[str, str], tuple[Array, Array]]:
 
 
 def contour_of(turn: Contour) -> Array:
-    """(ANGLES,) deviation of the radius [m] at angles that are the same for every turn."""
+    """(CONTOUR_POINTS,) deviation of the radius [m] at angles that are the same for every turn."""
     order = np.argsort(turn.angle)
     return np.asarray(np.interp(_angles(), turn.angle[order], turn.deviation[order], period=2 * math.pi))
 
 
 def _angles() -> Array:
-    return np.linspace(-math.pi, math.pi, ANGLES, endpoint=False)
+    return np.linspace(-math.pi, math.pi, CONTOUR_POINTS, endpoint=False)

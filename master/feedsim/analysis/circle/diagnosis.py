@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.cogging import fitted, without
-from feedsim.analysis.circle.geometry import ANGLES, CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.geometry import ANGLE_TERMS, CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import ESSENTIAL, Fit
 from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circle.vibration import Vibration, vibrations
@@ -508,7 +508,7 @@ def _unseparated(fit: Fit) -> tuple[str, ...]:
     keys = {"offset_0": "offset", "offset_1": "offset"}
     if "servo" not in fit.names:
         keys["squareness"] = "squareness_or_servo"
-    lengths = [name not in ANGLES for name in fit.names]
+    lengths = [name not in ANGLE_TERMS for name in fit.names]
     rows = [
         row
         for row, name in enumerate(fit.names)

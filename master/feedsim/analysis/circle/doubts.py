@@ -37,7 +37,7 @@ STILL, MOVED = 5, 3.0
 # A sample stands out alone where it is off the median of so many neighbours by so many times their scatter, and by so
 # much of the range of all others: more where an axis reverses, as peaks of friction are narrow.
 OUTLIER_NEIGHBOURS, OUTLIER_SCATTER, OF_RANGE, OF_RANGE_AT_REVERSAL, REVERSAL = 3, 8.0, 0.3, 2.0, math.radians(6)
-FINEST = 1e-12  # [m]; below it a step is rounding
+ROUNDING_STEP = 1e-12  # [m]; below it a step is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
     span = float(min(ordered[-3] - ordered[0], ordered[-1] - ordered[2], ordered[-2] - ordered[1]))
     to_reversal = np.abs((turned + math.pi / 4) % (math.pi / 2) - math.pi / 4)
     share = np.where(to_reversal < REVERSAL, OF_RANGE_AT_REVERSAL, OF_RANGE)
-    values = (off > OUTLIER_SCATTER * scatter) & (off > share * span) & (off > FINEST)
+    values = (off > OUTLIER_SCATTER * scatter) & (off > share * span) & (off > ROUNDING_STEP)
     # Three beside each other are a motion.
     three = values & np.r_[False, values[:-1]] & np.r_[values[1:], False]
     wide = three | np.r_[False, three[:-1]] | np.r_[three[1:], False]
@@ -175,7 +175,7 @@ def _missing(turned: Array) -> Iterator[str]:
 def _step(values: Array) -> float:
     """The step that all values are multiples of, 0 where there is none."""
     steps = np.diff(np.unique(values))
-    steps = steps[steps > FINEST]
+    steps = steps[steps > ROUNDING_STEP]
     if not steps.size:
         return 0.0
     step = float(steps.min())
@@ -195,7 +195,7 @@ def longest_run(same: NDArray[np.bool_]) -> tuple[int, int]:
 
 def _clipped_position(axis: str, values: Array, other: Array, radius: float, step: float) -> Iterator[str]:
     for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
-        first, length = longest_run(np.abs(values - end) <= FINEST)
+        first, length = longest_run(np.abs(values - end) <= ROUNDING_STEP)
         rows = slice(first, first + length)
         moves = np.sqrt(np.maximum(radius**2 - other[rows] ** 2, 0.0))
         if length >= STILL and (gone := float(np.ptp(moves))) > max(MOVED * step, 1e-6):
@@ -207,7 +207,7 @@ def _clipped_position(axis: str, values: Array, other: Array, radius: float, ste
 
 def _clipped_deviation(values: Array) -> Iterator[str]:
     for end, word, inner in ((float(values.max()), "largest", -1), (float(values.min()), "smallest", 1)):
-        same = np.abs(values - end) <= FINEST
+        same = np.abs(values - end) <= ROUNDING_STEP
         _, length = longest_run(same)
         levels, counts = np.unique(values, return_counts=True)
         beside = counts[-6:-1] if inner < 0 else counts[1:6]

@@ -24,7 +24,7 @@ PITCHES, FEWEST_PITCHES = 2.0, 0.5
 COURSE_POINTS = 1024
 # More samples of a turn add nothing to its shape.
 MAX_TURN_SAMPLES = 8000
-ANGLES = ("angle", "angle_cos", "angle_sin")  # terms that written angles may be larger by
+ANGLE_TERMS = ("angle", "angle_cos", "angle_sin")  # terms that written angles may be larger by
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
 CLOSED = 0.01
 
@@ -178,7 +178,7 @@ def angle_waves(path: TurnedPath) -> dict[str, Array]:
     that lies off its centre. Positions of both axes give the angle without such an axle."""
     axle = 0.0 if path.phase is not None else 1.0
     waves = np.ones(len(path.angle)), axle * np.cos(path.angle), axle * np.sin(path.angle)
-    return dict(zip(ANGLES, waves, strict=True))
+    return dict(zip(ANGLE_TERMS, waves, strict=True))
 
 
 def displacements(

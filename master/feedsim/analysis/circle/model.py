@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import (
-    ANGLES,
+    ANGLE_TERMS,
     FEWEST_PITCHES,
     PITCHES,
     PLAY,
@@ -182,7 +182,7 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     """
     if not circle.recorded:
         return _told(circle, paths, {})
-    still = dict.fromkeys(ANGLES, (0.0, CHANGE_FLOOR))
+    still = dict.fromkeys(ANGLE_TERMS, (0.0, CHANGE_FLOOR))
     wide = _fit(circle, paths, Left(*np.radians(EDGE_SEARCH_ANGLES)), Shape(known=still))
     lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
     signals = [residual + step for residual, step in zip(wide.residual, lost, strict=True)]

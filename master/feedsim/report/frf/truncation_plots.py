@@ -23,7 +23,7 @@ TABLES: tuple[tuple[str, Dash], ...] = (
     (ORANGE, ""),
 )
 MOST_COLUMNS = 3
-FINEST, COARSEST = 1e-4, 100.0  # dB, of the axis of deviations
+SMALLEST_DEVIATION, LARGEST_DEVIATION = 1e-4, 100.0  # dB, of the axis of deviations
 AGREED = 0.1  # dB
 PLOTTED_QUANTITIES = (  # stem, title, what is drawn per axis, ordinate
     ("truncation-n_M", "n/M", "{0}.n_a/{0}.M_a", Ordinate("|n_a/M_a|", "dB re 1 (rad/s)/(N·m)")),
@@ -85,12 +85,12 @@ def _picture(
         others = {model: response for model, response in responses.items() if model != FULL}
         for (colour, dash), (model, response) in zip(TABLES, others.items(), strict=False):
             curves.append(Curve(model, response.frequency, ordinate.of(response[name]), colour, dash, 1.2))
-            size = np.maximum(np.abs(deviation(response, full, name)), FINEST)
+            size = np.maximum(np.abs(deviation(response, full, name)), SMALLEST_DEVIATION)
             off.append(Curve(model, full.frequency, size, colour, dash, 1.2))
         heading = f"{'Direction' if name.startswith('tool') else 'Axis'} {title}"
         axis = Axis(ordinate.label, ordinate.unit, log=not ordinate.decibel)
         above.append(Panel(heading, frequency, axis, curves, [dropped], linked="f"))
-        axis = Axis("deviation", "dB", log=True, span=(FINEST, COARSEST))
+        axis = Axis("deviation", "dB", log=True, span=(SMALLEST_DEVIATION, LARGEST_DEVIATION))
         below.append(
             Panel("", frequency, axis, off, [dropped, Level(AGREED, f"{AGREED:g} dB")], linked="f", height=0.8)
         )

@@ -218,6 +218,8 @@ def with_undecided(
     def value(values: Mapping[str, float], name: str) -> float:
         if name == "T_n" and values.keys() >= {"K_p", "K_i"}:
             return values["K_p"] / values["K_i"]
+        if name == "T_dyn" and name not in values:  # what T_sym leaves of a delay that is known
+            return -values.get("T_sym", nan)
         return values.get(name, nan)
 
     for name, one in estimates.items():
@@ -227,14 +229,14 @@ def with_undecided(
     return wider
 
 
-def _line_of(each: AxisRecord, machine: Machine) -> dict[str, Estimate]:
+def _line_of(axis_record: AxisRecord, machine: Machine) -> dict[str, Estimate]:
     """Inertia and constant load by the torque line of rigid motion; none where the record has no such line, or has the
     torque at one phase of the position cycle alone (start.of_cycle)."""
-    if machine.cycles.T_pos > 0.5 * each.record.interval:
+    if machine.cycles.T_pos > 0.5 * axis_record.record.interval:
         return {}
-    rows = np.flatnonzero(each.rows)
+    rows = np.flatnonzero(axis_record.rows)
     try:
-        line = inertia([each.record.between(int(rows[0]), int(rows[-1]) + 1)])
+        line = inertia([axis_record.record.between(int(rows[0]), int(rows[-1]) + 1)])
     except InputError:
         return {}
     # A simple friction and a rigid axis are not all that there is.
@@ -246,17 +248,17 @@ def _line_of(each: AxisRecord, machine: Machine) -> dict[str, Estimate]:
     }
 
 
-def contradicts_line(each: AxisRecord, machine: Machine, J: float) -> bool:
+def contradicts_line(axis_record: AxisRecord, machine: Machine, J: float) -> bool:
     """Whether an inertia is none that the torque line of rigid motion allows for, whatever the drive."""
-    line = _line_of(each, machine).get("J")
+    line = _line_of(axis_record, machine).get("J")
     return line is not None and not line.interval[0] <= J <= line.interval[1]
 
 
-def beside_line(each: AxisRecord, machine: Machine, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+def beside_line(axis_record: AxisRecord, machine: Machine, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """Estimates held against what needs no structure of the drive: where the torque line of rigid motion says something
     else, an interval includes that. What rests on such an inertia is not determined."""
     result = dict(estimates)
-    for name, line in _line_of(each, machine).items():
+    for name, line in _line_of(axis_record, machine).items():
         one = result[name]
         apart, allowed = abs(one.value - line.value), half_width(one.sigma) + half_width(line.sigma)
         if apart <= allowed:

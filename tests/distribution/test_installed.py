@@ -135,6 +135,8 @@ def test_every_way_of_use(installed: Installation) -> None:
         "friction",
         "friction",
         "friction",
+        "friction",
+        "friction",
         "constant/log.csv",
         "--axes",
         "Z",

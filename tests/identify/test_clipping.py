@@ -10,7 +10,7 @@ import pytest
 
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import identify
-from feedsim.identify.clipping import without_clipped
+from feedsim.identify.clipping import tied_at_limit, without_clipped
 from feedsim.identify.inertia import inertia
 from feedsim.identify.options import Options
 from feedsim.identify.plateaus import plateaus
@@ -214,3 +214,20 @@ def test_what_clipping_leaves_open_is_not_determined() -> None:
     for name, each in found.estimates.items():
         if each.status == "estimated" and name in TRUE:
             assert each.interval[0] <= TRUE[name] <= each.interval[1], name
+
+
+@pytest.mark.parametrize("limit", [0.6, 0.9])
+def test_torque_at_one_value_to_the_last_digit(limit: float) -> None:
+    """A range that ends below what a move needs, also where nothing else shows it; a torque of 1 N.m steps has many
+    rows at every value, and noise none."""
+    time = 2e-3 * np.arange(600)
+    speed = 100.0 * np.sin(2 * np.pi * 1.7 * time)
+    torque = 15.0 + 2.6 * np.sign(speed) + 0.02 * np.gradient(speed, 2e-3)
+    torque += 0.1 * np.random.default_rng(1).standard_normal(600)
+    most = limit * float(np.max(torque))
+
+    def share(values: np.ndarray) -> float:
+        return tied_at_limit(Record("made", time=time, torque=values, speed=speed))[1]
+
+    assert share(np.clip(torque, -most, most)) == pytest.approx(np.mean(torque >= most))
+    assert share(torque) == share(np.round(torque)) == 0.0

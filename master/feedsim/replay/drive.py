@@ -73,7 +73,10 @@ EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 # Standard deviations of a delay [s], and of K_v over itself, below which a regression is better than a fit of the axis.
 DELAY_SIGMA, GAIN_SIGMA = 10e-6, 0.01
 MIN_MOVING_ROWS = 50  # in which the axis moves
-MISSED, SMALLEST_NOISE = 3.0, 0.1e-6  # of the noise of a position, [m] at least: a fit that leaves more lacks something
+MISSED, MIN_POSITION_NOISE = (
+    3.0,
+    0.1e-6,
+)  # of the noise of a position, [m] at least: a fit that leaves more lacks something
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
 WEIGHT_TOLERANCE = 0.01  # change of a weight that moves no value by what its interval shows
 
@@ -312,7 +315,7 @@ def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
 
 def _misses(problem: Problem, fit: Tuned) -> bool:
     """Whether a fit leaves more than noise of the position, or has an inertia that the torque line contradicts."""
-    noise = max(white(problem.each.position), SMALLEST_NOISE)
+    noise = max(white(problem.each.position), MIN_POSITION_NOISE)
     return rms(fit.position) > MISSED * noise or contradicts_line(problem.each, problem.machine, fit.values["J"])
 
 

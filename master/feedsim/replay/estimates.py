@@ -218,6 +218,8 @@ def with_undecided(
     def value(values: Mapping[str, float], name: str) -> float:
         if name == "T_n" and values.keys() >= {"K_p", "K_i"}:
             return values["K_p"] / values["K_i"]
+        if name == "T_dyn" and name not in values:  # what T_sym leaves of a delay that is known
+            return -values.get("T_sym", nan)
         return values.get(name, nan)
 
     for name, one in estimates.items():

@@ -206,7 +206,9 @@ def test_initial_values_depend_on_the_inputs_that_are_told(archive: Archive) -> 
             slave.freeInstance()
     candidates = {reference + 1 for reference, _ in inputs}
     told = {index: known & candidates for index, known in _structure(archive, "InitialUnknowns").items()}
-    assert found == told
+    names = {int(each.attrib["valueReference"]) + 1: each.attrib["name"] for each in elements}
+    for index, known in told.items():  # n_a moves x_m through a hysteresis of measuring, which is off by default
+        assert found[index] <= known <= found[index] | {k for k in known if (names[index], names[k]) == ("x_m", "n_a")}
 
 
 def _one_digit_off(guid: str, digit: int) -> str:

@@ -76,7 +76,7 @@ def refusal(file: Path, *overrides: str) -> InputError:
         ('stopTime="', 'stopTime="soon', "is no number"),
         ('stopTime="', 'stopTime="-', "position cycles; allowed"),
         ('stopTime="', 'stopTime="9999999', "position cycles; allowed"),
-        ('"motions": [', '"motions": [,', "annotation feedsim.scenario is not readable JSON"),
+        ('"motions": [', '"motions": [,', "annotation feedsim.scenario is no JSON that can be read"),
         ('"note": "",', '"noot": "",', "unknown key 'noot'"),
         ('"cycles": {', '"cycles": 1, "x": {', "has no machine with cycles, path and axes"),
         ('"kind": "move"', '"kind": "setpoints", "file": "/etc/passwd"', "names the recording '/etc/passwd'"),
@@ -327,7 +327,7 @@ def test_the_command_line(exported: Path, fmus: Path, tmp_path: Path, capsys: py
 
 def test_writing_is_whole_or_not_at_all(fmus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = short_scenario(tmp_path)
-    fine = ["ssp", str(file), "--fmus", str(fmus), "--out"]
+    fine = ["export", str(file), "--fmus", str(fmus), "--out"]
     assert cli.main([*fine, str(tmp_path / "x.zip")]) == 2  # importers tell it by its name
     assert cli.main([*fine, str(tmp_path / "none" / "x.ssp")]) == 4
     (tmp_path / "folder.ssp").mkdir()
@@ -338,8 +338,8 @@ def test_writing_is_whole_or_not_at_all(fmus: Path, tmp_path: Path, capsys: pyte
     capsys.readouterr()
     assert cli.main([*fine, str(tmp_path / "x.ssp")]) == 0
     said = capsys.readouterr().out
-    assert said.startswith(f"{tmp_path / 'x.ssp'}: ")
-    assert archive.folders()[0] in said.rpartition("runs on ")[2]
+    assert said.endswith(f"-> {tmp_path / 'x.ssp'}\n")
+    assert archive.folders()[0] in said.rpartition("runs on ")[2].splitlines()[0]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder.ssp", "short.yaml", "x.ssp"]
 
 

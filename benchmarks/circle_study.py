@@ -25,8 +25,7 @@ from compensation_study import scenarios
 from feedsim import cosim, nc, scenario
 from feedsim.analysis import Diagnosis, contour
 from feedsim.analysis.circle import CircleUnderTest, TurnedPath, diagnose, name
-from feedsim.analysis.circle_figures import FIGURE_UNITS, diagnosed
-from feedsim.analysis.evaluate import CircleTask, tasks
+from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnosed, tasks
 from feedsim.errors import FeedsimError
 from feedsim.trace import Trace
 

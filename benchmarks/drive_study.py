@@ -37,9 +37,9 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.cycle import decision
 from feedsim.replay.elastic import ElasticMode, with_modes
 from feedsim.replay.identified import identify_drives
+from feedsim.replay.tuning import decision
 from feedsim.scenario import Machine, load, load_machine
 from feedsim.structure import checked_modes
 from feedsim.structure.modes import write_modes

@@ -36,11 +36,10 @@ import feedsim
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.files.columns import load_columns
 from feedsim.identify import Asked, Options, Record, identify, read_traces
-from feedsim.identify.motion import motion
+from feedsim.identify.motion import RecordTorque, motion
 from feedsim.identify.parameters import torque as torque_over_speed
 from feedsim.identify.read import Recorded
-from feedsim.identify.structure_torque import with_structure
-from feedsim.identify.torque import RecordTorque
+from feedsim.identify.stages import with_structure
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS, GMS
 

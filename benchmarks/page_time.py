@@ -23,7 +23,7 @@ from feedsim import cosim, nc, scenario  # noqa: E402
 from feedsim.judge import judged  # noqa: E402
 from feedsim.page import html  # noqa: E402
 from feedsim.page.content import content  # noqa: E402
-from feedsim.page.scripts import computing  # noqa: E402
+from feedsim.page.html import computing  # noqa: E402
 from page_helpers import NODE  # noqa: E402
 
 ROUNDS, TURNS = 15, 50

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Guards an import: results of your simulator against references, in one line of any CI.
 #
-#   FEEDSIM=feedsim-0.2.0-py3-none-any.whl sh compare.sh --tol 1e-6 -- results references
+#   FEEDSIM=feedsim-0.3.0-py3-none-any.whl sh compare.sh --tol 1e-6 -- results references
 #
 # What stands behind it goes to `feedsim compare`. Behind -- are names of files alone, also where they begin with "-".
 # Leaves feedsim.xml (JUnit: a variable outside its tolerance is a failure, a result that is missing or cannot be read

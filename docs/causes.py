@@ -16,9 +16,8 @@ from feedsim import cosim, scenario
 from feedsim.analysis import Diagnosis
 from feedsim.analysis.circle import name
 from feedsim.analysis.circle.words import worth_telling
-from feedsim.analysis.circle_figures import FIGURE_UNITS, diagnosed
 from feedsim.analysis.circularity import contour
-from feedsim.analysis.evaluate import CircleTask, tasks
+from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnosed, tasks
 from feedsim.report.style import SIMULATED
 
 HERE = Path(__file__).resolve().parent

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from feedsim.report.chart.placing import width_of
+from feedsim.report.chart.svg import width_of
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 

@@ -60,20 +60,20 @@ def place(tmp_path: Path) -> Path:
 
 
 CASES = [
-    ("convert table.csv --out table.csv", "is an input"),
-    ("convert table.csv --column time=time:s --out mine/result.csv", "--force"),
-    ("pack s/z_positioning.yaml --out s/z_positioning.yaml", "is an input"),
-    ("pack s/z_positioning.yaml --out s/machines/test_centre/modes.csv", "is an input"),
-    ("pack s/z_positioning.yaml --out table.csv", "--force"),
-    ("machine pack s/machines/test_centre --out s/machines/test_centre/machine.yaml", "is an input"),
-    ("machine pack s/machines/test_centre --out s/machines/test_centre/modes.csv --force", "is an input"),
+    ("tools convert table.csv --out table.csv", "is an input"),
+    ("tools convert table.csv --column time=time:s --out mine/result.csv", "--force"),
+    ("export s/z_positioning.yaml --out s/z_positioning.yaml", "is an input"),
+    ("export s/z_positioning.yaml --out s/machines/test_centre/modes.csv", "is an input"),
+    ("export s/z_positioning.yaml --out table.csv", "--force"),
+    ("export --plant s/machines/test_centre --out s/machines/test_centre/machine.yaml", "is an input"),
+    ("export --plant s/machines/test_centre --out s/machines/test_centre/modes.csv --force", "is an input"),
     ("machine build s/machines/one_axis --out s/machines/one_axis", "modes.csv: exists already"),
-    ("ssp s/z_positioning.yaml --out mine/result.csv", "ends in .ssp"),
+    ("export s/z_positioning.yaml --out mine/result.csv", "must end in .fmu, .ssp, .html"),
     ("run s/z_positioning.yaml --out mine", "mine/result.csv: exists already"),
     ("frf s/machines/one_axis --no-measure --out s/machines/one_axis", ""),
     ("compare table.csv table.csv --report table.csv", "is an input"),
     ("compare table.csv table.csv --report mine/result.csv", "--force"),
-    ("compare table.csv table.csv --json mine/result.csv", "--force"),
+    ("compare table.csv table.csv --junit mine/result.csv", "--force"),
 ]
 
 

@@ -26,13 +26,13 @@ __all__ = sorted(_HOMES)
 _OLD_NAMES = {
     "compensate": "feedsim.jobs.tune_feedforward:tune_feedforward",
     "identify": "feedsim.jobs.identify:identify_friction",
-    "machine_pack": "feedsim.jobs.machine_pack:machine_pack",
+    "machine_pack": "feedsim.jobs.export:machine_pack",
     "machine_show": "feedsim.jobs.machine:machine_view",
-    "pack": "feedsim.jobs.pack:pack",
+    "pack": "feedsim.jobs.export:pack",
     "show": "feedsim.jobs.diff:diff",
     "validate": "feedsim.jobs.check:check",
-    "write_page": "feedsim.jobs.write_page:write_page",
-    "write_ssp": "feedsim.jobs.write_ssp:write_ssp",
+    "write_page": "feedsim.jobs.export:write_page",
+    "write_ssp": "feedsim.jobs.export:write_ssp",
 }
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
-from feedsim.analysis.circle_figures import bidirectional
+from feedsim.analysis.evaluate import bidirectional
 from feedsim.errors import InputError
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import plan

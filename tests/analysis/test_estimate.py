@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import freqz, lfilter
 
-from feedsim.analysis import estimate
+from feedsim.analysis import campaign as estimate
 from feedsim.errors import InputError
 from feedsim.nc.excitation import multisine
 from feedsim.scenario import Cycles

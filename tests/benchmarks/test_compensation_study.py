@@ -15,8 +15,7 @@ from feedsim.linear.judgement import judge  # noqa: E402
 from feedsim.scenario import load  # noqa: E402
 from feedsim.structure import checked_modes  # noqa: E402
 from feedsim.tune.circles import practical  # noqa: E402
-from feedsim.tune.closed_forms import axis_lag, loop_lag  # noqa: E402
-from feedsim.tune.proposals import least_margins  # noqa: E402
+from feedsim.tune.proposals import axis_lag, least_margins, loop_lag  # noqa: E402
 
 
 @pytest.mark.parametrize("name", MACHINES)

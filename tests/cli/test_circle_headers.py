@@ -12,7 +12,7 @@ import pytest
 from analysis.drawn_circles import Causes, driven
 from feedsim import cli
 from feedsim.analysis.circle import CircleUnderTest
-from feedsim.analysis.circle.header import header_values
+from feedsim.analysis.circle.records import header_values
 
 RADIUS, SPEED = 0.15, 1.0 / 60
 CIRCLE = CircleUnderTest(("X", "Y"), RADIUS, SPEED)

@@ -106,7 +106,7 @@ def test_outputs_never_replace_inputs(reference: Path, off: Path, tmp_path: Path
     before = reference.read_bytes()
     assert run(off, reference, "--report", reference) == 2
     assert run(off, reference, "--junit", off) == 2
-    assert run(off, reference, "--junit", tmp_path / "x", "--json", tmp_path / "x") == 2
+    assert run(off, reference, "--junit", tmp_path / "x", "--report", tmp_path / "x") == 2
     assert run(off, reference, "--report", tmp_path) == 2
     assert reference.read_bytes() == before
     assert not (tmp_path / "x").exists()
@@ -175,10 +175,9 @@ def test_junit(reference: Path, off: Path, tmp_path: Path) -> None:
     assert failures["Z.M_a"] is None
 
 
-def test_json(reference: Path, off: Path, tmp_path: Path) -> None:
-    file = tmp_path / "out.json"
-    assert run(off, reference, "--json", file, "--tol", "0", "--quiet") == 1
-    found = json.loads(file.read_text(encoding="utf-8"))
+def test_json(reference: Path, off: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(off, reference, "--json", "--tol", "0") == 1
+    found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "different"
     (pair,) = found["comparisons"]
     assert pair["worst"] == "Z.x_a"
@@ -316,7 +315,7 @@ def test_an_estimated_shift_of_nothing_is_0(
 ) -> None:
     late = written(tmp_path / "late.csv", Series(wave().time + 0.3, wave().columns, wave().units))
     assert run(reference, reference, "--shift", "estimate") == 0
-    assert run(late, reference, "--shift", "estimate", "--max-shift", "0.4 s", "--all") == 0
+    assert run(late, reference, "--shift", "estimate", "--max-shift", "0.4 s", "-v") == 0
     out = capsys.readouterr().out
     assert "shifted by -300 ms" in out
     assert not re.search(r"e-[0-9]+ (s|ns)\b", out)
@@ -347,7 +346,7 @@ def test_names_do_not_command_the_terminal(tmp_path: Path, capsys: pytest.Captur
     for name, value in (("a", 1), ("b", 2)):
         (tmp_path / f"{name}.csv").write_text(f"time,x\x1b[2J\x9b\n0,{value}\n1,{value}\n", encoding="utf-8")
     for files in (["a.csv", "b.csv"], ["a.csv", "\x1b[31m.csv"]):
-        assert main(["compare", *(str(tmp_path / each) for each in files), "--all"]) in (1, 2)
+        assert main(["compare", *(str(tmp_path / each) for each in files), "-v"]) in (1, 2)
     told = "".join(capsys.readouterr())
     assert "x\\x1b[2J\\x9b" in told
     assert all(c.isprintable() or c == "\n" for c in told)

@@ -19,11 +19,11 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.identify import Options, identify, stages
 from feedsim.identify.friction_file import Line, friction_text
+from feedsim.identify.motion import RecordTorque
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate, Plateau
 from feedsim.identify.stages import begins, merged_correlation, transitions
-from feedsim.identify.torque import RecordTorque
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
 from feedsim.trace import write_csv

@@ -22,11 +22,11 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 COMMANDS = {
     "run": ["run", "Länge.yaml", "--out", "out", "--set", "name=Länge"],
-    "validate": ["validate", "Länge.yaml", "--set", "name=Länge"],
-    "schema": ["schema", "study"],
-    "ssp": ["ssp", "Länge.yaml", "--out", "out/x.ssp"],
-    "pack": ["pack", "Länge.yaml", "--out", "out/x.fmu"],
-    "compare": ["compare", "a.csv", "a.csv", "--report", "out/a.html", "--json", "out/a.json"],
+    "validate": ["check", "Länge.yaml", "--set", "name=Länge"],
+    "schema": ["tools", "schema", "study"],
+    "ssp": ["export", "Länge.yaml", "--out", "out/x.ssp"],
+    "pack": ["export", "Länge.yaml", "--out", "out/x.fmu"],
+    "compare": ["compare", "a.csv", "a.csv", "--report", "out/a.html", "--junit", "out/a.xml"],
 }
 
 

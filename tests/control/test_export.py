@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.control.formats import opened
-from feedsim.control.reading import read
-from feedsim.control.view import Value
+from feedsim.control.reading import Value, read
 from feedsim.control.writing import changed, number
 from feedsim.errors import InputError
 

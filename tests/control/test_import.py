@@ -10,8 +10,7 @@ import pytest
 from control_helpers import DRIVE, INI, NC, reasons, values
 from feedsim.control import table
 from feedsim.control.formats import opened
-from feedsim.control.reading import read
-from feedsim.control.usual import usual_ranges
+from feedsim.control.reading import read, usual_ranges
 from feedsim.errors import InputError
 
 

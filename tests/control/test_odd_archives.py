@@ -12,8 +12,7 @@ import pytest
 
 from feedsim.control.archive import Archive
 from feedsim.control.formats import opened
-from feedsim.control.reading import Reading, read
-from feedsim.control.view import Value
+from feedsim.control.reading import Reading, Value, read
 from feedsim.control.writing import changed
 from feedsim.errors import InputError
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, scenario
-from feedsim.cosim.departure import first_departure
+from feedsim.cosim.run import first_departure
 from feedsim.errors import SimulationError
 from feedsim.trace import Trace
 from scenario_helpers import default_machine

@@ -18,10 +18,12 @@ from feedsim.errors import InputError, OutputError, SimulationError
 from feedsim.judge import judged
 from feedsim.motions import circular
 from feedsim.motions.points import Held, Joined
-from feedsim.nc import program, spline
+from feedsim.nc import program
+from feedsim.nc import program as spline
 from feedsim.outputs import replacing
 from feedsim.report import run as report
-from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, table, write_csv
+from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, write_csv
+from feedsim.trace import trace as table
 
 ROOT = Path(__file__).resolve().parents[2]
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"

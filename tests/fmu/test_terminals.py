@@ -17,7 +17,7 @@ from lxml import etree
 from PIL import Image
 
 from feedsim.cosim import wiring
-from feedsim.jobs.pack import pack as pack_machine
+from feedsim.jobs.export import pack as pack_machine
 from feedsim_packager import build, cli
 from feedsim_packager.errors import InputError
 from fmu.toy_table import toy

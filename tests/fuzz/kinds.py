@@ -26,7 +26,8 @@ from feedsim.scenario.load import load_machine, read_friction
 from feedsim.scenario.roles import DRIVE
 from feedsim.scenario.structure.load import load_structure
 from feedsim.scenario.study import load_study
-from feedsim.structure.matrices import calculix, market
+from feedsim.structure.matrices import build as market
+from feedsim.structure.matrices import calculix
 from feedsim.structure.modes import read_modes
 from feedsim.structure.poses_file import read_cell, read_grid
 from feedsim.sweep.table import read_table

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.free_axis import first_deflection, first_speed, reached, substeps
 from feedsim.identify.friction_file import drift_texts
-from feedsim.identify.open_loop import balanced
+from feedsim.identify.open_loop import balanced, first_deflection, first_speed, reached, substeps
 from feedsim.identify.parameters import FRICTION_NAMES, NO_EFFECT
 from feedsim.identify.record import Record
 from feedsim.identify.result import Balance, Estimate
@@ -170,7 +169,7 @@ def test_steps_of_the_free_axis_are_all_that_is_wrong(
     general: Record, law: FrictionLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record = general.between(1230, len(general))
-    monkeypatch.setattr("feedsim.identify.free_axis.EXPLICIT_STEP_SHARE", 0.05)
+    monkeypatch.setattr("feedsim.identify.open_loop.EXPLICIT_STEP_SHARE", 0.05)
     assert_true(found(record, law, estimates(OFF)), EXACT / 9)  # three steps per interval
 
 

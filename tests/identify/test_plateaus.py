@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from feedsim.estimation.covariance import correlation_length
-from feedsim.identify import averages
+from feedsim.identify import plateaus as averages
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from identify_records import I_P, SPEEDS, TRUE, J, constant_speeds, noisy, stationary

@@ -10,7 +10,8 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import drift, stribeck
+from feedsim.identify import stribeck
+from feedsim.identify import stribeck as drift
 from feedsim.identify.parameters import curve, torque
 from feedsim.identify.result import Plateau, Stationary
 from identify_records import I_P, SPEEDS, TRUE, stationary

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.judge import loops
-from feedsim.judge.loops import loops_of
+from feedsim.judge import run as loops
+from feedsim.judge.run import loops_of
 from feedsim.linear.judgement import judge
 from feedsim.scenario import Machine, load
 from feedsim.structure import checked_modes

@@ -12,7 +12,8 @@ from feedsim import cli, cosim, nc, scenario
 from feedsim.cosim import fmus_directory
 from feedsim.errors import InputError
 from feedsim.judge import judged
-from feedsim.page import module, write
+from feedsim.page import content as module
+from feedsim.page import write
 from feedsim.page.content import content
 from live_page.test_page_numbers import SAME, settings
 from machine_helpers import write_machine, write_scenario

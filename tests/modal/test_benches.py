@@ -12,8 +12,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from feedsim.cli import main
 from feedsim.modal.estimate import estimated
-from feedsim.modal.neighbours import least, scatter
-from feedsim.modal.rational import fitted
+from feedsim.modal.rational import fitted, least, scatter
 from feedsim.trace import Trace, write_csv
 from feedsim.trace.trace import Array
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from feedsim.errors import InputError
 from feedsim.motions.profile import rest_to_rest, speed_change
-from feedsim.nc.spline import RestSpline
+from feedsim.nc.program import RestSpline
 
 JERK = 150.0
 

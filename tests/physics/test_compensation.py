@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, nc, scenario
-from feedsim.analysis import compensation_errors as module
-from feedsim.analysis.compensation import Compensation, circle_task, compensate
-from feedsim.analysis.compensation_errors import Quality, quality
+from feedsim.analysis import compensation as module
+from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
 from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError

@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from feedsim.analysis import estimate
+from feedsim.analysis import campaign as estimate
 from feedsim.cosim.excite import Measurement, measure, usual_rms
 from feedsim.errors import InputError
 from feedsim.linear.loops import speed_gain

@@ -12,11 +12,11 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Options, identify
 from feedsim.identify.identifiability import reversals, turnover_rows
+from feedsim.identify.motion import RecordTorque
 from feedsim.identify.output_error import dynamic
 from feedsim.identify.record import Record
 from feedsim.identify.result import Dynamic, Estimate
 from feedsim.identify.search import Solution
-from feedsim.identify.torque import RecordTorque
 from identify_records import constant_speeds, noisy
 
 Floats = NDArray[np.float64]

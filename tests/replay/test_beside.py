@@ -8,7 +8,7 @@ import pytest
 
 from feedsim.identify.result import Estimate
 from feedsim.report.control import control_names
-from feedsim.report.replay.beside import beside, beside_lines, beside_part, beside_section
+from feedsim.report.replay.drive import beside, beside_lines, beside_part, beside_section
 from feedsim.scenario import load_machine
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"  # K_v 66.7 1/s, T_n 12 ms

@@ -14,9 +14,8 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.identify import Record
 from feedsim.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
-from feedsim.replay.coupling import coupled
 from feedsim.replay.elastic import Beside, ElasticMode, with_modes
-from feedsim.replay.identified import _beside
+from feedsim.replay.identified import _beside, coupled
 from feedsim.replay.machine_files import RigidAxis, machine_files
 from feedsim.scenario import Machine, load, load_machine
 from feedsim.structure import checked_modes

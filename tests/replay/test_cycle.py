@@ -15,8 +15,8 @@ from feedsim.files.columns import load_columns
 from feedsim.identify.parameters import estimate
 from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.cycle import OtherCycle, decision, gain_of, with_either
 from feedsim.replay.identified import identify_drives
+from feedsim.replay.tuning import OtherCycle, decision, gain_of, with_either
 from feedsim.scenario import load, load_machine
 from feedsim.structure import checked_modes
 from feedsim.trace import write_csv

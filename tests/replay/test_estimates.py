@@ -13,8 +13,8 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.parameters import estimate
 from feedsim.identify.result import Estimate
 from feedsim.replay.estimates import STRETCHES, between_stretches, shared_lag, with_undecided
-from feedsim.replay.parameters import parameter
 from feedsim.replay.start import of_cycle
+from feedsim.replay.tuning import parameter
 
 
 def fits(*values: dict[str, float]) -> Any:

@@ -10,8 +10,7 @@ import pytest
 from feedsim.identify import Record
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.elastic import resonator
-from feedsim.replay.moving_lines import lines_in_motion
-from feedsim.replay.outside import Line
+from feedsim.replay.moving_lines import Line, lines_in_motion
 from feedsim.trace.trace import Array
 
 H, I_P = 2e-3, 10e-3 / (2 * np.pi)  # [s], [m/rad] of a pitch of 10 mm

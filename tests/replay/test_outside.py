@@ -9,7 +9,7 @@ import pytest
 
 from feedsim.identify import Record
 from feedsim.replay.closed_loop import AxisRecord
-from feedsim.replay.outside import Line, in_words, without_outside
+from feedsim.replay.moving_lines import Line, in_words, without_outside
 from feedsim.trace.trace import Array
 
 H = 2e-3

@@ -10,8 +10,7 @@ import pytest
 from drive_helpers import MACHINES
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord, Replay
-from feedsim.replay.preload import run_in
+from feedsim.replay.closed_loop import AxisRecord, Replay, run_in
 from feedsim.scenario import load_machine
 
 FRICTION = load_machine(MACHINES / "sinumerik_840d").axes["X"].friction

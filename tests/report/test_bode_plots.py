@@ -24,7 +24,7 @@ from feedsim.report.frf.bode_plots import (
     scale_pictures,
     speed_reference_pictures,
 )
-from feedsim.report.frf.truncation_plots import truncation_pictures
+from feedsim.report.frf.report import truncation_pictures
 from feedsim.structure import Modes, checked_modes
 from feedsim.trace.response import FrequencyResponse
 from frf_helpers import responses

@@ -12,7 +12,7 @@ import pytest
 from feedsim.report import style
 from feedsim.report.chart import Curve
 from feedsim.report.replay.plots import MOST_NAMES, names_of
-from feedsim.report.show.pictures import looks_of
+from feedsim.report.show.report import looks_of
 from feedsim.trace import Mark
 
 REPORT = Path(style.__file__).parent

@@ -20,17 +20,16 @@ from feedsim.identify.result import Balance, Correlation, Identification
 from feedsim.jobs.identify import IdentifyResult
 from feedsim.report.chart import Grid
 from feedsim.report.identify import headline, rigid_line, table_lines, terminal_warnings
-from feedsim.report.identify.plots import (
+from feedsim.report.identify.report import (
     _length,
     correlation_picture,
     describe,
     loops_picture,
     open_loop_picture,
+    report_of,
     residuals_picture,
 )
-from feedsim.report.identify.quantities import at_slide, curve_error
-from feedsim.report.identify.report import report_of
-from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
+from feedsim.report.identify.stribeck_plots import at_slide, curve_error, plateaus_picture, stribeck_picture
 from feedsim.report.page import html
 from feedsim.report.provenance import friction_origins
 from feedsim.scenario import load_machine

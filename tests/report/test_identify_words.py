@@ -16,9 +16,8 @@ from feedsim.report.chart import Curve, Panel
 from feedsim.report.content import Report, Tile
 from feedsim.report.formatting import counted
 from feedsim.report.identify import headline
-from feedsim.report.identify.quantities import speeds_of
 from feedsim.report.identify.report import report_of
-from feedsim.report.identify.stribeck_plots import stribeck_picture, stribeck_title
+from feedsim.report.identify.stribeck_plots import speeds_of, stribeck_picture, stribeck_title
 from feedsim.report.identify.summary import summary
 from feedsim.report.page import html
 from feedsim.report.picture import Picture

@@ -16,10 +16,9 @@ from PIL import Image
 
 from feedsim import cli
 from feedsim.errors import InputError
-from feedsim.report.machine.animation import FRAMES
 from feedsim.report.machine.model import MODE_DEFLECTION, Model, model, motion, solids, turned
-from feedsim.report.machine.pictures import telling_view
 from feedsim.report.machine.projection import FRONT, OBLIQUE, SIDE, TOP, view
+from feedsim.report.machine.report import FRAMES, telling_view
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.build import Built, build

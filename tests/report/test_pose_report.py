@@ -209,7 +209,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
 )
 def test_cells_that_are_refused(texts: list[str], message: str) -> None:
     from feedsim.arguments import as_options, pairs
-    from feedsim.jobs.machine_pack import POSITIONS_EXAMPLE, grid_axes
+    from feedsim.jobs.export import POSITIONS_EXAMPLE, grid_axes
 
     with pytest.raises(InputError) as caught, as_options():
         grid_axes(default_machine(), pairs("poses", texts, f"{POSITIONS_EXAMPLE} is the form"))

@@ -27,12 +27,11 @@ from feedsim.jobs.check import Checked
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.chart.embedded import embedded
+from feedsim.report.chart.model import embedded
 from feedsim.report.content import Tile
 from feedsim.report.page import script
 from feedsim.report.run.files import summary
-from feedsim.report.run.report import HEADER, real_time_factor, tile
-from feedsim.report.run.words import moved_words
+from feedsim.report.run.report import HEADER, moved_words, real_time_factor, tile
 from feedsim.report.style import PAGE_COLOURS
 from feedsim.trace import read_csv
 from report_helpers import Page, circle_run, contents, positioning_run, run_of

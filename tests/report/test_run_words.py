@@ -7,7 +7,7 @@ import math
 import pytest
 
 from feedsim.analysis import Figure
-from feedsim.report.run.words import accuracy_words, stop_words
+from feedsim.report.run.report import accuracy_words, stop_words
 
 
 def figures(**values: float) -> dict[str, Figure]:

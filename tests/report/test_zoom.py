@@ -15,7 +15,7 @@ import pytest
 from feedsim.analysis import evaluate
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.chart.embedded import BLOCK_ROWS, embedded, steps
+from feedsim.report.chart.model import BLOCK_ROWS, embedded, steps
 from feedsim.report.chart.scales import ticks
 from feedsim.report.content import Report
 from feedsim.report.page import html

@@ -18,9 +18,9 @@ from scipy import sparse
 from feedsim.cli import main
 from feedsim.errors import InputError
 from feedsim.scenario.structure.load import load_structure
+from feedsim.structure.build import check
 from feedsim.structure.matrices import ansys
 from feedsim.structure.matrices.build import Imported, import_model
-from feedsim.structure.model_check import check
 
 
 def bundled() -> Path | None:

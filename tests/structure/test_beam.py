@@ -11,7 +11,7 @@ from scipy.integrate import dblquad
 from scipy.linalg import eigh
 
 from feedsim.scenario.structure.parts import Box, Material, Properties, Rectangle, Rod, Tube
-from feedsim.structure.geometry.beam import BeamProperties, area_moments, beam_axes, beam_matrices, beam_properties, rod
+from feedsim.structure.geometry.mesh import BeamProperties, area_moments, beam_axes, beam_matrices, beam_properties, rod
 
 Floats = NDArray[np.float64]
 

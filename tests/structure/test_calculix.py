@@ -16,8 +16,8 @@ from fe_models import STRUCTURES, dense_modes
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure.load import load_structure
+from feedsim.structure.build import check
 from feedsim.structure.matrices.build import Imported, import_model
-from feedsim.structure.model_check import check
 
 SHIPPED = STRUCTURES / "calculix"
 CCX = shutil.which("ccx")

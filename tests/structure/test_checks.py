@@ -13,7 +13,7 @@ from scipy import sparse
 from feedsim.errors import InputError
 from feedsim.scenario.structure.matrices import SI, UnitSystem
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.model_check import check, frequency_warnings
+from feedsim.structure.build import check, frequency_warnings
 
 MASS, STIFFNESS = chain([100.0, 200.0, 300.0], [4e6, 9e6])
 ZEROS = np.zeros(3)

@@ -15,8 +15,8 @@ from fe_models import STRUCTURES, chain, dense_modes, write_market
 from feedsim.errors import InputError
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.assembly import Assembly
+from feedsim.structure.build import check
 from feedsim.structure.matrices.build import Imported, import_model
-from feedsim.structure.model_check import check
 
 REFERENCE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre" / "modes.csv"
 SHIPPED = STRUCTURES / "matrix_market"

@@ -12,8 +12,7 @@ from scipy.sparse import csc_array, diags_array
 from eigen_models import DEFAULT_DAMPING, TOOL, Floats, given
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.geometry.assemble import assemble
-from feedsim.structure.moving import Motion, Share, what_moves
-from feedsim.structure.solve import Solution, solve
+from feedsim.structure.solve import Motion, Share, Solution, solve, what_moves
 from structure_helpers import GIVEN_POSE, default_structure
 
 

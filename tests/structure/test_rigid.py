@@ -15,8 +15,7 @@ from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.eigenpairs import dense
 from feedsim.structure.geometry.assemble import assemble
-from feedsim.structure.rigid import cleaned, definite_basis, definite_signs
-from feedsim.structure.solve import Solution, solve
+from feedsim.structure.solve import Solution, cleaned, definite_basis, definite_signs, solve
 from structure_helpers import GIVEN_POSE, default_structure
 
 KHZ = 2 * math.pi * 1000

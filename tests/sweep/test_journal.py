@@ -17,7 +17,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.sweep.design import Outcome
-from feedsim.sweep.journal import JOURNAL_NAME, Journal
+from feedsim.sweep.study import JOURNAL_NAME, Journal
 
 HEAD = {"study": "S", "fingerprint": "abc", "parts": {"plant.fmu": "1", "parameters": "2"}}
 RUNS = 50

@@ -11,7 +11,7 @@ import pytest
 from feedsim.errors import InputError
 from feedsim.scenario import load
 from feedsim.scenario.study import load_study
-from feedsim.scenario.study.distribution import outside
+from feedsim.scenario.study.parameter import outside
 from feedsim.scenario.study.study import Distribution
 from feedsim.sweep.design import quantile
 

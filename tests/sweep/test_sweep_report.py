@@ -20,8 +20,7 @@ from feedsim.report.formatting import scale
 from feedsim.report.page import html
 from feedsim.report.sweep.account import Account, quantile_interval
 from feedsim.report.sweep.figure_plots import running_median
-from feedsim.report.sweep.plots import pictures_of
-from feedsim.report.sweep.report import report_of
+from feedsim.report.sweep.report import pictures_of, report_of
 from feedsim.report.sweep.summary import summary
 from feedsim.scenario.study import Study, load_study
 from feedsim.sweep.design import Design, Outcome, design

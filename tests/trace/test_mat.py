@@ -25,8 +25,7 @@ from scipy.io import loadmat, savemat
 from command_helpers import PATIENCE
 from feedsim.errors import InputError
 from feedsim.trace import read_recording
-from feedsim.trace.mat import read_mat
-from feedsim.trace.mat_values import Other, flat
+from feedsim.trace.mat import Other, flat, read_mat
 
 CONTENT: dict[str, Any] = {
     "t": np.arange(500) / 500,

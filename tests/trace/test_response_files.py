@@ -10,7 +10,7 @@ import pytest
 import pyuff
 
 from feedsim.errors import InputError, OutputError
-from feedsim.trace import uff
+from feedsim.trace import response_files as uff
 from feedsim.trace.response import FrequencyResponse, quotient_unit
 from feedsim.trace.response_files import read_overlay, read_response, read_response_csv, write_response
 

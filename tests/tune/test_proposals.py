@@ -21,8 +21,16 @@ from feedsim.report.changes import changes_part, changes_section
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.structure import checked_modes
 from feedsim.tune import Proposal, of_circle, of_run
-from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain, torque_response
-from feedsim.tune.proposals import GAIN_MARGIN, PHASE_MARGIN, changed, least_margins
+from feedsim.tune.proposals import (
+    GAIN_MARGIN,
+    PHASE_MARGIN,
+    axis_lag,
+    changed,
+    least_margins,
+    loop_lag,
+    model_gain,
+    torque_response,
+)
 
 PROJECT = Path(__file__).resolve().parents[2]
 CIRCLE = PROJECT / "scenarios" / "xz_circle.yaml"

@@ -17,12 +17,10 @@ from command_helpers import feedsim
 from feedsim.scenario import Machine, load
 from feedsim.structure import checked_modes
 from feedsim.tune import circles as circles_module
-from feedsim.tune import compensation
+from feedsim.tune import compensators as compensation
 from feedsim.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
-from feedsim.tune.compensation import tune
-from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, pulse, score
-from feedsim.tune.effects import effects_of, frictionless
-from feedsim.tune.groups import compensated
+from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, pulse, score, tune
+from feedsim.tune.effects import compensated, effects_of, frictionless
 from identified_sets import write_set
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"

@@ -20,14 +20,12 @@ from feedsim.linear.judgement import judge
 from feedsim.scenario import Drive, Machine, load, load_machine
 from feedsim.structure import Modes, checked_modes
 from feedsim.structure.modes import read_modes
-from feedsim.tune.changed import changed_values
 from feedsim.tune.circles import Pair
-from feedsim.tune.closed_forms import axis_lag, loop_lag
-from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, _Search, tune_drive
+from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, _Search, least, tune_drive
 from feedsim.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
-from feedsim.tune.drive_result import Limits
+from feedsim.tune.drive_result import Limits, changed_values
 from feedsim.tune.knobs import Knobs, matched, with_drives
-from feedsim.tune.search import least
+from feedsim.tune.proposals import axis_lag, loop_lag
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 Z = SCENARIOS / "z_positioning.yaml"

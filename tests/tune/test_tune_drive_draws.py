@@ -16,9 +16,10 @@ from feedsim.errors import SimulationError
 from feedsim.linear.candidates import Candidates
 from feedsim.scenario import load
 from feedsim.structure import Modes, checked_modes
-from feedsim.tune import compensation, drive
+from feedsim.tune import compensators as compensation
+from feedsim.tune import drive
 from feedsim.tune.circles import Circles, Contour
-from feedsim.tune.drive_margins import judges_of, margins_of
+from feedsim.tune.drive import judges_of, margins_of
 from feedsim.tune.drive_program import DriveProgram
 from feedsim.tune.drive_result import Limits
 from feedsim.tune.knobs import with_drives

@@ -14,7 +14,7 @@ from feedsim import cosim
 from feedsim.analysis import circularity, tasks
 from feedsim.scenario import load
 from feedsim.uncertainty import cloud_of, of_run
-from feedsim.uncertainty.runs import curves_of
+from feedsim.uncertainty.draws import curves_of
 from identified_sets import CIRCLE, write_set
 
 SHORT = ("motions.0.radius=5 mm",)

@@ -114,7 +114,7 @@ def test_a_draw_that_fails_says_so(tmp_path: Path, fmus: Path, monkeypatch: pyte
     def fail(*args: object, **named: object) -> None:
         raise SimulationError("unit Z.friction: no")
 
-    monkeypatch.setattr("feedsim.uncertainty.runs.run", fail)
+    monkeypatch.setattr("feedsim.uncertainty.draws.run", fail)
     with pytest.raises(SimulationError, match=r"^draw 1 of 19 of the machine: unit Z\.friction: no"):
         of_run(nominal, cloud_of(scenario.machine), 19, progress=lambda what, done, total: None)
 

@@ -19,12 +19,11 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-from feedsim.cli.commands import Command, add_commands, arguments, given_files, refuse_missing_files, renamed
-from feedsim.cli.grammar import Parser
+from feedsim.cli.commands import Command, Parser, add_commands, arguments, given_files, refuse_missing_files, renamed
 from feedsim.cli.kinds import meant
-from feedsim.cli.start import START_TEXT
 from feedsim.cli.terminal import (
     STANDARD_OUTPUT,
+    START_TEXT,
     choose_colour,
     finish,
     painted,

@@ -5,14 +5,13 @@ Start with compare.py; tube.py is the method.
 """
 
 from feedsim.called import called
-from feedsim.compare.between import bounds_of, thinned
+from feedsim.compare.between import along, bounds, bounds_of, thinned
 from feedsim.compare.compare import compare
 from feedsim.compare.files import compare_files, compare_series, pairs_of, tolerances_of, unusable
+from feedsim.compare.likeness import EXIT_CODES, Comparison, Coverage, Curves, Proposal, Variable, percent, seconds
 from feedsim.compare.options import Options
 from feedsim.compare.shift import Shift, estimated_shift
 from feedsim.compare.tolerance import DEFAULT, Tolerance, Tolerances
-from feedsim.compare.tube import along, bounds
-from feedsim.compare.verdict import EXIT_CODES, Comparison, Coverage, Curves, Proposal, Variable, percent, seconds
 
 __all__ = [
     "DEFAULT", "EXIT_CODES", "Comparison", "Coverage", "Curves", "Options", "Proposal", "Shift", "Tolerance",

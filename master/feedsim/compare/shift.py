@@ -9,9 +9,9 @@ from math import floor, log10, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.compare.between import Rows, usual_step
 from feedsim.compare.options import LISTED, Options, chosen, factor, sources, with_units
 from feedsim.compare.tolerance import Tolerances
-from feedsim.compare.tube import Rows, usual_step
 from feedsim.errors import InputError, few
 from feedsim.trace import Array, Series
 

@@ -17,8 +17,7 @@ from feedsim.control.archive import Archive, Entry, scalar
 from feedsim.control.conditions import shown, tied
 from feedsim.control.formats import opened
 from feedsim.control.names import Name, names_of
-from feedsim.control.reading import Reading, Taken, read
-from feedsim.control.view import Value, View
+from feedsim.control.reading import Reading, Taken, Value, View, read
 from feedsim.errors import InputError
 
 # Values this close are the same [relative]: a text of ten digits and its value in SI.

@@ -6,8 +6,7 @@ Start with run.py: ``run``; then schedule.py, which says once what a control cyc
 
 from feedsim.cosim.binaries import executed, executing, fmus_directory
 from feedsim.cosim.loop import Progress
-from feedsim.cosim.poses import Crossings
-from feedsim.cosim.run import Follower, Run, check, follow, logged, run
+from feedsim.cosim.run import Crossings, Follower, Run, check, follow, logged, run
 
 __all__ = [
     "Crossings", "Follower", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.averages import resolution, white
 from feedsim.identify.inertia import REST_SPEED_SHARE, Inertia, inertia, smooth_speed
 from feedsim.identify.parameters import RIGID_AXIS_NAMES
+from feedsim.identify.plateaus import resolution, white
 from feedsim.identify.record import Array, Record, runs
 
 MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the heap

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason, shows
+from feedsim.identify.motion import RecordTorque, deflection
 from feedsim.identify.parameters import NO_EFFECT, PARAMETER_KINDS, inner, outer
 from feedsim.identify.result import Stationary, Status
 from feedsim.identify.search import Solution
-from feedsim.identify.torque import RecordTorque, deflection
 
 GOES_WITH = "goes with"  # begins the reason of a parameter that is only held because another is
 SIGNIFICANT = 2.0  # standard deviations that something must differ from what it would be without

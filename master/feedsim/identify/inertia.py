@@ -18,8 +18,8 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.estimation.fit import correlation
-from feedsim.identify.averages import white
 from feedsim.identify.parameters import RIGID_AXIS_NAMES, estimate, torque
+from feedsim.identify.plateaus import white
 from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Correlation, Estimate
 

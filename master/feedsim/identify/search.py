@@ -11,9 +11,9 @@ from feedsim.estimation.covariance import correlation_length
 from feedsim.estimation.fit import Fit, fit
 from feedsim.estimation.parameter import Parameter, Prior
 from feedsim.identify.inertia import REST_SPEED_SHARE
+from feedsim.identify.motion import START_PRIOR, STARTS, RecordTorque
 from feedsim.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
 from feedsim.identify.record import Array
-from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 REACH = {"z": 1.0, "c": 0.5}
 VALLEYS, REACHED = 6, 1.5  # tried beside a solution, drawn within so many standard deviations of it

@@ -11,8 +11,8 @@ from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
 from feedsim.estimation.fit import Fit, correlation, fit, inverse
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.estimation.parameter import Parameter
-from feedsim.identify import drift
 from feedsim.identify import stribeck_identifiability as identifiability
 from feedsim.identify.parameters import (
     CONSTANT_SPEED,
@@ -33,7 +33,87 @@ from feedsim.identify.parameters import (
 )
 from feedsim.identify.record import Array
 from feedsim.identify.result import Correlation, Plateau, Stationary, Status
-from feedsim.identify.stribeck_identifiability import Points
+from feedsim.identify.stribeck_identifiability import SAME_SPEED, Points
+
+# --- Friction that changes while plateaus are driven: what speeds that come back show, and what they do not -----------
+
+
+SAME_SPEED_SHARE = 0.02  # relative difference up to which a speed counts as repeated
+DRIFT_SIGMAS, LEAST_DRIFT = 4.0, 2e-3  # standard deviations, and share of the friction, that a drift must have
+# Standard deviation of the relative change of viscous friction from the first plateau to the last one: grease and oil
+# lose a third and more of it while a cold axis warms up.
+WARMS = 0.25
+WORTH_A_WORD = 0.05  # of sigma_2: standard deviation by warming that is worth a warning
+
+
+def warming(age: Array) -> Array:
+    """(K, K) covariance of the relative change of viscous friction since the first plateau, in WARMS^2.
+
+    age: (K,) time of the plateaus, from the first one at 0 to the last one at 1. Nobody knows the course: a change at
+    once, an even one and one at random (Brownian motion) have equal shares in it.
+    """
+    later = np.asarray(age > 0, dtype=np.float64)
+    return np.asarray((np.outer(later, later) + np.outer(age, age) + np.minimum(age[:, None], age[None, :])) / 3)
+
+
+def hides(drifts: float, sigma_2: float) -> tuple[str, ...]:
+    """A warning where warming that the speeds do not show leaves sigma_2 open.
+
+    drifts: the part of its standard deviation [N.m.s/rad] by warming. The interval itself is that of all records
+    together, which is printed with the value.
+    """
+    if not drifts > WORTH_A_WORD * sigma_2:
+        return ()
+    return (
+        "no fast speed is driven both early and late: viscous friction that falls as the axis warms up is not "
+        f"separated from the shape of the curve; the plateaus alone leave +-{100 * NORMAL_95 * drifts / sigma_2:.2g} "
+        "% of sigma_2 open by that; drive the fastest speed first and last, or warm the axis up before",
+    )
+
+
+def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
+    """The first and the last plateau of each direction and speed that came back after another speed."""
+    result = []
+    for k, first in enumerate(plateaus):
+        like = [
+            m
+            for m, other in enumerate(plateaus)
+            if abs(other.speed - first.speed) <= SAME_SPEED_SHARE * abs(first.speed)
+        ]
+        between = (abs(abs(other.speed) - abs(first.speed)) for other in plateaus[k : like[-1]])
+        if like[0] == k and any(away > SAME_SPEED * abs(first.speed) for away in between):
+            result.append((k, like[-1]))
+    return result
+
+
+def repeated(
+    plateaus: Sequence[Plateau], values: Mapping[str, float], names: Sequence[str]
+) -> tuple[Array, tuple[str, ...]]:
+    """(P,) variance of `names` by friction that was another when a speed came back, and a sentence about it."""
+    variance, worst = np.zeros(len(names)), 0.0
+    said: tuple[str, ...] = ()
+    for k, m in repeats(plateaus):
+        first, last = plateaus[k], plateaus[m]
+        n = np.array([first.speed, last.speed])
+        before, after = np.array([first.torque, last.torque]) - torque(values, n)
+        change, friction, size = float(after - before), float(curve(values, n[:1])[0]), abs(first.speed)
+        if abs(change) < max(DRIFT_SIGMAS * float(np.hypot(first.sigma, last.sigma)), LEAST_DRIFT * friction):
+            continue
+        # What each would have to change by to make the difference alone, from the first plateau to the last one of all.
+        reach = {"sigma_2": size, "F_log": float(np.log1p(size / values["v_log"])), "F_C": 1.0, "F_S": 1.0}
+        whole = change * (len(plateaus) - 1) / (m - k)
+        moved = np.array([whole / reach[name] if name in reach else 0.0 for name in names])
+        variance = np.maximum(variance, (moved / NORMAL_95) ** 2)
+        if abs(change) / friction > worst:
+            worst = abs(change) / friction
+            way = "fell" if change * first.speed < 0 else "rose"
+            said = (
+                f"friction at {size:.3g} rad/s {way} by {100 * worst:.2g} % between {first.begin:.4g} s "
+                f"({first.record}) and {last.begin:.4g} s ({last.record}): it drifts, as with temperature; the "
+                "parameters are a mean, and their intervals hold the drift; warm the axis up and record again",
+            )
+    return variance, said
+
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
@@ -182,7 +262,7 @@ class _Problem:
         suits them best. So does the course of viscous friction over time.
         """
         without, moved = self._hidden(result, reasons, extra, 0.0)
-        within, warmed = self._hidden(result, reasons, extra, drift.WARMS)
+        within, warmed = self._hidden(result, reasons, extra, WARMS)
         known = np.isfinite(within) & np.isfinite(without)
         part = np.where(known, within - np.where(known, without, 0.0), 0.0) + np.outer(warmed - moved, warmed - moved)
         # With nothing hidden what was found is the best there is, at a bound too.
@@ -206,7 +286,7 @@ class _Problem:
         # In units of what may be: a row of unit variance for each that is hidden.
         usual = np.eye(len(names), count + len(names), count)
         lost = warms * values["sigma_2"] * points.speed * weight
-        noise = np.eye(len(lost)) + drift.warming(points.age) * np.outer(lost, lost)
+        noise = np.eye(len(lost)) + warming(points.age) * np.outer(lost, lost)
         root = np.linalg.cholesky(noise)
         whole = np.vstack([solve_triangular(root, np.hstack(columns), lower=True), usual])
         away = np.concatenate([solve_triangular(root, result.residuals, lower=True), np.zeros(len(names))])
@@ -297,7 +377,7 @@ def _conclude(
     names = tuple(map(outer, result.names))
     turn = inner_to_outer(result.names, names)
     whole, warmed = problem.marginal(result, reasons, extra)
-    drifted, drifts = drift.repeated(plateaus, values, names)
+    drifted, drifts = repeated(plateaus, values, names)
     covariance, warmed = turn @ whole @ turn.T + np.diag(drifted), turn @ warmed @ turn.T
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
@@ -312,7 +392,7 @@ def _conclude(
     said += drifts
     if "sigma_2" in sigma:
         at = names.index("sigma_2")
-        said += drift.hides(float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
+        said += hides(float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
     if extra > 0:
         said.append(
             f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "

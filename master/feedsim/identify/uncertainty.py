@@ -9,10 +9,10 @@ import numpy as np
 
 from feedsim.estimation.fit import Fit
 from feedsim.estimation.parameter import Prior
+from feedsim.identify.motion import RecordTorque
 from feedsim.identify.parameters import PRE_SLIDING, inner
 from feedsim.identify.record import Array
 from feedsim.identify.search import Search, Solution
-from feedsim.identify.torque import RecordTorque
 
 # Of the record's RMS torque, and of the inertia: what the model itself is not better than (interpolation between the
 # samples, modes of the structure). Without it the quietest move of a record without noise would count for all.

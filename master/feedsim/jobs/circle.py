@@ -13,9 +13,8 @@ from feedsim.analysis.circle import diagnose, further
 from feedsim.analysis.circle.records import RecordedCircle, read_circle
 from feedsim.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import circle as page
 from feedsim.report.content import Report

@@ -15,12 +15,11 @@ from feedsim import units
 from feedsim.arguments import Value, amount, spelt
 from feedsim.compare.between import bounds_of
 from feedsim.compare.compare import compare as compared
-from feedsim.compare.files import compare_series, pairs_of, tolerances_of, unusable
-from feedsim.compare.lines import lines_of
+from feedsim.compare.files import compare_series, lines_of, pairs_of, tolerances_of, unusable
+from feedsim.compare.likeness import Comparison, Variable, Verdict
 from feedsim.compare.options import Options, no_match
 from feedsim.compare.shift import estimated_shift
 from feedsim.compare.tolerance import Tolerances
-from feedsim.compare.verdict import Comparison, Variable, Verdict
 from feedsim.errors import InputError
 from feedsim.jobs.parameters import Argument, Force, Option, job
 from feedsim.jobs.result import Result

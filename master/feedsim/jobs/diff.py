@@ -14,9 +14,8 @@ from feedsim.analysis import Figure, Named
 from feedsim.analysis.alignment import aligned
 from feedsim.analysis.side_by_side import Source, differing, named_apart, read_sources
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.run import RunResult
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.judge import judged

@@ -2,15 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from feedsim.arguments import Value, spelt
+from feedsim import cosim, judge, nc, scenario, ssp, units
+from feedsim.analysis import check
+from feedsim.arguments import Changes, Pairs, Value, by_name, listed, pairs, settings, spelt
+from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.errors import InputError
-from feedsim.jobs.made import Made
+from feedsim.files.source import is_ssp
+from feedsim.jobs.machine import Positions, positions
 from feedsim.jobs.parameters import Archives, Argument, File, Force, Option, Settings, job, out_file
-from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.jobs.result import Kind, Made
+from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
+from feedsim.judge import judged
+from feedsim.outputs import archive_with, begins_with, same
+from feedsim.owned import TemporaryFolder
+from feedsim.page.content import content
+from feedsim.page.html import MARK, page
+from feedsim.report.provenance import input_paths
+from feedsim.scenario import Machine, Scenario
+from feedsim.scenario.described import load_described
+from feedsim.scenario.load import load
+from feedsim.scenario.structure.load import load_structure
+from feedsim.ssp import Exported
+from feedsim.ssp.archive import STRUCTURE
+from feedsim.structure import checked_modes
+from feedsim.structure import pack as archive
+from feedsim.structure.build import build
+from feedsim.structure.geometry.assemble import movable
+from feedsim.structure.modes import read_modes, write_modes
+from feedsim.structure.poses import grid_axis, pose_grid
+from feedsim.structure.poses_file import GridAxis, write_poses
+from feedsim.structure.table_check import table_mismatch
 
 # Ending of the file -> the options that it has besides those of all.
 ENDINGS = {".fmu": ("inputs", "plant", "base", "terminals"), ".ssp": ("one",), ".html": ("knobs",)}
@@ -128,15 +154,15 @@ def export(
         )
         raise InputError(f"{spelt(wrong)}: is for {needs}, not for {ending}")
     if ending == ".ssp":
-        from feedsim.jobs.write_ssp import write_ssp
+        pass
 
         return write_ssp(subject, out, one=one, fmus=fmus, set=set, force=force, watch=watch)
     if ending == ".html":
-        from feedsim.jobs.write_page import write_page
+        pass
 
         return write_page(subject, out, knobs=knobs, fmus=fmus, set=set, force=force, watch=watch)
     if plant:
-        from feedsim.jobs.machine_pack import machine_pack
+        pass
 
         if set:
             raise InputError(
@@ -154,8 +180,427 @@ def export(
             force=force,
             watch=watch,
         )
-    from feedsim.jobs.pack import pack
+    pass
 
     return pack(
         subject, out, inputs=inputs, base=base, terminals=terminals, fmus=fmus, set=set, force=force, watch=watch
     )
+
+
+# --- A scenario, or a machine, as one unit for other people's simulators ----------------------------------------------
+
+
+PACKED = archive_with("modelDescription.xml", b'generationTool="feedsim')
+UNIT_KIND = Kind("pack", "unit", PACKED)
+
+
+def pack(
+    subject: File,
+    out: File | None = None,
+    *,
+    inputs: bool = False,
+    terminals: bool = True,
+    base: File | None = None,
+    fmus: File | None = None,
+    set: Changes = None,
+    force: bool = False,
+    watch: Watch = NO_WATCH,
+) -> Made:
+    """Pack a scenario, or a machine, as one FMI 2.0 co-simulation unit; needs no compiler.
+
+    Args:
+        subject: scenario file, machine file or machine folder. Of a scenario the motion is inside.
+        out: archive to write; None: :meth:`Made.save` does it.
+        inputs: leave the scenario's motion out, so that setpoints are inputs.
+        terminals: with terminals and icons, which FMI Library 3 refuses in units of FMI 2.0.
+        base: archive whose binaries are taken; None: machine.fmu in `fmus`.
+        fmus: folder of the archives.
+        set: changes of the file, as behind ``--set``.
+        force: `out` may be a file that feedsim did not write.
+        watch: who hears whose programs are executed.
+
+    Raises:
+        InputError: a faulty file, a machine that no run would take, loads over time.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.export("z_positioning.yaml", inputs=True).kind
+    'pack'
+    """
+    UNIT_KIND.check_folder(out)
+    loaded = scenario.load_subject(subject, settings(set))
+    own = None if base is None else Path(base)
+    read = [Path(subject), *(file for _, file in loaded.files), *([own] if own is not None else [])]
+    with UNIT_KIND.checked(out, read, force=force) as path:
+        plan, machine = loaded.scenario, loaded.machine
+        announce_archive(watch, own, "the packed unit's trial")
+        archives = Path(fmus) if fmus is not None else cosim.fmus_directory()
+        program = nc.plan(plan) if plan is not None and not inputs else None
+        if plan is not None:
+            _check_loads(plan)
+        findings: tuple[str, ...] = ()
+        if plan is not None and program is not None:
+            findings = judge.check(plan, program, fmus=archives)  # what a run would refuse should not be packed
+        else:
+            checked_modes(machine)
+        moving = plan if program is not None else None
+        with TemporaryFolder() as folder:
+            packed = pack_whole(
+                own or archives / f"{UNIT}.fmu",
+                folder / "machine.fmu",
+                machine,
+                coupling=plan.coupling if plan else None,
+                program=program,
+                name=machine.name if moving is None else f"{machine.name}; motion: {moving.name}",
+                note=machine.note if moving is None else " ".join(loaded.notes),
+                model=machine.name if moving is None else moving.name,
+                terminals=terminals,
+            )
+            content = packed.path.read_bytes()
+        motion = f"motion of {program.duration:.4g} s inside" if program else "setpoints are inputs"
+        line = (
+            f"axes {', '.join(machine.axes)}; {motion}; control cycle {machine.cycles.T_c * 1e6:.6g} us; "
+            f"{packed.size / 1024:.0f} KiB, {', '.join(packed.platforms) or 'no binaries'}, guid {packed.guid}"
+        )
+        made = Made(UNIT_KIND, "machine.fmu", content, [line], findings, inputs=read)
+        if path is not None:
+            made.save(path, force=force)
+    return made
+
+
+def _check_loads(plan: Scenario) -> None:
+    if plan.loads:
+        raise InputError.of(
+            f"{plan.file}: the unit holds no loads over time",
+            [
+                f"{plan.at('loads', i)}: the load {load.words} does not go into the unit, which holds none over time: "
+                f"--set loads=[] packs it without, and its importer drives {load.input}"
+                for i, load in enumerate(plan.loads)
+            ],
+        )
+
+
+# --- A scenario's machine as one page that computes, with knobs -------------------------------------------------------
+
+
+PAGE_KIND = Kind("page", "page", begins_with(MARK))
+
+
+def write_page(
+    scenario: File,
+    out: File | None = None,
+    *,
+    knobs: str | Sequence[str] = (),
+    fmus: File | None = None,
+    set: Changes = None,
+    force: bool = False,
+    watch: Watch = NO_WATCH,
+) -> Made:
+    """Write one HTML file that holds the scenario's machine, compiled as WebAssembly, and knobs.
+
+    Args:
+        scenario: scenario file.
+        out: page to write; None: :meth:`Made.save` does it.
+        knobs: what can be turned: keys of the scenario or their ends, with * and ?; none: the usual ones.
+        fmus: folder of archives and module.
+        set: changes of the file, as behind ``--set``.
+        force: `out` may be a file that feedsim did not write.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, a machine that a page cannot hold, no such knob.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.export("z_positioning.yaml", kind="html").name
+    'z_positioning.html'
+    """
+    PAGE_KIND.check_folder(out)
+    file, archives = Path(scenario), None if fmus is None else Path(fmus)
+    wanted = listed(knobs)
+    asked = load(file, settings(set))
+    read = [file, *input_paths(asked)]
+    with PAGE_KIND.checked(out, read, force=force) as path:
+        program = nc.plan(asked)
+        content(asked, program, wanted, archives)  # what cannot be shown should not be run
+        check(asked, program)
+        run = judged(cosim.run(asked, program=program, fmus=archives, progress=watch.of("simulation")))
+        page_of_run = page(run, wanted, archives)
+        line = f"{len(page_of_run) / 1000:.0f} kB; axes {', '.join(asked.machine.axes)}; open it in a browser"
+        made = Made(PAGE_KIND, f"{file.stem}.html", page_of_run, [line], run.warnings, inputs=read)
+        if path is not None:
+            made.save(path, force=force)
+    return made
+
+
+# --- A scenario as one SSP file, for other people's simulators --------------------------------------------------------
+
+
+SSP_KIND = Kind("ssp", "SSP file", archive_with(STRUCTURE, b'generationTool="feedsim'))
+
+
+def write_ssp(
+    scenario: File,
+    out: File | None = None,
+    *,
+    one: bool = False,
+    fmus: File | None = None,
+    set: Changes = None,
+    force: bool = False,
+    watch: Watch = NO_WATCH,
+) -> Made:
+    """Write a scenario as one SSP file (System Structure and Parameterization 1.0): units, parameters, wiring, motion.
+
+    Args:
+        scenario: scenario file.
+        out: the SSP file to write, which ends in .ssp; None: :meth:`Made.save` does it.
+        one: one component, the machine as one unit with its motion inside, for any step size.
+        fmus: folder of the archives.
+        set: changes of the file, as behind ``--set``.
+        force: `out` may be a file that feedsim did not write.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, a motion that violates a limit, loads over time, a name that does not end in .ssp.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> made = fs.export("z_positioning.yaml", kind="ssp")
+    >>> made.content[:2]
+    b'PK'
+    """
+    if out is not None and not is_ssp(Path(out)):
+        raise InputError(f"{spelt('out')} {out}: an SSP file ends in .ssp; simulators recognise it by that")
+    file = Path(scenario)
+    if is_ssp(file):
+        raise InputError(f"{file}: is an SSP file already; a scenario is expected")
+    SSP_KIND.check_folder(out)
+    plan = load(file, [*settings(set), *(["coupling.units=one"] if one else [])])
+    read = [file, *input_paths(plan)]
+    with SSP_KIND.checked(out, read, force=force) as path:
+        with TemporaryFolder() as folder:
+            done = ssp.export(plan, folder / "machine.ssp", fmus=None if fmus is None else Path(fmus))
+            content = done.path.read_bytes()
+        line = (
+            f"{done.size / 1024:.0f} KiB, {_inside(done, plan.machine.cycles.T_c)}; "
+            f"runs on {', '.join(done.platforms) or 'no platform'}"
+        )
+        made = Made(SSP_KIND, f"{file.stem}.ssp", content, [line], done.warnings, inputs=read)
+        if path is not None:
+            made.save(path, force=force)
+    return made
+
+
+def _inside(done: Exported, T_c: float) -> str:
+    if len(done.instances) == 1:
+        return f"one instance, {done.duration:.4g} s at any step; parameters in its archive"
+    return (
+        f"{len(done.instances)} instances, {done.duration:.4g} s at {T_c * 1e6:.6g} us; parameters in resources/*.ssv"
+    )
+
+
+# --- A machine at a pose, or over a grid of poses, in a plant archive -------------------------------------------------
+
+
+PLANT_KIND = Kind("machine pack", "unit", PACKED, makes_folder=True)
+# A cell takes a tenth of a second and, with two axes and a hundred modes, 0.2 MB in the archive and in the plant.
+MOST_CELLS = 3000
+# Positions that are typed twice are the same where they differ by less [m].
+START_TOLERANCE = 1e-9
+POSITIONS_EXAMPLE = "Z=20mm or Z=0mm..400mm/20mm"
+
+
+def machine_pack(
+    machine: File,
+    out: File | None = None,
+    *,
+    at: Positions = None,
+    poses: Pairs[Value] = None,
+    name: str | None = None,
+    note: str | None = None,
+    terminals: bool = True,
+    base: File | None = None,
+    force: bool = False,
+    watch: Watch = NO_WATCH,
+) -> Made:
+    """Pack the machine's axes, pose and table of modes into a plant archive; needs no compiler.
+
+    Args:
+        machine: machine file, or a folder with a machine.yaml.
+        out: archive to write; None: :meth:`Made.save` does it.
+        at: axis -> position [m], or a text with a unit; other axes stay at the machine's pose.
+        poses: axis -> size of the cells of a grid of poses [m], or a text "20mm" or "0mm..400mm/20mm".
+        name, note: of the machine in the archive; None: the machine's own.
+        terminals: with terminals and icons, which FMI Library 3 refuses in units of FMI 2.0.
+        base: archive whose binaries are taken; None: plant.fmu of those that come along.
+        force: `out` may be a file that feedsim did not write.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no such axis or position, no structure to compute modes from.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.export("machines/test_centre", at={"Z": "100 mm"}, plant=True).name
+    'plant.fmu'
+    """
+    described = load_described(machine)
+    loaded = scenario.load_machine(machine)
+    own = None if base is None else Path(base)
+    # The archive that the machine file names as its plant, and one that is packed in place, are made anew here.
+    made = [path for path in (loaded.plant, own) if path is not None]
+    files = [file for _, file in described.files if not any(same(file, path) for path in made)]
+    read = [Path(machine), loaded.modes, *files]
+    with PLANT_KIND.checked(out, read, force=force) as path:
+        announce_archive(watch, own, "the packed plant's trial")
+        pose = _pose_of(loaded, at)
+        with TemporaryFolder() as folder:
+            modes = _modes_at(loaded, pose, folder / "modes.csv") if at else loaded.modes
+            checked_modes(loaded.model_copy(update={"modes": modes}))  # what a run would refuse should not be packed
+            if not at and (doubt := table_mismatch(loaded)) is not None:
+                raise InputError(f"{doubt}, or let the modes be computed: {spelt('at')}")
+            grid, follows = None, ""
+            if poses:
+                grid = folder / "poses.bin"
+                follows = f"; {_write_grid(loaded, pose, modes, poses, watch, grid)}"
+            packed = archive.pack(
+                own or cosim.fmus_directory() / "plant.fmu",
+                folder / "plant.fmu",
+                modes=modes,
+                pose=pose,
+                poses=grid,
+                name=loaded.name if name is None else name,
+                note=loaded.note if note is None else note,
+                terminals=terminals,
+            )
+            content = packed.path.read_bytes()
+        where = ", ".join(f"{axis} at {position * 1e3:.9g} mm" for axis, position in pose.items())
+        line = (
+            f"{where}{follows}; {packed.size / 1024:.0f} KiB, {', '.join(packed.platforms) or 'no binaries'}, "
+            f"guid {packed.guid}"
+        )
+        result = Made(PLANT_KIND, "plant.fmu", content, [line], inputs=read)
+        if path is not None:
+            result.save(path, force=force)
+    return result
+
+
+def _pose_of(machine: Machine, at: Positions) -> dict[str, float]:
+    """The machine's pose [m], axes in its order, with the positions `at` in place of its own.
+
+    Raises:
+        InputError: no such axis, no length, or outside of the axis' travel.
+    """
+    pose = {axis: machine.pose[axis] for axis in machine.axes}
+    for axis, position in positions(at).items():
+        if axis not in pose:
+            raise InputError(f"{spelt('at')}: the machine has no axis {axis}; axes are {', '.join(pose)}")
+        low, high = machine.axes[axis].travel
+        if not low <= position <= high:
+            raise InputError(
+                f"{spelt('at')} {axis}: {units.show(position, 'm')} is outside of the travel, "
+                f"{units.show(low, 'm')} to {units.show(high, 'm')}"
+            )
+        pose[axis] = position
+    return pose
+
+
+def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
+    """Table of the machine's modes at `pose` [m], computed from its structure and written to `out`.
+
+    Raises:
+        InputError: the machine has no structure, its kind is known at one pose only, or it is faulty.
+    """
+    if machine.structure is None:
+        raise InputError(
+            f"{machine.name}: has no structure to compute modes from at another pose; give it the key structure, or "
+            f"leave {spelt('at')} out"
+        )
+    write_modes(out, build(load_structure(machine.structure), pose).solution.modes)
+    return out
+
+
+def _write_grid(
+    machine: Machine, pose: Mapping[str, float], modes: Path, asked: Pairs[Value], watch: Watch, out: Path
+) -> str:
+    """Compute the grid that is asked for, about `pose` [m], and write it to `out`; returns what was made, in words.
+
+    modes: table at `pose`, which says how large the grid will be.
+
+    Raises:
+        InputError: no such axis, no such cells, or a machine whose structure is known at one pose only.
+    """
+    if machine.structure is None:
+        raise InputError(
+            f"{machine.name}: has no structure to compute the modes of other poses from; give the machine file the key "
+            f"structure, or leave {spelt('poses')} out"
+        )
+    structure = load_structure(machine.structure)
+    movable(structure)
+    grid = grid_axes(machine, asked)
+    axes = list(machine.axes)
+    watch.say(_size(machine, pose, grid, len(read_modes(modes, axes).frequency)))
+    poses = pose_grid(structure, pose, grid, axes=axes, progress=watch.of(machine.name))
+    size = write_poses(out, poses)
+    cells = " x ".join(f"{len(axis.centres)} in {axis.axis}" for axis in grid)
+    return f"follows the pose, {len(poses.cells)} cells ({cells}), {size / 2**20:.1f} MiB of modes"
+
+
+def _size(machine: Machine, pose: Mapping[str, float], grid: Sequence[GridAxis], count: int) -> str:
+    """How much is about to be computed, of `count` modes per cell, in words.
+
+    Raises:
+        InputError: too much, or the plant would start outside of the grid.
+    """
+    for axis in grid:
+        low, high = axis.reach
+        if not low - START_TOLERANCE <= pose[axis.axis] <= high + START_TOLERANCE:
+            raise InputError(
+                f"{spelt('poses')}: the machine stands at {axis.axis} {pose[axis.axis] * 1e3:.6g} mm, outside of the "
+                f"grid, {low * 1e3:.6g} mm to {high * 1e3:.6g} mm; choose a range that holds it, or another pose with "
+                f"{spelt('at')}"
+            )
+    cells = math.prod(len(axis.centres) for axis in grid)
+    numbers = cells * (1 + count * (5 + 2 * len(machine.axes)) + len(grid) * count**2)
+    size = f"{cells} cells of about {count} modes, about {8 * numbers / 2**20:.3g} MiB"
+    if cells > MOST_CELLS:
+        raise InputError(
+            f"{spelt('poses')}: {size}; at most {MOST_CELLS} cells are allowed: larger cells, or fewer axes"
+        )
+    return size
+
+
+def grid_axes(machine: Machine, poses: Pairs[Value]) -> list[GridAxis]:
+    """Grid axes of axis -> size of the cells [m], or a text CELL or LOW..HIGH/CELL.
+
+    Raises:
+        InputError: no such form, no such axis, or a range outside of its travel.
+    """
+
+    def axis_of(name: str, given: Value) -> GridAxis:
+        if name not in machine.axes:
+            raise InputError(f"the machine has no axis {name!r}; axes are {', '.join(machine.axes)}")
+        low, high = travel = machine.axes[name].travel
+        rest = given if isinstance(given, str) else f"{given} m"
+        limits, slash, cell = rest.rpartition("/") if ".." in rest else ("", "", rest)
+        if ".." in rest and not slash:
+            raise InputError(f"the size of the cells is missing; {POSITIONS_EXAMPLE} is the form")
+        width = units.parse(cell, "m", "20 mm")
+        if slash:
+            first, _, last = limits.partition("..")
+            low, high = units.parse(first, "m", "0 mm"), units.parse(last, "m", "400 mm")
+        if not travel[0] <= low <= travel[1] or not travel[0] <= high <= travel[1]:
+            raise InputError(
+                f"outside of the travel of {name}, {units.show(travel[0], 'm')} to {units.show(travel[1], 'm')}"
+            )
+        axis = grid_axis(name, low, high, width)
+        if len(axis.centres) == 1:
+            raise InputError(
+                f"as wide as the {'range' if slash else 'travel'}, {units.show(high - low, 'm')}, or wider: 1 cell "
+                "does not follow; leave the axis out, or give smaller cells"
+            )
+        return axis
+
+    given = pairs("poses", poses, f"{POSITIONS_EXAMPLE} is the form")
+    return [*by_name("poses", given, axis_of).values()]

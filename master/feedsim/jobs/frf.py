@@ -15,11 +15,10 @@ from feedsim.arguments import Band, Value, between, listed, quantity, settings, 
 from feedsim.cosim.plant import plant_modes
 from feedsim.errors import FeedsimError, InputError
 from feedsim.findings import severity
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
-from feedsim.judge.loops import control as control_findings
+from feedsim.judge.run import control as control_findings
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.report.content import Report

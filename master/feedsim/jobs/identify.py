@@ -19,9 +19,8 @@ from feedsim.identify import STAGES, Asked, Estimate, Identification, Identified
 from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.parameters import PARAMETER_KINDS
 from feedsim.identify.stages import identify as identified_from
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import identify as page
 from feedsim.report.content import Report

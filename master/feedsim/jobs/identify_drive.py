@@ -12,7 +12,6 @@ from typing import Annotated, Any
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import Value, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import (
     Archives,
     Argument,
@@ -26,7 +25,7 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.replay.elastic import MOST_MODES
 from feedsim.replay.identified import identify_drives

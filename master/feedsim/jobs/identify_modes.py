@@ -11,14 +11,12 @@ from feedsim.analysis import Figure, Named
 from feedsim.arguments import Band, Value, between, quantity, settings, spelt
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.modal.identified import AxisModes
-from feedsim.modal.identified import identify_modes as identified
 from feedsim.modal.measured import Channel, from_responses, from_signals
-from feedsim.modal.rational import MOST_MODES
+from feedsim.modal.rational import MOST_MODES, AxisModes
+from feedsim.modal.rational import identify_modes as identified
 from feedsim.report.content import Report
 from feedsim.report.modal import report as page
 from feedsim.report.results import Content

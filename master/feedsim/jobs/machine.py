@@ -14,9 +14,8 @@ import numpy as np
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import Pairs, Value, lengths, pairs, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import begins_with, forced, replacing
 from feedsim.report.content import Report

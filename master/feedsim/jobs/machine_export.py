@@ -12,13 +12,12 @@ from feedsim.analysis import Figure, Named
 from feedsim.arguments import listed, pairs, spelt
 from feedsim.control import names_of
 from feedsim.control.archive import Archive
-from feedsim.control.view import Value
+from feedsim.control.reading import Value
 from feedsim.control.writing import Written, changed
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.machine_import import Names, assumed, axes_of, inputs_of, read_files
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
 from feedsim.report.control_files import exported as page

@@ -16,9 +16,8 @@ from feedsim.control.formats import opened
 from feedsim.control.reading import Reading, read
 from feedsim.errors import InputError, no_such_file
 from feedsim.files.regular import content
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
 from feedsim.report.control_files import imported as page

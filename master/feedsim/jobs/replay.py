@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import (
     Archives,
     Argument,
@@ -23,7 +22,7 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.replay.compare import replayed
 from feedsim.replay.open_loop import driven

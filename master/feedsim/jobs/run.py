@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from feedsim import analysis, cosim
 from feedsim.analysis import Figure
 from feedsim.findings import ranked, severity
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import (
     Archives,
     Argument,
@@ -28,7 +27,7 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, in_words_of
+from feedsim.jobs.result import Result, in_words_of, kept
 from feedsim.jobs.subject import Opened, opened
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.judge import JudgedRun, judged

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import settings
 from feedsim.findings import WRONG, Wrong
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.owned import TemporaryFolder
 from feedsim.report.content import Report

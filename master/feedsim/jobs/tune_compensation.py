@@ -13,19 +13,17 @@ from feedsim.analysis import Figure
 from feedsim.arguments import listed, settings, spelt
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report import tune as page
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
-from feedsim.report.tune.drive_files import lines_of
+from feedsim.report.tune.drive import lines_of
 from feedsim.report.tune.report import SETTINGS, SHEET
-from feedsim.tune.closed_forms import check_controlled
-from feedsim.tune.compensation import Judged, tune
-from feedsim.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES
+from feedsim.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, Judged, tune
+from feedsim.tune.proposals import check_controlled
 from feedsim.uncertainty import check_count, cloud_of
 
 

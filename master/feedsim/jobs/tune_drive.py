@@ -12,7 +12,6 @@ from feedsim import scenario as scenarios
 from feedsim.analysis import Figure
 from feedsim.arguments import Value, amount, given, quantity, settings, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import (
     Archives,
     Argument,
@@ -26,22 +25,21 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, in_words_of
+from feedsim.jobs.result import Result, in_words_of, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
+from feedsim.report.tune import drive as drive_files
 from feedsim.report.tune import drive as page
-from feedsim.report.tune import drive_files
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure import Modes
 from feedsim.structure.build import build
-from feedsim.tune.changed import Changed
 from feedsim.tune.drive import EVALUATIONS
 from feedsim.tune.drive import tune_drive as tune
 from feedsim.tune.drive_program import check_axis
-from feedsim.tune.drive_result import Limits, Tuned
+from feedsim.tune.drive_result import Changed, Limits, Tuned
 from feedsim.uncertainty import check_count, cloud_of
 
 LEAST_EVALUATIONS = 10

@@ -14,9 +14,8 @@ from feedsim.analysis import compensation
 from feedsim.analysis.compensation import Compensation, check_moves, lags_of, moving_axes
 from feedsim.arguments import Pairs, Value, amount, by_name, pairs, settings, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.folder import kept
 from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report import compensate as page
 from feedsim.report import uncertainty as intervals

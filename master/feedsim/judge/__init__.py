@@ -4,7 +4,6 @@ May use cosim, linear, structure and what is below them. It judges a finished ru
 Start with run.py: ``judged``; each of the other files judges one thing.
 """
 
-from feedsim.judge.pose import PoseUse
-from feedsim.judge.run import JudgedRun, check, judged
+from feedsim.judge.run import JudgedRun, PoseUse, check, judged
 
 __all__ = ["JudgedRun", "PoseUse", "check", "judged"]

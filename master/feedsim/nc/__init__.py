@@ -4,7 +4,6 @@ May use the scenario with its motions, and trace. Sole user of the splines throu
 Start with program.py: ``plan``.
 """
 
-from feedsim.nc.program import plan
-from feedsim.nc.segment import Program, Segment
+from feedsim.nc.program import Program, Segment, plan
 
 __all__ = ["Program", "Segment", "plan"]

@@ -10,8 +10,9 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,19 +28,162 @@ from feedsim.cosim.system import plant_parameters
 from feedsim.cosim.whole import open_whole
 from feedsim.errors import InputError
 from feedsim.estimation.interval import student
+from feedsim.installation import checkout
 from feedsim.judge import check as judged_ahead
-from feedsim.judge.exchange import exchange_stability
-from feedsim.judge.loops import control
+from feedsim.judge.run import control, exchange_stability, left_grid
 from feedsim.linear.judgement import SHOWS, judge, locked_modes
 from feedsim.motions.circular import Circle, Circular
 from feedsim.motions.dwell import Dwell
 from feedsim.motions.move import Move, Straight
 from feedsim.nc import Program
-from feedsim.page import module, reach
-from feedsim.page.knobs import Knob, chosen
+from feedsim.page.knobs import REACH, Knob, chosen
 from feedsim.scenario import CircleTest, Machine, Positioning, Scenario
 from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import Modes, checked_modes
+from feedsim.structure.pack import POSES_IN_ARCHIVE
+from feedsim.structure.pose_change import LARGE_SHIFT, MIN_POSE_DISTANCE, over_axis, pose_change, warnings
+from feedsim.structure.poses_file import GridAxis, read_grid
+
+# --- The WebAssembly module of the unit `machine` (src/page): where it is, and whether it fits the archives -----------
+
+
+MODULE_FILE = "machine.wasm"
+SECTION = b"feedsim"
+MAGIC = b"\0asm\1\0\0\0"
+
+
+def read(fmus: Path, guid: str) -> bytes:
+    """The module beside the archives in the folder `fmus`, for the unit with this GUID.
+
+    Raises:
+        InputError: it is missing, no module, or built from another table of variables.
+    """
+    path = fmus / MODULE_FILE
+    mend = "`make page-module` builds it" if checkout() else "a wheel of feedsim brings it along: install it anew"
+    if not path.is_file():
+        raise InputError(f"{path}: there is no module of the machine for pages; {mend}")
+    content = path.read_bytes()
+    table = _section(content).get("table")
+    if table is None:
+        raise InputError(f"{path}: is no WebAssembly module that feedsim made; {mend}")
+    if table != guid.partition("-")[0]:
+        raise InputError(
+            f"{path}: was built for a machine.fmu whose table of variables has the hash {table}, the archive's is "
+            f"{guid.partition('-')[0]}: one of them is of other sources; {mend}"
+        )
+    return content
+
+
+def _section(content: bytes) -> dict[str, str]:
+    """What the custom section `feedsim` says; empty where there is none."""
+    if not content.startswith(MAGIC):
+        return {}
+    at = len(MAGIC)
+    while at < len(content):
+        kind, at = content[at], at + 1
+        size, at = _length(content, at)
+        if kind == 0:
+            length, begin = _length(content, at)
+            if content[begin : begin + length] == SECTION:
+                result: dict[str, str] = json.loads(content[begin + length : at + size])
+                return result
+        at += size
+    return {}
+
+
+def _length(content: bytes, at: int) -> tuple[int, int]:
+    """An unsigned LEB128 number, and where the next byte is."""
+    value = shift = 0
+    while at < len(content):
+        byte, at = content[at], at + 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            break
+    return value, at
+
+
+# --- What a page needs to say how far a motion leaves the pose of its plant, or the grid of poses, as a run says it ---
+# How the modes change there takes the structure, which a page has not: their frequencies at some positions of every
+# axis
+# are carried along, and the page takes cubics through them.
+
+
+# Distance of positions at which modes are carried along [m]: up to some times what the program reaches, and beyond.
+# Between close ones a cubic is right to some 1e-5 of a frequency.
+CLOSE_DISTANCE, WIDE_DISTANCE, REACH_FACTOR = 0.02, 0.06, 1.6
+# Where no mode changes by more than this share of what is worth a warning as far as sliders reach, none are carried.
+NEGLIGIBLE_CHANGE = 0.5
+
+
+def reached(machine: Machine, program: Program) -> dict[str, tuple[float, float]]:
+    """Positions between which an axis may move while sliders turn [m]: the program's, farther by a slider's reach."""
+    result = {}
+    for axis in program.x_s:
+        low, high = program.reached(axis)
+        pose, travel = machine.pose[axis], machine.axes[axis].travel
+        ends = pose - REACH * max(pose - low, 0.0), pose + REACH * max(high - pose, 0.0)
+        result[axis] = max(ends[0], travel[0]), min(ends[1], travel[1])
+    return result
+
+
+def described(machine: Machine, program: Program, resources: Path) -> dict[str, Any]:
+    """Per axis what the page needs: "grid", first and last position of its cells; "over", modes over its positions."""
+    grid = _grid(machine, resources)
+    return {
+        "grid": {axis.axis: list(axis.reach) for axis in grid if len(axis.centres) > 1},
+        "over": dict(_over(machine, program, {axis.axis for axis in grid})), "near": MIN_POSE_DISTANCE,
+        "large": LARGE_SHIFT,
+    }  # fmt: skip
+
+
+def sentences(machine: Machine, program: Program, resources: Path) -> list[str]:
+    """What a run says of the positions that the program reaches: the page says it in place of it."""
+    grid = {axis.axis: axis for axis in _grid(machine, resources)}
+    ranges = {axis: program.reached(axis) for axis in program.x_s}
+    outside = [name for axis in grid if axis in ranges for name in left_grid(grid[axis], ranges[axis], machine)]
+    return [*outside, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
+
+
+def _grid(machine: Machine, resources: Path) -> tuple[GridAxis, ...]:
+    file = resources.parent / POSES_IN_ARCHIVE
+    return read_grid(file, tuple(machine.axes)) if file.is_file() else ()
+
+
+def _over(machine: Machine, program: Program, followed: set[str]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for axis, (low, high) in reached(machine, program).items():
+        pose = machine.pose[axis]
+        if axis in followed or max(pose - low, high - pose) <= MIN_POSE_DISTANCE:
+            continue
+        ends = over_axis(machine, axis, [low, high])
+        if ends is None:
+            continue
+        if ends.largest < NEGLIGIBLE_CHANGE * LARGE_SHIFT:
+            yield axis, {"low": low, "high": high}
+            continue
+        here = program.reached(axis)
+        sides = (pose - low, pose - here[0], -1), (high - pose, here[1] - pose, 1)
+        positions = sorted({pose, *(pose + sense * at for far, near, sense in sides for at in _steps(far, near))})
+        table = over_axis(machine, axis, positions)
+        assert table is not None
+        words = [moving.partition(",")[0] for moving in table.moving]
+        rounded = [[float(f"{f:.9g}") for f in row] for row in table.there.tolist()]
+        frequency = table.frequency.tolist()
+        yield axis, {"low": low, "high": high, "position": [round(x, 4) for x in positions], "there": rounded,
+                     "frequency": frequency, "moving": words}  # fmt: skip
+
+
+def _steps(far: float, near: float) -> list[float]:
+    """Distances from the pose on one side [m], up to `far`; close together up to REACH_FACTOR times `near`."""
+    if far <= MIN_POSE_DISTANCE:
+        return []
+    close = min(REACH_FACTOR * max(near, 0.0), far)
+    count, wide = max(math.ceil(close / CLOSE_DISTANCE), 1), math.ceil((far - close) / WIDE_DISTANCE)
+    return [
+        *(k * close / count for k in range(1, count + 1)),
+        *(close + k * (far - close) / wide for k in range(1, wide + 1)),
+    ]
+
 
 # Longer runs take a phone more than a second or two at every turn of a knob.
 MAX_RUN_TIME = 60.0  # s
@@ -75,7 +219,7 @@ def content(scenario: Scenario, program: Program, wanted: Sequence[str] = (), fm
     evaluated = [item for item in scenario.evaluate if _known(item, scenario)]
     values = {**plant_parameters(machine, None), **parameters(machine, scenario.coupling, built_in=False)}
     with open_whole(machine, folder) as archive:
-        code = module.read(folder, archive.guid)
+        code = read(folder, archive.guid)
         resources = archive.directory / "resources"
         files = {path.name: path.read_bytes() for path in sorted(resources.iterdir()) if path.is_file()}
         described = _machine(scenario, archive) | _judged(scenario, program, folder, resources)
@@ -148,7 +292,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
     omega, damping, peak = (locked_mode.tolist() for locked_mode in locked_modes(machine, modes))
     said = {
         *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
-        *reach.sentences(machine, program, resources),
+        *sentences(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
     own = machine.plant is not None or machine.transmitted  # not the modes that the unit holds
@@ -159,7 +303,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
                 if axis.guide is not None and axis.guide.share
                 for key, value in machine.shipped_friction(name, "a page").parameters().items()}  # fmt: skip
     return {
-        "friction": friction, "reach": reach.described(machine, program, resources), "modes": tables,
+        "friction": friction, "reach": described(machine, program, resources), "modes": tables,
         "warnings": [str(warning) for warning in ahead],
         "locked": [list(entry) for entry in zip(omega, damping, peak, strict=True) if MOST_K_V * entry[2] > SHOWS],
         "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "substeps": coupling.substeps},

@@ -11,7 +11,9 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from html import escape
+from importlib import resources
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -21,15 +23,59 @@ from feedsim.analysis.circle import answer, swinging
 from feedsim.errors import InputError
 from feedsim.judge import JudgedRun
 from feedsim.page.content import Content, content, packed
-from feedsim.page.scripts import showing, styles, text, worker
 from feedsim.report.content import Table
 from feedsim.report.formatting import display_unit, duration, shown, typeset
+from feedsim.report.page import drawing, style
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_section
 from feedsim.report.style import PALETTE
 from feedsim.trace.files import written_whole
+
+# --- The scripts and styles of a page: what computes, for a worker, and what shows, for the page itself ---------------
+
+
+COMPUTING = (
+    "packed.js", "unit.js", "plan.js", "figures.js", "algebra.js", "circle_model.js", "circle_diagnosis.js", "signs.js",
+    "circle_words.js", "linear.js", "judgement.js", "bode.js", "work.js",
+)  # fmt: skip
+SHOWING = ("packed.js", "figures.js", "signs.js", "pictures.js", "lessons.js", "page.js")
+
+
+@cache
+def computing() -> str:
+    """Unit, planner, figures: without anything of a browser, so that node runs it as well."""
+    return "".join(text(name) for name in COMPUTING)
+
+
+@cache
+def worker() -> str:
+    """The worker's script."""
+    return '"use strict";\n' + _without_comments(computing() + text("worker.js"))
+
+
+@cache
+def showing() -> str:
+    """The page's own script: charts of reports, and what is about knobs."""
+    script = drawing() + "".join(text(name) for name in SHOWING)
+    return '"use strict";\n(() => {\n' + _without_comments(script) + "})();\n"
+
+
+def styles() -> str:
+    """The style sheet: that of reports, and the page's own."""
+    return style() + text("page.css")
+
+
+def text(name: str) -> str:
+    """A file of the template folder."""
+    return (resources.files("feedsim.page") / "template" / name).read_text(encoding="utf-8")
+
+
+def _without_comments(script: str) -> str:
+    """Without the lines that are comments alone, which are for readers of the sources: pages travel by mail."""
+    return "".join(line for line in script.splitlines(keepends=True) if not line.lstrip().startswith("//"))
+
 
 # With a plant of thousands of modes or a grid of poses; a mail takes it, and a phone.
 MAX_PAGE_BYTES = 1_500_000  # bytes

@@ -17,8 +17,7 @@ from feedsim.errors import InputError
 from feedsim.findings import Note, Wrong
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of, same_time, unclipped
-from feedsim.replay.moving_lines import lines_in_motion
-from feedsim.replay.outside import Line, in_words, same_line, without_outside
+from feedsim.replay.moving_lines import Line, in_words, lines_in_motion, same_line, without_outside
 from feedsim.replay.plausible import implausible
 from feedsim.scenario import Drive, Machine
 from feedsim.structure import checked_modes

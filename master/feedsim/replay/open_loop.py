@@ -2,7 +2,7 @@
 
 The axis is rigid: it begins with the recorded position and speed, and nothing corrects it. The position is then the
 second integral of what friction and load lack, and drifts away from an error of a percent. In closed loop the drive
-hides such an error. Equation and start are those of the identification (identify/free_axis.py).
+hides such an error. Equation and start are those of the identification (identify/open_loop.py).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
-from feedsim.identify.free_axis import reached
+from feedsim.identify.open_loop import reached
 from feedsim.identify.parameters import FRICTION_NAMES
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.compare import Channel, Comparison

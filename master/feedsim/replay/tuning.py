@@ -7,24 +7,131 @@ take differences anew.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import log, nan, sqrt
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from math import exp, hypot, inf, log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import FeedsimError, InputError
 from feedsim.estimation.covariance import correlation_length
+from feedsim.estimation.interval import NORMAL_95, half_width
 from feedsim.estimation.least_squares import LeastSquares, Point
+from feedsim.estimation.parameter import Parameter
 from feedsim.estimation.secant import secant
 from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import rms
+from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import AxisRecord, Mask, Replay, per_row_of
 from feedsim.replay.elastic import modes_of, with_modes
-from feedsim.replay.parameters import difference, no_effect, parameter
+from feedsim.replay.start import of_cycle
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
+
+# --- The parameters of a fit of a drive: what each may be, how it is scaled, and what is known of it beforehand -------
+# They are those of the drive and the friction, but for three: K_i = K_p/T_n, `excess` = F_S - F_C, and `delay`, by
+# how
+# much the torque is logged later than the motion. Every parameter has a prior: its start, and a standard deviation
+# about
+# it, of the logarithm where it is known by its order of magnitude.
+
+
+SPAN = 4.0  # standard deviations of the prior that a logarithm may be off its start
+LEAST_SHAPE = 1e-3  # of a mode at the scale, over the rigid motion's
+DIFFERENCE = 1e-3  # step of differences: of the logarithm, or of a tenth of the prior's standard deviation
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table.
+
+    Attributes:
+        deviation: standard deviation of the prior about the start, of the logarithm where log, else of the value.
+        log: scaled by the logarithm, and bounded by SPAN deviations.
+        lower, upper: bounds, where not log.
+        no_effect: values at which a part of the friction law has no effect, or runs away.
+        of_friction: deviation, bounds and no_effect are shares of F_C at the start.
+    """
+
+    deviation: float
+    log: bool = False
+    lower: float = -inf
+    upper: float = inf
+    no_effect: tuple[float, ...] = ()
+    of_friction: bool = False
+
+
+# The inertia begins with the rigid line's, which accelerations determine well; where they do not, its deviation is
+# that line's (J_sigma of the start). A mode's place is known by regression ahead of the fit.
+TABLE: Mapping[str, Row] = {
+    "J": Row(0.05, log=True),
+    "K_p": Row(1.0, log=True),
+    "K_i": Row(1.5, log=True),
+    "K_v": Row(1.0, log=True),
+    "omega_0": Row(0.7, log=True),
+    "D": Row(0.5, log=True),
+    "filter_1.f": Row(0.7, log=True),  # of the low-pass that stands for a current loop
+    "k_ffw": Row(0.5, lower=0.0, upper=1.5),
+    "T_sym": Row(3e-3, lower=0.0, upper=0.02),
+    "T_dyn": Row(10e-3, lower=0.0, upper=0.1),
+    "delay": Row(1e-3, lower=-5e-3, upper=5e-3),
+    "M_0": Row(5.0, of_friction=True),
+    "F_C": Row(0.7, log=True),
+    EXCESS: Row(0.5, lower=0.0, upper=3.0, no_effect=(0.0, 3.0), of_friction=True),
+    "v_s": Row(1.5, log=True),
+    "F_log": Row(2.0, lower=0.0, no_effect=(0.0,), of_friction=True),
+    "sigma_0": Row(1.5, log=True),
+    "sigma_1": Row(2.0, log=True),
+    "sigma_2": Row(1.5, log=True),
+    "W": Row(1.5, log=True),
+    "gamma": Row(0.5, lower=1e-3, upper=1.0, no_effect=(1.0,)),
+    "asymmetry": Row(0.2, lower=-0.6, upper=0.6, no_effect=(-0.6, 0.6)),
+    # Of the elastic modes, numbered from 1: mode_f_1.
+    "mode_f": Row(0.1, log=True),
+    "mode_D": Row(0.7, log=True),
+    "mode_u": Row(0.7, log=True),
+    "mode_v": Row(1.0),  # of the start
+}
+
+
+def row(name: str) -> Row:
+    """Of a parameter, those of modes included."""
+    return TABLE[name] if name in TABLE else TABLE[name.rpartition("_")[0]]
+
+
+def parameter(name: str, start: Mapping[str, float]) -> Parameter:
+    """With its bounds and the prior's deviation as scale; position 0 is the start.
+
+    start: all values to begin with; J_sigma: deviation of the logarithm of the inertia, where it is known.
+    """
+    own, value = row(name), start[name]
+    unit = start["F_C"] if own.of_friction else 1.0
+    deviation = own.deviation * unit
+    if name == "J":
+        deviation = max(deviation, start.get("J_sigma", 0.0))
+    elif name.startswith("mode_v"):
+        deviation = max(abs(value), LEAST_SHAPE)
+    lower, upper = own.lower * unit, own.upper * unit
+    if own.log:
+        lower, upper = value * exp(-SPAN * deviation), value * exp(SPAN * deviation)
+    return Parameter(name, value, lower, upper, scale=deviation, log=own.log, origin=value)
+
+
+def difference(of: Parameter) -> float:
+    """Step of the differences in a parameter's position."""
+    return DIFFERENCE / of.step if of.log else 0.1 * DIFFERENCE
+
+
+def no_effect(name: str, value: float, start: Mapping[str, float]) -> bool:
+    """Whether a fit has moved a value to where it has no effect, or to the end of its range."""
+    own, moved = row(name), parameter(name, start)
+    if own.log:
+        return abs(moved.inward(value)) > 0.95 * SPAN
+    unit = start["F_C"] if own.of_friction else 1.0
+    return any(abs(value - end * unit) < 0.01 * moved.step for end in own.no_effect)
+
 
 Rows = NDArray[np.int64]
 
@@ -247,3 +354,116 @@ class Problem:
     def _tuned(self, problem: LeastSquares, point: Point) -> Tuned:
         values, residuals, jacobian = problem.values(point.x), problem.residuals(point), problem.jacobian(point)
         return Tuned(problem.names, values, point, residuals, jacobian, self.counted)
+
+
+# --- The cycle in which a control closes its position loop: the axis fitted with another one, and a test between both -
+# Two cycles are two models that do not contain one another. The record decides between them where the sum of the
+# rows'
+# logarithms of the likelihood differs by more than its own scatter, 95 % (Q. H. Vuong, Econometrica 57 (1989),
+# 307-333).
+# That holds for models neither of which is quite the axis. Rows depend on each other, so that the scatter counts
+# their
+# correlation over time.
+
+
+OTHERWISE = "with a position cycle of {:g} ms, which fits as well, it is {:.4g} {}"
+
+
+@dataclass(frozen=True, eq=False)
+class OtherCycle:
+    """A fit with another cycle of the position loop than the one that was taken.
+
+    Attributes:
+        cycle: [s].
+        gain: by how much the record is likelier with it (logarithm). sigma: standard deviation of that.
+        estimates: with it; empty where the record speaks against it.
+    """
+
+    cycle: float
+    gain: float
+    sigma: float
+    estimates: Mapping[str, Estimate] = field(default_factory=dict)
+
+
+def decision(others: Sequence[OtherCycle]) -> int:
+    """1 where the records of all axes together speak for the other cycle, -1 against it, 0 where they do not decide."""
+    gain, sigma = sum(other.gain for other in others), hypot(*(other.sigma for other in others))
+    return int(gain > NORMAL_95 * sigma) - int(gain < -NORMAL_95 * sigma)
+
+
+def other_cycle(
+    problem: Problem, fit: Tuned, cycle: float, judged: Callable[[Tuned], Mapping[str, Estimate]]
+) -> OtherCycle:
+    """A fit once more, with another cycle of the position loop [s].
+
+    The rigid line of a record is no measure of the inertia in every cycle, so the fit may leave it as that cycle asks.
+
+    judged: estimates of a fit.
+    """
+    machine, weights, start = problem.machine, problem.weights, problem.start
+    cycles = machine.cycles.model_copy(update={"position": cycle})
+    problem.machine = machine.model_copy(update={"cycles": cycles})
+    problem.start = of_cycle(start, cycle, problem.each.record.interval)
+    try:
+        fits = [_refitted(problem, fit)]
+        if fit.values["T_sym"] <= TABLE["T_sym"].lower:
+            # A wrong cycle has driven the delay to its bound; what it leaves of the position has no weight any more.
+            problem.weights = first_weights(problem.each)
+            with suppress(InputError):
+                fits.append(problem.first(fit.names))
+        best = max(fits, key=lambda one: float(np.sum(_likelihood(one))))
+        gain, sigma = gain_of(_likelihood(best) - _likelihood(fit))
+        if gain < -NORMAL_95 * sigma:
+            return OtherCycle(cycle, gain, sigma)
+        problem.weigh(best)
+        best = problem.exact(problem.fitted(best.names, best.values, best), central=True)
+        return OtherCycle(cycle, gain, sigma, judged(best))
+    finally:
+        problem.machine, problem.weights, problem.start = machine, weights, start
+
+
+def _refitted(problem: Problem, fit: Tuned) -> Tuned:
+    """A fit near another one, whose weights are those of what is left."""
+    fit = problem.fitted(fit.names, fit.values, fit, COMPARED_TOLERANCE)
+    problem.weigh(fit)
+    return problem.fitted(fit.names, fit.values, fit, COMPARED_TOLERANCE)
+
+
+def _likelihood(fit: Tuned) -> Array:
+    """(N,) logarithm of the likelihood of every row, normally distributed by what the fit leaves of either channel."""
+    torque = np.zeros(len(fit.counted))
+    torque[fit.counted] = _of_channel(fit.torque)
+    return _of_channel(fit.position) + torque
+
+
+def _of_channel(remaining: Array) -> Array:
+    sigma = rms(remaining)
+    return np.asarray(-0.5 * (remaining / sigma) ** 2 - log(sigma)) if sigma > 0 else np.full(len(remaining), inf)
+
+
+def gain_of(differences: Array) -> tuple[float, float]:
+    """Sum of the rows' differences (N,) of the logarithm of the likelihood, and its standard deviation."""
+    scatter = differences - np.mean(differences)
+    length = correlation_length(scatter, of_mean=True)
+    return float(np.sum(differences)), sqrt(float(np.sum(scatter**2)) * length)
+
+
+def with_either(estimates: Mapping[str, Estimate], other: OtherCycle) -> dict[str, Estimate]:
+    """Estimates of a record that does not decide between two cycles.
+
+    A value that lies outside of its interval with the other cycle is not determined. It keeps its interval, which
+    belongs to the cycle that was taken. The other intervals include that of the other cycle.
+    """
+    result = dict(estimates)
+    for name, one in estimates.items():
+        if name not in other.estimates or one.status != "estimated":
+            continue
+        value, half = other.estimates[name].value, half_width(one.sigma)
+        moved = abs(value - one.value)
+        if moved > half:
+            reason = OTHERWISE.format(1e3 * other.cycle, value, one.unit)
+            result[name] = replace(one, status="undetermined", reason=reason)
+        else:
+            both = max(half, moved + half_width(other.estimates[name].sigma))
+            result[name] = replace(one, sigma=both / NORMAL_95).judged()
+    return result

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cache import own_folder
-from feedsim.report.chart.embedded import embedded
 from feedsim.report.chart.layout import LAYOUT
+from feedsim.report.chart.model import embedded
 from feedsim.report.content import TILES, Report, parted
 from feedsim.report.formatting import typeset
 from feedsim.report.style import PALETTE

@@ -8,9 +8,19 @@ from feedsim.scenario.axis_units import CurrentController, Drive, Filter, Fricti
 from feedsim.scenario.base import Base, Change
 from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
-from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
 from feedsim.scenario.machine import Axis, Cycles, Machine
-from feedsim.scenario.model import CircleTest, Positioning, PositioningAccuracy, Recording, Scenario
+from feedsim.scenario.model import (
+    CircleTest,
+    Delay,
+    Level,
+    Logging,
+    Noise,
+    Positioning,
+    PositioningAccuracy,
+    Quantisation,
+    Recording,
+    Scenario,
+)
 from feedsim.scenario.roles import ForeignUnit
 
 __all__ = [

@@ -20,7 +20,8 @@ from feedsim.nc import Program, plan
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
-from feedsim.ssp import archive, described, one, parameter_set, system_structure
+from feedsim.ssp import archive, one, parameter_set, system_structure
+from feedsim.ssp import rebuilt as described
 from feedsim.ssp.parameter_set import ParameterSet, Value
 from feedsim.ssp.setpoints import pack_setpoints
 from feedsim.ssp.system_structure import Binding, Component, Connector, Link, Structure

@@ -24,8 +24,7 @@ from feedsim.nc.program import MAX_POSITION_CYCLES
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Scenario, load
 from feedsim.ssp import archive, one, rebuilt, setpoints, system_structure
-from feedsim.ssp.described import STRUCTURE
-from feedsim.ssp.rebuilt import Parts
+from feedsim.ssp.rebuilt import STRUCTURE, Parts
 from feedsim.ssp.roles import roles
 from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
 from feedsim.ssp.system_structure import Structure

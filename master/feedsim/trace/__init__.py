@@ -10,8 +10,7 @@ from feedsim.trace.csv import read_csv, read_signals, write_csv
 from feedsim.trace.files import written_whole
 from feedsim.trace.recording import Recording, convert, read_recording
 from feedsim.trace.series import Series, as_series, read_series
-from feedsim.trace.table import Table, least_and_largest, release, stretches
-from feedsim.trace.trace import Array, Trace, matches, matching
+from feedsim.trace.trace import Array, Table, Trace, least_and_largest, matches, matching, release, stretches
 
 __all__ = [
     "Array", "Mark", "Recording", "Series", "Table", "Trace", "as_series", "convert", "least_and_largest",

@@ -17,8 +17,7 @@ from feedsim import units
 from feedsim.errors import InputError, OutputError
 from feedsim.trace.cells import TIME_NAMES, read_table, round_unit
 from feedsim.trace.files import written_whole
-from feedsim.trace.table import stretches
-from feedsim.trace.trace import Array, Trace, first_not_finite
+from feedsim.trace.trace import Array, Trace, first_not_finite, stretches
 
 ROWS = 1 << 12  # that are written at a time
 

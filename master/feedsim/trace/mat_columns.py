@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.files.spellings import known_unit, spelled
 from feedsim.trace import modelica
-from feedsim.trace.mat import read_mat
-from feedsim.trace.mat_values import REAL, Other, Value, flat, lines
+from feedsim.trace.mat import REAL, Other, Value, flat, lines, read_mat
 
 MAT = ".mat"
 TIME, TIME_FIELDS = "time", ("time", "t")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.files.spellings import known_unit, spelled
-from feedsim.trace.mat_values import Value, lines
+from feedsim.trace.mat import Value, lines
 from feedsim.trace.trace import Array
 
 REAL = "fiu"

@@ -18,26 +18,189 @@ import numpy as np
 from feedsim.analysis.figures import Array
 from feedsim.arguments import spelt
 from feedsim.cosim.plant import plant_modes
+from feedsim.linear.candidates import Candidates
+from feedsim.linear.judgement import Loop, judge
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.structure import Modes
 from feedsim.structure.modes import with_transmissions, write_modes
-from feedsim.tune.drive_margins import (
-    FREQUENCY_FACTORS,
-    Judge,
-    checked,
-    judges_of,
-    margins_of,
-    percent,
-    scaled,
-    worse_of,
-)
 from feedsim.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
 from feedsim.tune.drive_result import ERROR_FLOOR, WORSE, Case, Drawn, Limits, Margins, Point, Tuned, decibels
 from feedsim.tune.effects import Effect, effects_of
 from feedsim.tune.knobs import Knobs, matched
-from feedsim.tune.search import Rank, least
-from feedsim.uncertainty import JUDGE_SEED, SEARCH_DRAWS, SEARCH_SEED, Cloud, draw_named, torque_scale, typed_on
+from feedsim.uncertainty import (
+    JUDGE_SEED,
+    SEARCH_DRAWS,
+    SEARCH_SEED,
+    Cloud,
+    draw_named,
+    torque_scale,
+    typed_drive,
+    typed_on,
+)
+
+# --- Margins and noise of one axis with other drives: at every pose, with elastic modes changed, on draws of the machin
+# A judge closes the loops of the axis on one structure. `Candidates` keeps what drives have in common; `checked` is
+# the
+# judgement that warnings of a run have, and keeps nothing.
+
+
+FREQUENCY_FACTORS = (1.0, 0.9, 1.1)  # factors on the frequencies of elastic modes
+Worst = tuple[tuple[float, str], tuple[float, str]]  # least gain margin [dB] and phase margin [deg], with their loops
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Judges drives of an axis of a machine on one structure. draw: of the machine, or that machine."""
+
+    candidates: Candidates
+    draw: Machine
+    machine: Machine
+    axis: str
+
+    def least(self, drive: Drive) -> tuple[Worst, float]:
+        """Least margins, and torque of noise [N.m/rad] as the machine itself has it."""
+        judged = self.candidates.judge(self._on_draw(drive))
+        return _least_of(judged.loops), judged.noise / torque_scale(self.machine, self.draw, self.axis)
+
+    def checked(self, machine: Machine) -> Worst:
+        """Least margins of the axis of a machine with other drives."""
+        changed = typed_on(self.draw, self.machine, machine)
+        return _least_of([loop for loop in judge(changed, self.candidates.modes) if loop.axis == self.axis])
+
+    def _on_draw(self, drive: Drive) -> Drive:
+        return drive if self.draw is self.machine else typed_drive(self.draw, self.machine, self.axis, drive)
+
+
+def judges_of(
+    machine: Machine, axis: str, poses: Mapping[str, Modes], factors: Sequence[float], draw: Machine | None = None,
+    name: str = "",
+) -> dict[str, Judge]:  # fmt: skip
+    """Name -> judge at every pose with every factor on its modes. poses: name -> modes of structures. name: of a
+    draw."""
+    own = machine if draw is None else draw
+    judges = {}
+    for pose, modes in poses.items():
+        for factor in factors:
+            words = ", ".join(filter(None, [name, pose, "" if factor == 1 else percent("modes", factor)]))
+            candidates = Candidates(own, with_transmissions(own, scaled(modes, factor)), axis)
+            judges[words] = Judge(candidates, own, machine, axis)
+    return judges
+
+
+def margins_of(judges: Mapping[str, Judge], drive: Drive) -> Margins:
+    """Least margins and largest noise over judges."""
+    result = {name: value.least(drive) for name, value in judges.items()}
+    return _over({name: worst for name, (worst, _) in result.items()}, max(noise for _, noise in result.values()))
+
+
+def checked(judges: Mapping[str, Judge], machine: Machine, axis: str) -> Margins:
+    """Margins of a result, by a second judgement that keeps nothing and knows nothing of the search."""
+    noise = margins_of(judges, machine.shipped_drive(axis, "tuning")).noise
+    return _over({name: value.checked(machine) for name, value in judges.items()}, noise)
+
+
+def worse_of(one: Margins, two: Margins) -> Margins:
+    """The lesser margins and the larger noise of two."""
+    gain, phase = min(one, two, key=lambda margins: margins.gain), min(one, two, key=lambda margins: margins.phase)
+    return Margins(gain.gain, phase.phase, gain.gain_of, phase.phase_of, max(one.noise, two.noise))
+
+
+def scaled(modes: Modes, factor: float) -> Modes:
+    """Modes with other frequencies."""
+    return modes if factor == 1 else replace(modes, frequency=modes.frequency * factor)
+
+
+def percent(what: str, factor: float) -> str:
+    """A factor in words."""
+    return f"{what} {abs(100 * (factor - 1)):.0f} % {'higher' if factor > 1 else 'lower'}"
+
+
+def _least_of(loops: Sequence[Loop]) -> Worst:
+    if any(loop.growing for loop in loops):
+        return (-math.inf, "unstable"), (-math.inf, "unstable")
+    gain = min(loops, key=lambda loop: loop.gain_margin)
+    phase = min(loops, key=lambda loop: loop.phase_margin)
+    size = 20 * math.log10(gain.gain_margin) if math.isfinite(gain.gain_margin) else math.inf
+    return (size, f"{gain.kind} loop {gain.state}"), (phase.phase_margin, f"{phase.kind} loop {phase.state}")
+
+
+def _over(result: Mapping[str, Worst], noise: float) -> Margins:
+    gain = min(result, key=lambda name: result[name][0][0])
+    phase = min(result, key=lambda name: result[name][1][0])
+    return Margins(
+        result[gain][0][0],
+        result[phase][1][0],
+        f"{result[gain][0][1]}, {gain}",
+        f"{result[phase][1][1]}, {phase}",
+        noise,
+    )
+
+
+# --- The least of a function within a box, where some points are forbidden: an evolution strategy with ranks ----------
+# Covariance matrix adaptation (N. Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772, equations 20 to
+# 44).
+# Only ranks count. Allowed points stand before forbidden ones, those by the amount of the violation (K. Deb, An
+# efficient
+# constraint handling method for genetic algorithms, Comput. Methods Appl. Mech. Engrg. 186 (2000)).
+
+
+# (violation, value): violation 0 of an allowed point. Tuples are compared as they stand.
+Rank = tuple[float, float]
+LEAST_STEP = 0.004  # of the box: a search whose steps are shorter has come to its end
+
+
+def least(
+    rank: Callable[[Array], Rank], start: Array, *, step: float, evaluations: int, seed: int, population: int = 0
+) -> tuple[Array, Rank]:
+    """The best point of the unit cube (n,) that is met, and its rank.
+
+    start: first mean. step: first standard deviation. The random numbers of a seed are the same in every call.
+    """
+    n = len(start)
+    size = population or 4 + int(3 * math.log(n))
+    half = size // 2
+    weights = np.log(half + 0.5) - np.log(np.arange(1, half + 1))
+    weights /= weights.sum()
+    mass = 1 / float((weights**2).sum())
+    c_c = (4 + mass / n) / (n + 4 + 2 * mass / n)
+    c_s = (mass + 2) / (n + mass + 5)
+    c_1 = 2 / ((n + 1.3) ** 2 + mass)
+    c_mu = min(1 - c_1, 2 * (mass - 2 + 1 / mass) / ((n + 2) ** 2 + mass))
+    damping = 1 + 2 * max(0.0, math.sqrt((mass - 1) / (n + 1)) - 1) + c_s
+    length = math.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n**2))
+
+    random = np.random.default_rng(seed)
+    mean, sigma, covariance = np.array(start, dtype=np.float64), step, np.eye(n)
+    path_c, path_s = np.zeros(n), np.zeros(n)
+    best, best_rank, done, generation = mean.copy(), rank(mean), 1, 0
+    while done + size <= evaluations and sigma * math.sqrt(float(np.diag(covariance).max())) > LEAST_STEP:
+        values, vectors = np.linalg.eigh(covariance)
+        root = np.sqrt(np.maximum(values, 1e-20))
+        steps = random.normal(size=(size, n)) * root @ vectors.T
+        points = 1 - np.abs((mean + sigma * steps) % 2 - 1)  # mirrored at the faces of the cube
+        ranks = [rank(point) for point in points]
+        done += size
+        generation += 1
+        order = sorted(range(size), key=lambda k: ranks[k])
+        if ranks[order[0]] < best_rank:
+            best, best_rank = points[order[0]].copy(), ranks[order[0]]
+        taken = (points[order[:half]] - mean) / sigma
+        move = weights @ taken
+        mean = mean + sigma * move
+        white = vectors @ ((vectors.T @ move) / root)
+        path_s = (1 - c_s) * path_s + math.sqrt(c_s * (2 - c_s) * mass) * white
+        ahead = float(np.linalg.norm(path_s)) / math.sqrt(1 - (1 - c_s) ** (2 * generation))
+        moving = 1.0 if ahead < (1.4 + 2 / (n + 1)) * length else 0.0
+        path_c = (1 - c_c) * path_c + moving * math.sqrt(c_c * (2 - c_c) * mass) * move
+        covariance = (
+            (1 - c_1 - c_mu + (1 - moving) * c_1 * c_c * (2 - c_c)) * covariance
+            + c_1 * np.outer(path_c, path_c)
+            + c_mu * (taken.T * weights) @ taken
+        )
+        sigma *= math.exp(min(1.0, c_s / damping * (float(np.linalg.norm(path_s)) / length - 1)))
+    return best, best_rank
+
 
 Progress = Callable[[str, int, int], None]
 

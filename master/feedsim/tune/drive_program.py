@@ -27,7 +27,7 @@ from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.model import Recording
 from feedsim.trace import Trace
 from feedsim.tune.circles import REST, RUN_IN_ANGLE, Pair, run_in, sweep_of, turn_of
-from feedsim.tune.closed_forms import axis_lag, check_controlled
+from feedsim.tune.proposals import axis_lag, check_controlled
 
 BAND = 1e-6  # [m] within which an axis has settled
 ROOM = 0.9  # of the travel on either side of the pose that is used

@@ -22,8 +22,7 @@ import numpy as np
 
 from feedsim.analysis.figures import Array
 from feedsim.scenario import Cycles, Drive, Filter, Machine
-from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain
-from feedsim.tune.proposals import MIN_RESET_TIME, NEUTRAL, NEUTRAL_SHARE
+from feedsim.tune.proposals import MIN_RESET_TIME, NEUTRAL, NEUTRAL_SHARE, axis_lag, loop_lag, model_gain
 from feedsim.units import convert
 from feedsim.variables import parameters
 

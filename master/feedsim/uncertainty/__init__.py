@@ -6,21 +6,27 @@ Start with draws.py; spread.py makes intervals of the draws, runs.py runs them.
 
 from feedsim.uncertainty.draws import (
     JUDGE_SEED,
+    MIN_DRAWS,
     SEARCH_DRAWS,
     SEARCH_SEED,
+    Band,
     Cloud,
     Known,
+    Uncertainty,
+    check_count,
     cloud_of,
     draw_named,
     drawn_friction,
+    interval,
     known_of,
     known_values,
+    of_compensation,
+    of_run,
+    share_of,
     torque_scale,
     typed_drive,
     typed_on,
 )
-from feedsim.uncertainty.runs import Band, Uncertainty, of_compensation, of_run
-from feedsim.uncertainty.spread import MIN_DRAWS, check_count, interval, share_of
 
 __all__ = [
     "JUDGE_SEED", "MIN_DRAWS", "SEARCH_DRAWS", "SEARCH_SEED", "Band", "Cloud", "Known", "Uncertainty", "check_count",

@@ -13,7 +13,7 @@ from html import escape
 from importlib import resources
 
 from feedsim.extras import ask
-from feedsim.report.chart.shapes import BOLD, rectangle, text
+from feedsim.report.chart.polar import BOLD, rectangle, text
 from feedsim.report.chart.svg import WIDTH
 from feedsim.report.style import MUTED, PAGE_COLOURS
 

@@ -6,15 +6,445 @@ Start with svg(), which places the panels; panel.py, polar.py and grid.py draw o
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from html import escape
 
-from feedsim.report.chart.grid import draw_grid, grid_height
-from feedsim.report.chart.layout import BAND, BOTTOM, FILL, GAP, HEIGHT, LEFT, RIGHT, ROUND, TOP
-from feedsim.report.chart.model import Band, Chart, Curve, Grid, Panel, Part, Polar
-from feedsim.report.chart.panel import Frame, above, draw_panel, frame_of
-from feedsim.report.chart.placing import Box
-from feedsim.report.chart.polar import draw_polar
-from feedsim.report.chart.shapes import circle, fill, line, rectangle, stroke, text
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.report.chart.layout import (
+    BAND,
+    BLOCK,
+    BOTTOM,
+    CELL_WITH_NAME,
+    CELL_WITH_NUMBER,
+    DASHES,
+    DEPTH,
+    FILL,
+    GAP,
+    HEIGHT,
+    LEADER,
+    LEFT,
+    LETTER,
+    LINE_PITCH,
+    RIGHT,
+    ROUND,
+    ROW,
+    SCALE_STEP,
+    SCALE_STEPS,
+    SECOND,
+    SLANTED,
+    TICK_HEIGHT,
+    TICK_WIDTH,
+    TOP,
+)
+from feedsim.report.chart.model import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Part, Polar, extremes
+from feedsim.report.chart.polar import (
+    HALO,
+    circle,
+    draw_polar,
+    fill,
+    heading,
+    line,
+    path,
+    rectangle,
+    stroke,
+    text,
+    turned,
+)
+from feedsim.report.chart.scales import Range, Ticks, apart, measured, ranges, tick_text, ticks
+from feedsim.report.formatting import minus, three
+from feedsim.report.style import BLUE, GRID, INK, MUTED, VERMILLION, Array
+
+# --- Words within a panel, where no curve is: what curves and words cover, in small squares, and the place of each word
+# Sizes are pixels. The page's script places words by the same rules.
+
+
+Box = tuple[float, float, float, float]  # left, top, width, height
+Place = tuple[float, float, float]  # left, foot of the first line, how far it is from what it belongs to
+ASCENT, LINE = 10.0, 15.0  # of words; from line to line
+OUTSIDE, COVERING, COVERED = (
+    1e6,
+    120.0,
+    10.0,
+)  # what it costs: to leave the panel, to cover curves, and a square of them
+
+
+def width_of(text: str) -> float:
+    """About the width of words over curves."""
+    return LETTER * max(map(len, text.split("\n"))) + 2
+
+
+class Covered:
+    """A panel in small squares: which of them curves and words cover."""
+
+    def __init__(self, inner: Box) -> None:
+        self.inner = inner
+        self.squares: NDArray[np.bool_] = np.zeros(
+            (math.ceil(inner[3] / BLOCK) + 1, math.ceil(inner[2] / BLOCK) + 1), dtype=bool
+        )
+
+    def box(self, x: float, y: float, wide: float, tall: float) -> None:
+        """Cover a rectangle."""
+        top, bottom, left, right = self._squares(x, y, wide, tall)
+        self.squares[max(0, top) : max(0, bottom), max(0, left) : max(0, right)] = True
+
+    def path(self, x: Array, y: Array, *, dots: bool = False) -> None:
+        """Cover points (N,), and unless they are dots the lines between them."""
+        points = np.column_stack([x - self.inner[0], y - self.inner[1]]) / BLOCK
+        if not dots and len(points) > 1:
+            points = np.clip(points, -1e3, 1e4)
+            with np.errstate(invalid="ignore"):
+                lengths = np.abs(np.diff(points, axis=0)).max(axis=1)
+            counts = np.where(np.isfinite(lengths), np.ceil(lengths * 1.3), 0).astype(int) + 1
+            first = np.repeat(np.arange(len(counts)), counts)
+            share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(
+                counts, counts
+            )
+            points = points[first] + share[:, None] * (points[first + 1] - points[first])
+        points = points[np.isfinite(points).all(axis=1)]
+        at = np.floor(points).astype(int)
+        rows, columns = self.squares.shape
+        inside = (at[:, 0] >= 0) & (at[:, 0] < columns) & (at[:, 1] >= 0) & (at[:, 1] < rows)
+        self.squares[at[inside, 1], at[inside, 0]] = True
+
+    def put(self, text: str, places: Sequence[Place]) -> tuple[float, float]:
+        """The place that covers least and is least far, which is covered then: left, and foot of the first line."""
+        left, top, width, height = self.inner
+        wide, tall = width_of(text), 12 + LINE * text.count("\n")
+
+        best = (math.inf, 0, left + 4, top + 12)
+        for k in sorted(range(len(places)), key=lambda k: places[k][2]):
+            x, y, far = places[k]
+            if far > best[0]:
+                break
+            begin, end, first, last = self._squares(x, y - ASCENT, wide, tall)
+            if y - ASCENT < top or y - ASCENT + tall > top + height or x < left or x + wide > left + width + 1:
+                far += OUTSIDE
+            elif count := int(np.count_nonzero(self.squares[begin:end, first:last])):
+                far += COVERING + COVERED * count
+            best = min(best, (far, k, x, y))
+        _, _, x, y = best
+        self.box(x, y - ASCENT, wide, tall)
+        return x, y
+
+    def _squares(self, x: float, y: float, wide: float, tall: float) -> tuple[int, int, int, int]:
+        x, y = (x - self.inner[0]) / BLOCK, (y - self.inner[1]) / BLOCK
+        return math.floor(y), math.floor(y + tall / BLOCK) + 1, math.floor(x), math.floor(x + wide / BLOCK) + 1
+
+
+# --- A panel of an SVG: curves over one pair of axes, with all that is marked in it -----------------------------------
+
+
+MOST_ROWS = 400  # of a curve: two for a pixel or so
+Scaled = Callable[[Array | float], Array]  # values to pixels
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a panel shows of its curves, its ticks upwards, and the room that these need at the left."""
+
+    across: Range
+    up: Range
+    heights: Ticks
+    left: float
+
+    def beginning(self, left: float) -> Frame:
+        """With the curves from there on."""
+        return replace(self, left=left)
+
+
+def above(panel: Panel) -> float:
+    """Room above the curves."""
+    return TOP + (SECOND if panel.x.also is not None else 0)
+
+
+def frame_of(panel: Panel, box: Box) -> Frame:
+    """For a box on paper."""
+    across, up = ranges(panel)
+    tall = box[3] - above(panel) - BOTTOM
+    heights = ticks(panel.y, up, len(panel.y.names) or max(2, int(tall / TICK_HEIGHT)))
+    names = panel.y.names
+    beside = max((6.6 * len(name) + (26 if names else 30) for name in names or heights.texts), default=0.0)
+    return Frame(across, up, heights, min(max(LEFT, beside), 0.45 * box[2]))
+
+
+def draw_panel(panel: Panel, box: Box, frame: Frame, aside: float, clip: str) -> str:
+    """The panel in its box; aside: room at the right; clip: an id of its own."""
+    _, _, width, height = box
+    inner: Box = (frame.left, above(panel), width - frame.left - aside, height - above(panel) - BOTTOM)
+    left, top, wide, tall = inner
+    right, bottom = left + wide, top + tall
+    across = _scale(panel.x, frame.across, left, right)
+    up = _scale(panel.y, frame.up, bottom, top)
+    begin = 0.0 if panel.y.names else max(0.0, min(left, width - 7.4 * len(panel.title)))
+    parts = [heading(panel.title, begin, width - begin), *_axes(panel, frame, inner, across, up, box)]
+    inside: list[str] = []
+    has_words = bool(panel.note or any(mark.text for mark in panel.marks) or any(level.text for level in panel.levels))
+    covered = Covered(inner) if has_words else None
+    inside += [_band(band, frame.across, across, up, bottom) for band in panel.bands]
+    inside += [_level(level, inner, across, up) for level in panel.levels]
+    for curve in sorted(panel.curves, key=lambda curve: not curve.dots):  # a line through its points, not below them
+        inside.append(_curve(curve, panel, frame, (across, up, bottom), covered))
+    marks = [(mark, float(across(mark.x)), float(up(mark.y))) for mark in panel.marks]
+    marks = [mark for mark in marks if left - 1 <= mark[1] <= right + 1]
+    for mark, x, y in marks:
+        colour = fill(mark.colour)
+        look = f'fill="{"none" if mark.hollow else colour}" stroke="{colour}" stroke-width="1.4"'
+        inside.append(circle(x, y, 3.6, look))
+        if covered is not None:
+            covered.box(x - 4, y - 4, 8, 8)
+    words, leaders = _words(panel, inner, across, up, marks, covered) if covered is not None else ([], [])
+    frame_look = f'stroke="{fill(MUTED)}" stroke-width="0.8"'
+    return "".join([
+        *parts, f'<clipPath id="{clip}">{rectangle(*inner, "")}</clipPath><g clip-path="url(#{clip})">', *inside,
+        *leaders, "</g>", rectangle(*inner, frame_look), *([f"<g {HALO}>", *words, "</g>"] if words else []),
+    ])  # fmt: skip
+
+
+def _scale(axis: Axis, span: Range, first: float, last: float) -> Scaled:
+    low, high = (float(measured(axis, value)) for value in span)
+    per = (last - first) / ((high - low) or 1.0)
+    return lambda values: np.asarray(first + (measured(axis, values) - low) * per)
+
+
+def _axes(panel: Panel, frame: Frame, inner: Box, across: Scaled, up: Scaled, box: Box) -> list[str]:
+    """Grid, ticks and names of the axes, on all sides that have a scale."""
+    (left, top, wide, tall), (_, _, width, height) = inner, box
+    right, bottom, parts = left + wide, top + tall, []
+    most = max(2, int(wide / max([TICK_WIDTH, *(7 * len(name) + 14 for name in panel.x.names)])))
+    along = apart(lambda n: ticks(panel.x, frame.across, n), lambda at: float(across(at)), most, width)
+    ways: dict[bool, list[str]] = {True: [], False: []}  # of the grid: with a text, and without
+    for at, words in along.marks:
+        x = float(across(at))
+        ways[bool(words)].append(f"M{x:.1f} {top:g}V{bottom:g}")
+        parts.append(text(min(x, width - 3.6 * len(words)), bottom + 16, words, anchor="middle"))  # the last one inside
+    for at, words in frame.heights.marks:
+        y = float(up(at))
+        ways[bool(words)].append(f"M{left:g} {y:.1f}H{right:g}")
+        parts.append(text(left - 6, y + 4, words, anchor="end"))
+    for with_text, way in ways.items():
+        if way:
+            parts.append(
+                f'<path d="{"".join(way)}" stroke="{fill(GRID)}" stroke-width="{0.8 if with_text else 0.35}"/>'
+            )
+    title = along.title(panel.x)
+    parts.append(text(min(left + wide / 2, width - 3.4 * len(title)), bottom + 34, title, anchor="middle"))
+    if not panel.y.names:
+        parts.append(_upright(frame.heights.title(panel.y), 13, inner, height - 8))
+    if panel.x.also is not None:
+        axis, factor = _second(panel.x)
+        span = (frame.across[0] * factor, frame.across[1] * factor)
+        result = apart(lambda n: ticks(axis, span, n), lambda at: float(across(at / factor)),
+                      max(2, int(wide / TICK_WIDTH)), math.inf)  # fmt: skip
+        parts += [text(float(across(at / factor)), top - 5, words, anchor="middle") for at, words in result.marks]
+        parts.append(text(left + wide / 2, top - 20, result.title(axis), anchor="middle"))
+    if panel.y.also is not None:
+        axis, factor = _second(panel.y)
+        result = ticks(axis, (frame.up[0] * factor, frame.up[1] * factor), max(2, int(tall / TICK_HEIGHT)))
+        parts += [text(right + 6, float(up(at / factor)) + 4, words) for at, words in result.marks]
+        parts.append(_upright(result.title(axis), width - 5, inner, height - 8, right=True))
+    return parts
+
+
+def _second(axis: Axis) -> tuple[Axis, float]:
+    """The same quantity in another unit, and the factor."""
+    assert axis.also is not None
+    label, unit, factor = axis.also
+    return Axis(label, unit, axis.log), factor
+
+
+def _upright(words: str, x: float, inner: Box, most: float, *, right: bool = False) -> str:
+    """What stands upright beside a panel: in two lines where one is longer than the panel, smaller where these are."""
+    _, top, _, tall = inner
+    cut = len(words)
+    if 6.4 * len(words) > tall and " " in words:
+        cut = min((k for k, letter in enumerate(words) if letter == " "), key=lambda k: abs(k - len(words) / 2))
+    lines = [part for part in (words[:cut], words[cut + 1 :]) if part]
+    size = max(8.0, min(12.0, 12 * most / (6.4 * max(map(len, lines), default=1))))
+    look = 'text-anchor="middle"' + (f' font-size="{size:.1f}"' if size < 12 else "")
+    pitch, first = LINE_PITCH * size, 1 - len(lines) if right else (1 - len(lines)) / 6
+    return "".join(turned(x + pitch * (k + first), top + tall / 2, part, -90, look) for k, part in enumerate(lines))
+
+
+def _band(band: Band, span: Range, across: Scaled, up: Scaled, bottom: float) -> str:
+    x = np.array(span) if band.x is None else band.x
+    low, high = (np.broadcast_to(np.asarray(edge, dtype=float), x.shape) for edge in (band.low, band.high))
+    rows = extremes(high, MOST_ROWS) if len(x) > MOST_ROWS else slice(None)
+    low, high = (np.clip(np.nan_to_num(up(edge[rows]), nan=bottom), -1e4, 1e4) for edge in (low, high))
+    seen = across(x[rows])
+    outline = path(np.concatenate([seen, seen[::-1]]), np.concatenate([high, low[::-1]]))
+    return f'<path d="{outline}Z" fill="{fill(band.colour)}" fill-opacity="{BAND}"/>'
+
+
+def _level(level: Level, inner: Box, across: Scaled, up: Scaled) -> str:
+    left, top, wide, tall = inner
+    at = float((across if level.upright else up)(level.at))
+    if not math.isfinite(at):
+        return ""
+    ends = [float((up if level.upright else across)(end)) for end in level.ends or ()]
+    first, last = ends or ([top, top + tall] if level.upright else [left, left + wide])
+    dash = f' stroke-dasharray="{DASHES[level.dash]}"' if level.dash else ""
+    points = (at, first, at, last) if level.upright else (first, at, last, at)
+    return line(*points, f'stroke="{fill(level.colour)}"{dash}')
+
+
+def _curve(curve: Curve, panel: Panel, frame: Frame, to: tuple[Scaled, Scaled, float], covered: Covered | None) -> str:
+    """A curve, of what is seen; what it covers is entered."""
+    across, up, bottom = to
+    x, y = curve.x, curve.y
+    if curve.ascending:
+        first, last = np.searchsorted(x, frame.across[0], "left"), np.searchsorted(x, frame.across[1], "right")
+        x, y = x[max(0, first - 1) : last + 1], y[max(0, first - 1) : last + 1]
+    if len(x) > MOST_ROWS and not curve.dots:
+        rows = extremes(y, MOST_ROWS) if curve.ascending else np.unique(
+            np.concatenate([extremes(x, MOST_ROWS), extremes(y, MOST_ROWS)]))  # fmt: skip
+        x, y = x[rows], y[rows]
+    if not len(x):
+        return ""
+    a, b = across(x), up(y)
+    if covered is not None:
+        covered.path(a, b, dots=curve.dots)
+    if curve.dots:
+        points = "".join(f"M{p:.1f} {q:.1f}h0" for p, q in zip(a.tolist(), b.tolist(), strict=True)
+                         if math.isfinite(p) and math.isfinite(q))  # fmt: skip
+        return f'<path d="{points}" {stroke(curve, 2 * curve.width)} stroke-linecap="round"/>'
+    if curve.filled:
+        zero = min(bottom, float(up(frame.up[0] if panel.y.log else 0.0)))
+        way = f"{path(a, b)}V{zero:.1f}H{a[0]:.1f}Z"
+        return f'<path d="{way}" fill="{fill(curve.colour)}" fill-opacity="{FILL}"/>'
+    return f'<path d="{path(a, b)}" {stroke(curve)}/>'
+
+
+def _words(
+    panel: Panel, inner: Box, across: Scaled, up: Scaled, marks: Sequence[tuple[Mark, float, float]], covered: Covered
+) -> tuple[list[str], list[str]]:
+    """What is said of marks and levels, and the note, where no curve is; and lines from points to words far away."""
+    left, top, wide, tall = inner
+    right, bottom = left + wide, top + tall
+    words, leaders = [], []
+    for level in panel.levels:
+        if not level.upright and not level.text and math.isfinite(y := float(up(level.at))):
+            covered.box(left, y, wide, 0)
+    for mark, x, y in marks:
+        if not mark.text:
+            continue
+        a, b = covered.put(mark.text, _beside(x, y, width_of(mark.text), left, right))
+        words.append(text(a, b, mark.text))
+        to = (min(max(x, a), a + width_of(mark.text)), b + 3 if b < y else b - 10)
+        if math.hypot(to[0] - x, to[1] - y) > LEADER:
+            leaders.append(line(x, y, *to, f'stroke="{fill(MUTED)}" stroke-width="0.7"'))
+    for level in panel.levels:
+        at = float((across if level.upright else up)(level.at))
+        first, last = (left, right) if level.upright else (top, bottom)
+        if level.text and first - 1 <= at <= last + 1:
+            places = _along_upright(at, level.text, top, bottom) if level.upright else _along(
+                at, level, left, right, across)  # fmt: skip
+            words.append(text(*covered.put(level.text, places), level.text, "", MUTED))
+    if panel.note:
+        lines = panel.note.split("\n")
+        beyond = right - 8 - width_of(panel.note)
+        low, high = bottom - 8 - LINE * (len(lines) - 1), top + 16
+        corners: list[Place] = []  # the lower left, another corner, else somewhere between
+        for foot in np.arange(high, low + 1e-9, LINE).tolist():
+            far = 3 + min(low - foot, foot - high)
+            corners += [(left + 8, foot, far), (beyond, foot, far + 1)]
+        x, y = covered.put(panel.note, [*corners, (left + 8, low, 0.0), (beyond, low, 1.0)])
+        words += [text(x, y + LINE * k, value) for k, value in enumerate(lines)]
+    return words, leaders
+
+
+def _beside(x: float, y: float, wide: float, left: float, right: float) -> list[Place]:
+    """Places for the label of a point."""
+    sides = ((x + 7, 0), (x - 7 - wide, 2), (x - wide / 2, 4), (x - 1.6 * wide, 40), (x + 0.6 * wide, 40))
+    return [(min(max(from_, left + 3), right - wide - 3), y - 6 + 13 * k, far + abs(13 * k))
+            for k in range(-9, 10) for from_, far in sides]  # fmt: skip
+
+
+def _along_upright(x: float, words: str, top: float, bottom: float) -> list[Place]:
+    """Places for the label of an upright line: beside it, as high as may be."""
+    feet = np.arange(top + 12, bottom - 4, 13).tolist()
+    sides = ((x + 4, 0), (x - 4 - width_of(words), 3))
+    return [(side, foot, foot - top + far) for foot in feet for side, far in sides]
+
+
+def _along(y: float, level: Level, left: float, right: float, across: Scaled) -> list[Place]:
+    """Places for the label of a level: above or below it, as far right as may be."""
+    begin, end = (min(max(float(across(end)), left), right) for end in level.ends) if level.ends else (left, right)
+    last = max(end - 4 - width_of(level.text), left + 4)
+    return [
+        (x, y - 4 - 12 * k if over else y + 12 + 12 * k, 0.2 * (last - x) + 12 * k + (0 if over else 3))
+        for x in np.arange(last, min(begin + 4, last) - 1e-9, -12).tolist()
+        for k in range(3)
+        for over in (True, False)
+    ]
+
+
+# --- A grid of an SVG: cells coloured by their numbers, and the numbers where there is room; else a scale of colours --
+
+
+def grid_height(grid: Grid) -> float:
+    """With names and title above the cells."""
+    return _over(grid) + ROW * len(grid.rows) + 12
+
+
+def draw_grid(grid: Grid, width: float) -> str:
+    """The grid with its names and its title."""
+    left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
+    wide, count = width - left - 8, len(grid.columns)
+    cell = min(wide / count, (wide - SLANTED * len(grid.columns[-1])) / (count - 0.5))
+    parts = [heading(grid.title, 4, width - 4)]
+    for j in range(0, count, math.ceil(CELL_WITH_NAME / cell)):
+        parts.append(turned(left + (j + 0.5) * cell, top - 6, grid.columns[j], -40, 'font-size="11"'))
+    for i, name in enumerate(grid.rows):
+        y = top + ROW * i
+        parts.append(text(left - 8, y + 16, name, 'font-size="11"', anchor="end"))
+        for j in range(count):
+            x, value = left + j * cell, float(grid.values[i, j])
+            edge = f'stroke="{fill(GRID)}" stroke-width="0.6"'
+            if not math.isfinite(value):
+                parts.append(rectangle(x, y, cell, ROW, edge))
+                continue
+            parts.append(rectangle(x, y, cell, ROW, f"{_paint(value, grid)} {edge}"))
+            if cell >= CELL_WITH_NUMBER:
+                weight = 'font-weight="700"' if grid.bold is not None and grid.bold[i, j] else ""
+                words = three(value) if grid.decimals is None else minus(f"{value:.{grid.decimals}f}")
+                parts.append(text(x + cell / 2, y + 16, words, f'font-size="11" {weight}', anchor="middle"))
+    if grid.best is not None:
+        i, j = grid.best
+        frame = f'stroke="{fill(INK)}" stroke-width="2.2"'
+        parts.append(rectangle(left + j * cell, top + ROW * i, cell, ROW, frame))
+    if cell < CELL_WITH_NUMBER:
+        parts.append(_grid_scale(grid, width))
+    return "".join(parts)
+
+
+def _grid_scale(grid: Grid, width: float) -> str:
+    low, high = grid.span
+    end = width - 8 - 7 * len(tick_text(high, 3))
+    begin = end - SCALE_STEPS * SCALE_STEP - 4
+    parts = [text(begin - 4, 15, tick_text(low, 3), 'font-size="11"', anchor="end"),
+             text(end, 15, tick_text(high, 3), 'font-size="11"')]  # fmt: skip
+    for k in range(SCALE_STEPS):
+        value = low + (high - low) * (k + 0.5) / SCALE_STEPS
+        parts.append(rectangle(begin + k * SCALE_STEP, 6, SCALE_STEP, 10, _paint(value, grid)))
+    return "".join(parts)
+
+
+def _paint(value: float, grid: Grid) -> str:
+    """The colour of a cell; about zero that of its sign."""
+    low, high = grid.span
+    signs = low < 0 < high
+    share = abs(value) / max(-low, high) if signs else (value - low) / (high - low or 1)
+    deep = DEPTH * min(1.0, max(0.0, share))
+    return f'fill="{fill(VERMILLION if signs and value < 0 else BLUE)}" fill-opacity="{deep:.3f}"'
+
+
+def _over(grid: Grid) -> float:
+    return 36 + 4.3 * max(map(len, grid.columns))
+
 
 WIDTH = 960.0
 FLAT = 360.0  # of a panel beside a polar one, at most

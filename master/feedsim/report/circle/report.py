@@ -13,8 +13,8 @@ import numpy as np
 from feedsim.analysis import Diagnosis, Figure, answer
 from feedsim.analysis.circle import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.records import RecordedCircle
-from feedsim.analysis.circle_figures import about, both_directions, cause_figures
 from feedsim.analysis.circularity import axis_letters
+from feedsim.analysis.evaluate import about, both_directions, cause_figures
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report import sections
 from feedsim.report.changes import changes_section

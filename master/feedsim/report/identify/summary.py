@@ -15,8 +15,8 @@ from feedsim.identify import Identified, friction_file
 from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.report.formatting import counted
-from feedsim.report.identify import quantities
-from feedsim.report.identify.quantities import MM_PER_MIN
+from feedsim.report.identify import stribeck_plots as quantities
+from feedsim.report.identify.stribeck_plots import MM_PER_MIN
 from feedsim.report.provenance import finite, inputs_part, machine_part, quantity, software
 from feedsim.report.style import Array
 from feedsim.trace.csv import quoted, shortest

@@ -13,7 +13,7 @@ import numpy as np
 from feedsim.analysis import Figure
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note
-from feedsim.modal.identified import MOTOR, AxisModes
+from feedsim.modal.rational import MOTOR, AxisModes
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, tile_value
 from feedsim.report.formatting import minus, typeset

@@ -9,29 +9,132 @@ from typing import Any
 
 from feedsim.analysis import Figure
 from feedsim.arguments import spelt
+from feedsim.control import names_of
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note, Wrong
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
+from feedsim.identify.result import Estimate
 from feedsim.replay.compare import Comparison
-from feedsim.replay.cycle import OtherCycle, decision
 from feedsim.replay.drive import DriveFound
 from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
-from feedsim.replay.outside import in_words
+from feedsim.replay.moving_lines import in_words
 from feedsim.replay.rivals import ERROR_RATE
+from feedsim.replay.tuning import OtherCycle, decision
 from feedsim.report.content import FOLDER, Paragraph, Report, Section, Table, Text, Tile, code, tile_value
-from feedsim.report.control import control_section
+from feedsim.report.control import asked, control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
-from feedsim.report.replay.beside import Beside, beside, beside_lines, beside_part, beside_section
 from feedsim.report.replay.plots import pictures_of
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
 from feedsim.report.style import remarked
-from feedsim.scenario import Machine, Subject
+from feedsim.scenario import Drive, Friction, Machine, Subject
+from feedsim.scenario.parameter_group import ParameterGroup
 from feedsim.trace import Mark
+
+# --- Identified values beside those of the machine file that was given, in the control's words too --------------------
+
+
+NOTE = (
+    "A value differs where the 95 % interval leaves out that of the machine file, and where both are more than 1 % "
+    "apart. Then one of the two is not that of the machine: look at the control before you change it."
+)
+MIN_DIFFERENCE_SHARE = 0.01  # share by which a value differs
+OF_THE_AXIS = {"M_0": "constant_load"}
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A parameter. present: of the machine file, SI. found: identified."""
+
+    axis: str
+    parameter: str
+    present: float
+    found: Estimate
+
+    @property
+    def differs(self) -> bool:
+        """Whether the record speaks against the machine file."""
+        low, high = self.found.interval
+        apart = abs(self.found.value - self.present) > MIN_DIFFERENCE_SHARE * abs(self.present)
+        return self.found.status == "estimated" and apart and not low <= self.present <= high
+
+
+def beside(machine: Machine, estimates: Mapping[str, Mapping[str, Estimate]]) -> list[Beside]:
+    """Parameters that the machine file has; estimates: axis -> name -> value."""
+    result = []
+    for axis, own in estimates.items():
+        known = machine.axes[axis]
+        for name, estimate in own.items():
+            drive = known.drive if isinstance(known.drive, Drive) else None
+            friction = known.friction if isinstance(known.friction, Friction) else None
+            parameter, value = f"drive.{name}", getattr(drive, name, None)
+            if value is None or isinstance(value, ParameterGroup):
+                parameter, value = f"friction.{name}", getattr(friction, name, None)
+            if name in OF_THE_AXIS:
+                parameter, value = OF_THE_AXIS[name], getattr(known, OF_THE_AXIS[name])
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                result.append(Beside(axis, parameter, float(value), estimate))
+    return result
+
+
+def beside_section(machine: Machine, result: list[Beside]) -> Section | None:
+    """All of them, in SI and in the control's words."""
+    if not result:
+        return None
+    control = asked(machine)
+    names = names_of(control) if control else {}
+    rows: list[tuple[Text, ...]] = []
+    for entry in result:
+        name = names.get(entry.parameter)
+        shown = "–"
+        if name is not None:
+            old, new = (minus(f"{name.shown(value):.5g}") for value in (entry.present, entry.found.value))
+            doubt = "" if name.confirmed else " (unit not confirmed)"
+            shown = f"{name.number} {name.name}: {old} | {new} {name.unit}{doubt}".rstrip()
+        rows.append((
+            entry.axis, code(entry.parameter.rpartition(".")[2]), minus(f"{entry.present:.5g}"),
+            minus(powers(value_text(entry.found))), display_unit(entry.found.unit),
+            minus(powers(interval_text(entry.found))), shown, "differs" if entry.differs else "",
+        ))  # fmt: skip
+    heads = ("Axis", "Parameter", "Machine file", "Identified", "SI unit", "95 % interval", "In the control", "")
+    return Section("Beside the machine file", [Table("llrrlrtl", heads, rows, NOTE)], "beside")
+
+
+def beside_part(result: list[Beside]) -> list[dict[str, Any]]:
+    """The same in summary.json, in SI."""
+    return [
+        {
+            "axis": entry.axis,
+            "parameter": entry.parameter,
+            "machine_file": entry.present,
+            "identified": entry.found.value,
+            "unit": entry.found.unit,
+            "status": entry.found.status,
+            "differs": entry.differs,
+        }
+        for entry in result
+    ]
+
+
+def beside_lines(machine: Machine, result: list[Beside]) -> list[str]:
+    """Values that differ, a line each for the terminal."""
+    control = asked(machine)
+    names = names_of(control) if control else {}
+    said = []
+    for entry in result:
+        if entry.differs:
+            name = names.get(entry.parameter)
+            words = f": {name.number} {name.shown(entry.present):.5g} -> {name.text(entry.found.value)}" if name else ""
+            said.append(
+                f"  differs: {entry.axis}.{entry.parameter} is {entry.present:.5g} {entry.found.unit} in the machine "
+                f"file, {value_text(entry.found)} in the record{words}"
+            )
+    return said
+
 
 MACHINE, MODES_FILE = "machine.yaml", "modes.csv"
 LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, rms"}

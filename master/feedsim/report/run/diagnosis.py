@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, separating_radius, swinging
-from feedsim.analysis.circle_figures import FIGURE_UNITS
+from feedsim.analysis.evaluate import FIGURE_UNITS
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.content import Section, Table
 from feedsim.report.formatting import minus, number, typeset

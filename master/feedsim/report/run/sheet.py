@@ -23,7 +23,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.run.accuracy import accuracy_picture
 from feedsim.report.run.circle_plots import contour_picture
 from feedsim.scenario import CircleTest, PositioningAccuracy, Scenario
-from feedsim.scenario.sheet import OF_CIRCLES, OF_POSITIONING, Sheet
+from feedsim.scenario.model import OF_CIRCLES, OF_POSITIONING, Sheet
 from feedsim.trace import Trace
 
 HTML, CSV, XLSX = "sheet.html", "sheet.csv", "sheet.xlsx"

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.arguments import spelt
+from feedsim.control import Name, names_of
 from feedsim.findings import Note, Wrong
-from feedsim.replay.machine_files import drive_file
+from feedsim.replay.machine_files import drive_file, drive_text
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import (
@@ -30,23 +32,184 @@ from feedsim.report.content import (
     tile_value,
     typed,
 )
+from feedsim.report.control import asked
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, remarked
-from feedsim.report.tune.drive_draws import (
-    drawn_answer,
-    drawn_findings,
-    drawn_intervals,
-    drawn_section,
-    reductions,
-    share_text,
-)
-from feedsim.report.tune.drive_files import SETTINGS, SHEET, names_for, rows
+from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.drive import NOISE, TORQUE
-from feedsim.tune.drive_result import WORSE, Case, Margins, Point, Tuned, decibels
+from feedsim.tune.drive_result import WORSE, Case, Changed, Margins, Point, Tuned, decibels
 from feedsim.tune.effects import EFFECTS
+from feedsim.uncertainty import interval, share_of
+from feedsim.units import convert
+from feedsim.variables import parameters
+
+# --- What the intervals of identified values make of a tuned drive: figures, findings, a sentence and a section -------
+
+
+def reductions(case: Case, name: str) -> Any:
+    """By how much an error of every motion falls [%]; below 1 nm counts as 1 nm."""
+    before, after = (np.maximum(getattr(errors, name), 1e-9) for errors in (case.before, case.after))
+    return 100 * (1 - after / before)
+
+
+def drawn_intervals(tuned: Tuned) -> dict[str, tuple[float, float]]:
+    """Figure -> interval over draws of the machine: margins, and reductions of a drive that changes; empty without."""
+    drawn = tuned.drawn
+    if drawn is None:
+        return {}
+    values = {
+        "gain_margin_after": [margin.gain for margin in drawn.margins],
+        "phase_margin_after": [margin.phase for margin in drawn.margins],
+    }
+    for name in ("peak", "overshoot") if drawn.cases else ():
+        values[f"{name}_reduction"] = [float(np.median(reductions(case, name))) for case in drawn.cases]
+    return {
+        name: tuple(map(float, interval(np.array(value))))  # type: ignore[misc]
+        for name, value in values.items()
+        if np.isfinite(value).all()
+    }
+
+
+def share_text(tuned: Tuned) -> str:
+    """Share of further draws that an interval holds."""
+    assert tuned.drawn is not None
+    return f"{100 * share_of(tuned.drawn.count):.0f} %"
+
+
+def drawn_findings(tuned: Tuned) -> list[str]:
+    """What draws of the machine lack: margins, and motions that get worse."""
+    drawn, limits = tuned.drawn, tuned.limits
+    if drawn is None:
+        return []
+    result = []
+    if thin := [margin for margin in drawn.margins if limits.missing(margin) > 0]:
+        least = (
+            f"{decibels(min(margins.gain for margins in thin))} and {min(margins.phase for margins in thin):.3g} deg"
+        )
+        result.append(
+            f"in {len(thin)} of {drawn.count} draws of the machine a margin is below {limits.gain_margin:g} dB or "
+            f"{limits.phase_margin:g} deg; the least are {least}"
+        )
+    if bad := [case for case in drawn.cases if case.worse]:
+        result.append(f"in {len(bad)} of {drawn.count} draws of the machine a motion gets worse than before")
+    return result
+
+
+def drawn_answer(tuned: Tuned) -> list[str]:
+    """What the intervals of identified values make of it."""
+    words = {"peak_reduction": "peaks fall by {} to {} %", "overshoot_reduction": "overshoot by {} to {} %",
+             "gain_margin_after": "the gain margin is {} to {} dB",
+             "phase_margin_after": "the phase margin {} to {} deg"}  # fmt: skip
+    result = drawn_intervals(tuned)
+    if not result or tuned.drawn is None:
+        return []
+    parts = [words[name].format(*(f"{end:.3g}" for end in result[name])) for name in words if name in result]
+    return [
+        f"With what identification leaves open: {', '.join(parts)} ({share_text(tuned)}, {tuned.drawn.count} draws)."
+    ]
+
+
+def drawn_section(tuned: Tuned, figures: Mapping[str, Figure]) -> Iterator[Section]:
+    """Intervals over draws of the machine, and what was drawn."""
+    if tuned.drawn is None:
+        return
+    lines: list[tuple[Text, ...]] = []
+    for name, ends in drawn_intervals(tuned).items():
+        figure = figures[f"{tuned.axis}.{name}"]
+        values = (minus(f"{value:.3g}") for value in (figure.value, *ends))
+        lines.append((code(f"{tuned.axis}.{name}"), *values, typeset(figure.unit)))
+    note = (
+        f"{tuned.drawn.count} draws of the machine, which the values were not found on. An interval holds "
+        f"{share_text(tuned)} of further draws. Margins: the least over loops, poses and modes."
+    )
+    table = Table("lrrrl", ("Figure", "Value", "From", "To", "Unit"), lines, note)
+    yield Section("What identification leaves open", [table, drawn_values(tuned.drawn.cloud)])
+
+
+# --- What a tuned drive leaves beside its page: settings, drive files, and the values to type -------------------------
+
+
+SETTINGS, SHEET = "settings.yaml", "sheet.csv"
+
+
+def names_for(tuned: Tuned, control: str) -> Mapping[str, Name]:
+    """Our parameter -> its name in the control that is asked for, or that the machine has; empty without one."""
+    known = control or asked(tuned.scenario.machine)
+    return names_of(known) if known else {}
+
+
+def settings(tuned: Tuned) -> str:
+    """The `set` group of a scenario with the values."""
+    head = "# Values of feedsim tune drive, for the group `set` of a scenario.\n"
+    lines = [f"  {change.key}: {change.text}" for change in tuned.changes]
+    return head + ("set:\n" + "\n".join(lines) + "\n" if lines else "set: {}\n")
+
+
+def drives(tuned: Tuned) -> dict[str, str]:
+    """Name -> text of a drive file for the tuned axis, changed or not, and for every other that has changed.
+
+    A machine file or --set takes them.
+    """
+    same = "; its values stay as they were" if tuned.kept else ""
+    head = f"Drive of axis {{}} of {tuned.scenario.machine.name}, written by feedsim tune drive{same}."
+    return {
+        drive_file(axis): drive_text(
+            tuned.machine.shipped_drive(axis, "a file"), {}, "", [head.format(axis)], exact=True
+        )
+        for axis in dict.fromkeys([tuned.axis, *(change.axis for change in tuned.changes)])
+    }
+
+
+def sheet(tuned: Tuned, control: str = "") -> str:
+    """Values to type: old and new, in the control's unit where its name is known."""
+    heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter")
+    return sheets.text_of((heads, *rows(tuned, control)))
+
+
+def rows(tuned: Tuned, control: str = "") -> Iterator[tuple[str, ...]]:
+    """Axis, number, name, old, new, unit, whether the unit is confirmed, and our parameter."""
+    names = names_for(tuned, control)
+    for change in tuned.changes:
+        name = names.get(change.parameter)
+        if name is not None:
+            shown = (_in_control(name, change.old), _in_control(name, change.new))
+            cells = (name.number, name.name, *shown, name.unit, "yes" if name.confirmed else "no")
+        else:
+            cells = ("", "", *_shown(change), "")
+        yield (change.axis, *cells, change.parameter.removeprefix("drive."))
+
+
+def _in_control(name: Name, value: Any) -> str:
+    return value if isinstance(value, str) else "" if value is None else f"{name.shown(float(value)):.6g}"
+
+
+def _shown(change: Changed) -> tuple[str, str, str]:
+    """Old and new value in the unit that is shown, and the unit."""
+    row = parameters("controller").get(change.parameter.removeprefix("drive."))
+    unit = row.display_unit if row is not None and change.unit else ""
+
+    def text(value: Any) -> str:
+        if value is None:
+            return "none"
+        if isinstance(value, str | bool) or not unit:
+            return str(value)
+        return f"{convert(float(value), change.unit, unit):.6g}"
+
+    return text(change.old), text(change.new), unit
+
+
+def lines_of(rows: Iterable[Sequence[str]]) -> list[str]:
+    """A line for every value to type, as the terminal shows it. rows: as of :func:`rows` and of sheets."""
+    result = []
+    for axis, number, name, old, new, unit, confirmed, parameter in rows:
+        what = f"{number} {name} ({parameter})" if number else parameter
+        doubt = " (unit not confirmed)" if confirmed == "no" else ""
+        result.append(f"  {axis}: {what} {old} -> {new}{'' if unit in ('', '1') else f' {unit}'}{doubt}")
+    return result
+
 
 KIND = "tune-drive"
 BINDS = 0.06  # of a limit: a margin that is as near to it binds

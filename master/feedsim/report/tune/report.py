@@ -21,8 +21,7 @@ from feedsim.report.provenance import figures_part, input_files, inputs_part, ma
 from feedsim.report.style import AFTER, BEFORE, NARROW, remarked
 from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
-from feedsim.tune.compensation import Errors, Judged
-from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, amplitude
+from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, Judged, amplitude
 from feedsim.uncertainty import interval, share_of
 from feedsim.units import convert
 from feedsim.variables import parameters

@@ -8,19 +8,23 @@ from pydantic import Field, StrictInt, field_validator, model_validator
 
 from feedsim.fields import AxisName, Model, Quantity, fault
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.fields import (
+from feedsim.scenario.structure.parts import (
     Direction,
+    Drive,
     Inertia,
     Mass,
+    Material,
     Name,
     NodeList,
     Nodes,
     OwnNode,
     Point,
     Rail,
+    Scale,
+    Section,
     Stiffness,
+    Tool,
 )
-from feedsim.scenario.structure.parts import Drive, Material, Scale, Section, Tool
 
 MOST_NODES = 10_000
 

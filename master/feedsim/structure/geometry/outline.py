@@ -13,12 +13,11 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.scenario.structure.checks import held, nodes, rail
 from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.scenario.structure.names import held, nodes, rail
 from feedsim.scenario.structure.parts import Section
 from feedsim.structure.assembly import Assembly, Floats, Geometry, Integers
-from feedsim.structure.geometry.beam import area_moments, beam_axes
-from feedsim.structure.geometry.mesh import Mesh
+from feedsim.structure.geometry.mesh import Mesh, area_moments, beam_axes
 from feedsim.structure.geometry.points import Grip, rigid
 
 

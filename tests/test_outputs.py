@@ -56,17 +56,19 @@ def place(tmp_path: Path) -> Path:
     (tmp_path / "table.csv").write_text("time [s],X.x_a [m]\n" + "".join(f"{k * 1e-3},{k * 1e-6}\n" for k in range(50)))
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "result.csv").write_text("of another program")
+    (tmp_path / "mine" / "other.fmu").write_text("of another program")
     return tmp_path
 
 
 CASES = [
     ("tools convert table.csv --out table.csv", "is an input"),
     ("tools convert table.csv --column time=time:s --out mine/result.csv", "--force"),
-    ("export s/z_positioning.yaml --out s/z_positioning.yaml", "is an input"),
-    ("export s/z_positioning.yaml --out s/machines/test_centre/modes.csv", "is an input"),
-    ("export s/z_positioning.yaml --out table.csv", "--force"),
-    ("export --plant s/machines/test_centre --out s/machines/test_centre/machine.yaml", "is an input"),
-    ("export --plant s/machines/test_centre --out s/machines/test_centre/modes.csv --force", "is an input"),
+    ("export s/z_positioning.yaml --out s/z_positioning.yaml", "must end in .fmu, .ssp, .html"),
+    ("export s/z_positioning.yaml --out s/machines/test_centre/modes.csv", "must end in .fmu, .ssp, .html"),
+    ("export s/z_positioning.yaml --out table.csv", "must end in .fmu, .ssp, .html"),
+    ("export --plant s/machines/test_centre --out s/machines/test_centre/machine.yaml", "must end in .fmu, .ssp, .html"),
+    ("export --plant s/machines/test_centre --out s/machines/test_centre/modes.csv --force", "must end in .fmu, .ssp, .html"),
+    ("export s/z_positioning.yaml --out mine/other.fmu", "--force"),
     ("machine build s/machines/one_axis --out s/machines/one_axis", "modes.csv: exists already"),
     ("export s/z_positioning.yaml --out mine/result.csv", "must end in .fmu, .ssp, .html"),
     ("run s/z_positioning.yaml --out mine", "mine/result.csv: exists already"),

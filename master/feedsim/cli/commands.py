@@ -322,6 +322,8 @@ def given_files(command: Command, options: Namespace) -> Iterator[tuple[str, Any
 
 def refuse_missing_files(command: Command, options: Namespace) -> None:
     """Raise InputError for a file that is named and is not there: before any library is loaded that would read it."""
+    if command.name == "compare":  # a pair without its file is one of its verdicts
+        return
     if sentence := command.missing_file(options):
         raise InputError(sentence)
 

@@ -66,8 +66,14 @@ CASES = [
     ("export s/z_positioning.yaml --out s/z_positioning.yaml", "must end in .fmu, .ssp, .html"),
     ("export s/z_positioning.yaml --out s/machines/test_centre/modes.csv", "must end in .fmu, .ssp, .html"),
     ("export s/z_positioning.yaml --out table.csv", "must end in .fmu, .ssp, .html"),
-    ("export --plant s/machines/test_centre --out s/machines/test_centre/machine.yaml", "must end in .fmu, .ssp, .html"),
-    ("export --plant s/machines/test_centre --out s/machines/test_centre/modes.csv --force", "must end in .fmu, .ssp, .html"),
+    (
+        "export --plant s/machines/test_centre --out s/machines/test_centre/machine.yaml",
+        "must end in .fmu, .ssp, .html",
+    ),
+    (
+        "export --plant s/machines/test_centre --out s/machines/test_centre/modes.csv --force",
+        "must end in .fmu, .ssp, .html",
+    ),
     ("export s/z_positioning.yaml --out mine/other.fmu", "--force"),
     ("machine build s/machines/one_axis --out s/machines/one_axis", "modes.csv: exists already"),
     ("export s/z_positioning.yaml --out mine/result.csv", "must end in .fmu, .ssp, .html"),

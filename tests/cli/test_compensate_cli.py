@@ -56,8 +56,8 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Pa
 def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
-    first, second = process.stdout.splitlines()
-    assert first == f"X-Z circle: friction compensation -> {Path('out') / 'report.html'}"
+    second, last = process.stdout.splitlines()
+    assert last == f"-> {Path('out') / 'report.html'}"
     assert second.startswith("  G 8.19 -> 0.8")
     numbers = re.findall(r"-> (\S+) um", second)
     assert len(numbers) == 3

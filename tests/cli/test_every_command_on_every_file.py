@@ -205,8 +205,8 @@ UNREAD = {"scope.svdx": "a project of TwinCAT Scope", "a.rst": "a file of ANSYS"
           "a.db": "a file of ANSYS", "a.OP2": "a file of Nastran", "a.odb": "a file of Abaqus",
           "a.frd": "a result of CalculiX", "a.tdms": "a recorder's file"}  # fmt: skip
 READERS = (
-    "identify", "compare", "convert", "show", "circle", "replay", "identify-drive", "identify-modes", "machine build",
-    "machine info",
+    "identify friction", "compare", "tools convert", "diff", "circle", "replay", "identify drive", "identify modes",
+    "machine build", "machine info",
 )  # fmt: skip
 
 

@@ -76,10 +76,10 @@ def test_everything_is_written_and_told(done: Done, traces: Path) -> None:
     assert {path.name for path in out.iterdir() if path.is_file()} == FILES
     lines = done.stdout.splitlines()
     assert lines[0].startswith("axis Z: curve within ")
-    assert lines[0].endswith(f"-> {Path('results') / 'identify_z' / 'report.html'}")
+    assert lines[-1] == f"-> {Path('results') / 'identify_z' / 'report.html'}"
     assert [line.split()[0] for line in lines[2:17]] == list(RESULT_ORDER)
     assert any(line.startswith("  constant load M_0 0.2") for line in lines)
-    assert lines[-1].endswith(f"machine.axes.Z.friction={Path('results') / 'identify_z' / 'friction.yaml'}")
+    assert lines[-2].endswith(f"machine.axes.Z.friction={Path('results') / 'identify_z' / 'friction.yaml'}")
 
 
 def test_a_path_with_blanks_can_be_pasted(
@@ -88,7 +88,7 @@ def test_a_path_with_blanks_can_be_pasted(
     monkeypatch.chdir(tmp_path)
     words = [str(traces / "constant" / "log.csv"), "--axes", "Z", "--machine", str(MACHINE), "--stages", "1"]
     assert main(["identify", "friction", *words, "--out", "my results", "--fmus", str(fmus)]) == 0
-    line = capsys.readouterr().out.splitlines()[-1]
+    line = capsys.readouterr().out.splitlines()[-2]
     given = f"machine.axes.Z.friction={Path('my results') / 'friction.yaml'}"
     assert line == f"  use: feedsim run SCENARIO.yaml --set '{given}'"
     assert shlex.split(line)[-1] == given

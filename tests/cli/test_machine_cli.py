@@ -49,13 +49,17 @@ def run(*words: str | Path) -> int:
     return cli.main(["machine", *map(str, words)])
 
 
+def export(*words: str | Path) -> int:
+    return cli.main(["export", "--plant", *map(str, words)])
+
+
 def test_build_as_documented(tmp_path: Path, capsys: Capture) -> None:
     out = tmp_path / "deep" / "out"
     assert run("build", TEST_CENTRE, "--at", "X=800mm", "Y=327mm", "Z=100mm", "--out", out) == 0
     said = capsys.readouterr()
     assert said.err == ""
     assert said.out.startswith("Test centre at X 800 mm, Y 327 mm, Z 100 mm: 615 degrees of freedom, 3 rigid and 90 ")
-    assert len(said.out.splitlines()) == 1
+    assert said.out.splitlines()[1:] == [f"-> {out / 'modes.csv'}"]
     assert sorted(path.name for path in out.iterdir()) == ["build.json", "modes.csv"]
     axes = ["X", "Y", "Z"]
     built, shipped = read_modes(out / "modes.csv", axes), read_modes(TEST_CENTRE / "modes.csv", axes)
@@ -190,7 +194,7 @@ def test_axes_of_other_names_contradict(machine: Path, tmp_path: Path, capsys: C
 
 def test_the_next_step_of_a_report_can_be_typed(machine: Path, tmp_path: Path, capsys: Capture) -> None:
     """It names a mode that is not rigid, and where its pictures go."""
-    assert run("diff", machine, "--out", tmp_path / "out", "--quiet") == 0
+    assert run("view", machine, "--out", tmp_path / "out", "--quiet") == 0
     page = html.unescape((tmp_path / "out" / "report.html").read_text())
     line = re.search(r"feedsim machine view [^<]*", page)
     assert line is not None
@@ -206,7 +210,7 @@ def test_no_structure_no_build(machine: Path, tmp_path: Path, capsys: Capture) -
     change(machine / "machine.yaml", "structure: structure.yaml", "# none")
     assert run("build", machine, "--out", tmp_path / "out") == 2
     assert "has no key structure" in capsys.readouterr().err
-    assert run("diff", machine, "--out", tmp_path / "out") == 2
+    assert run("view", machine, "--out", tmp_path / "out") == 2
     assert "a picture needs a structure file" in capsys.readouterr().err
     assert run("info", machine, "--at", "X=100mm") == 2
     assert "--at: " in capsys.readouterr().err
@@ -311,23 +315,26 @@ def test_one_axis_machine_runs(fmus: Path) -> None:
     ],
 )
 def test_grids_that_would_not_follow_are_refused(tmp_path: Path, capsys: Capture, poses: str, words: str) -> None:
-    assert run("export", TEST_CENTRE, "--poses", poses, "--out", tmp_path / "a.fmu") == 2
+    assert export(TEST_CENTRE, "--poses", poses, "--out", tmp_path / "a.fmu") == 2
     assert words in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
 def test_an_archive_needs_a_name(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run("export", TEST_CENTRE, "--out", ".") == 4
+    (tmp_path / "folder.fmu").mkdir()
+    assert export(TEST_CENTRE, "--out", "folder.fmu") == 4
     assert "the name of a file is needed" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
+    assert export(TEST_CENTRE, "--out", ".") == 2
+    assert "the name must end in .fmu, .ssp, .html" in capsys.readouterr().err
+    assert not list((tmp_path / "folder.fmu").iterdir())
 
 
 def test_a_table_of_another_pose_is_not_packed_and_warned_of(tmp_path: Path, capsys: Capture) -> None:
     folder = tmp_path / "moved"
     shutil.copytree(TEST_CENTRE, folder)
     change(folder / "machine.yaml", "Z: 100 mm}", "Z: 400 mm}")
-    assert run("export", folder, "--out", tmp_path / "a.fmu") == 2
+    assert export(folder, "--out", tmp_path / "a.fmu") == 2
     said = capsys.readouterr().err
     assert "is not that of the pose X 0.8 m, Y 0.327 m, Z 0.4 m" in said
     assert "--at X=800mm Y=327mm Z=400mm" in said

@@ -12,12 +12,14 @@ import pytest
 from feedsim import cosim, scenario
 from feedsim.cosim import logged
 from feedsim.cosim.recording import recorded_columns
+from feedsim.cosim.run import logged_axes
 from feedsim.errors import InputError
 from feedsim.judge import judged
 from feedsim.motions import Move
 from feedsim.motions.constant_speed import Strokes
 from feedsim.report import run as report
 from feedsim.scenario import Logging
+from feedsim.scenario.model import Signal
 from feedsim.trace import Trace, read_csv
 from scenario_helpers import MACHINE
 from scenario_helpers import scenario as described
@@ -225,7 +227,7 @@ def test_mistakes_are_named_with_their_line(tmp_path: Path, line: str, message: 
 
 
 def test_axes_default_to_those_that_move(tmp_path: Path) -> None:
-    assert cosim.logging.logged_axes(load(tmp_path, SHORT + "logging: {}")) == ("Z",)
+    assert logged_axes(load(tmp_path, SHORT + "logging: {}")) == ("Z",)
     with pytest.raises(InputError, match=r"s\.yaml:5: logging: no motion moves an axis; name the axes"):
         load(tmp_path, SHORT.replace("sine, axis: Z, moves", "dwell, duration: 1 s} #") + "logging: {}")
 
@@ -241,7 +243,7 @@ def test_all_keys_can_be_set_from_outside(tmp_path: Path) -> None:
 def test_every_recorded_signal_of_an_axis_can_be_logged() -> None:
     names = {name.partition(".")[2] for name in recorded_columns(described(Move(by={"Z": 1.0}, feed=1.0)))
              if name.startswith("Z.")}  # fmt: skip
-    assert set(scenario.logging.Signal.__args__) == names
+    assert set(Signal.__args__) == names
 
 
 def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path) -> None:

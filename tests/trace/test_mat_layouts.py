@@ -95,7 +95,7 @@ def test_columns(layout: str, form: str, tmp_path: Path) -> None:
     assert list(recording.names) == names if form == "5" else sorted(recording.names) == sorted(names)
     for spelling, values in ((time, T), (position, X), (torque, M[::2] if layout == "two rates" else M)):
         np.testing.assert_array_equal(recording.read([spelling])[spelling], values)
-        assert recording.named(spelling) in names
+        assert recording.called(spelling) in names
 
 
 def test_units_are_those_of_the_program(tmp_path: Path) -> None:

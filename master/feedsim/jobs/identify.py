@@ -86,7 +86,7 @@ class IdentifyResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """The table of all values with their intervals."""
-        return page.terminal_lines(self.identified)
+        return page.terminal_lines(self.identified, self.place)
 
     def report(self) -> Report:
         """Content of report.html."""

@@ -90,7 +90,11 @@ class MachineResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """All figures, as a table."""
-        return shown.text(self.info, self.listed).split("\n")
+        lines = shown.text(self.info, self.listed).split("\n")
+        if gaps := self.described.gaps:
+            more = f" (and {len(gaps) - 1} more)" if len(gaps) > 1 else ""
+            lines.append(f"The machine file is not complete: {gaps[0]}{more}")
+        return lines
 
     @property
     def structure(self) -> Structure:

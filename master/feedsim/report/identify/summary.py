@@ -77,8 +77,7 @@ def terminal_lines(identified: Identified, directory: Path | None = None) -> lis
     directory: where the result is; None: nowhere yet.
     """
     identification = identified.found
-    place = f" -> {directory / 'report.html'}" if directory is not None else ""
-    lines = [f"axis {identification.axis}: {headline(identified)}{place}", *table_lines(identified)]
+    lines = [f"axis {identification.axis}: {headline(identified)}", *table_lines(identified)]
     if line := friction_file.open_loop_line(identification):
         lines.append(f"  open loop: {line}")
     if line := rigid_line(identified):

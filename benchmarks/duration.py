@@ -162,7 +162,7 @@ def durations(parser: argparse.ArgumentParser) -> None:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    bench: Benchmark = arguments("duration", __doc__, words, rounds=3, only=tuple(CASES), images=True, more=durations)
+    bench = arguments("duration", __doc__, words, rounds=3, only=tuple(CASES), images=True, more=durations)
     wanted = bench.given.durations or ((4.0,) if bench.short else ())
     found = {
         case: [Point.of(CASES[case], duration) for duration in wanted or CASES[case].durations] for case in bench.only

@@ -32,7 +32,7 @@ def contradictions(page: str, summary: dict[str, Any]) -> tuple[list[str], int]:
     """Pairs of numbers of one name that differ by more than their digits; and how many pairs were compared."""
     page = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
     found, pairs = [], 0
-    read = {"identify": _identified, "machine": _machine, "show": _side_by_side, "sweep": _study}
+    read = {"identify": _identified, "machine": _machine, "diff": _side_by_side, "sweep": _study}
     shown = read.get(summary.get("kind", ""), _figures)(page, summary)
     for where, text, value in shown:
         if value is None or not NUMBER.fullmatch(text.strip()):

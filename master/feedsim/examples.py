@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -62,6 +62,21 @@ def examples() -> list[Example]:
     if not result:
         raise InputError(f"{root}: has no scenarios; {mend('them')}")
     return result
+
+
+def table(entries: Sequence[Example]) -> list[str]:
+    """The list as a terminal shows it: a heading for each kind, name and sentence in two columns."""
+    width = max(len(entry.name) for entry in entries)
+    kinds = dict.fromkeys(entry.kind for entry in entries)
+    lines = []
+    for kind in kinds:
+        lines += [f"{kind}:", *(f"  {entry.name:{width}}  {entry.about}" for entry in entries if entry.kind == kind)]
+    return [
+        *lines,
+        "",
+        "feedsim example NAME copies one into the working folder, with the files that it names",
+        "feedsim example --to scenarios copies all, to where the commands of the documentation have them",
+    ]
 
 
 def names() -> list[str]:

@@ -242,7 +242,13 @@ def _plain_lines(result: Any) -> list[str]:
         return [json.dumps(result, indent=2)]
     if isinstance(result, str):
         return [result]
-    return [visible(str(entry)) for entry in result]
+    if not result:
+        return ["all there already"]
+    if isinstance(result[0], Path):
+        return [visible(str(path)) for path in result]
+    from feedsim.examples import table
+
+    return table(result)
 
 
 def json_of(result: Any, out: Any) -> str:

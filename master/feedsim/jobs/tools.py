@@ -134,7 +134,11 @@ def example() -> list[Example]: ...
 
 
 @overload
-def example(names: str | Iterable[str], to: str | Path = ".") -> list[Path]: ...
+def example(names: str | Iterable[str], to: str | Path | None = None) -> list[Path]: ...
+
+
+@overload
+def example(*, to: str | Path) -> list[Path]: ...
 
 
 @job("list or copy scenarios, studies and machines to begin with", needs=())
@@ -149,11 +153,12 @@ def example(
         ),
     ] = None,
     to: Annotated[
-        str | Path, Option("DIR", "folder to copy into (default: the working folder); all, without a name")
-    ] = ".",
+        str | Path | None, Option("DIR", "folder to copy into (default: the working folder); all, without a name")
+    ] = None,
 ) -> list[Path] | list[Example]:
-    """Copy examples into the folder `to`, with all files that they name; returns the files written.
+    """Copy examples into the folder `to`, with all files that they name; returns the files written, or the list.
 
+    Without a name all are listed; with a folder and no name all are copied, to where the documentation has them.
     The machines are synthetic, but for emps and sinumerik_840d, which were measured. Nothing is overwritten.
 
     >>> import feedsim as fs
@@ -168,4 +173,6 @@ def example(
         InputError: there is no such example.
         OutputError: a file is there with another content, or cannot be written. Nothing is written then.
     """
-    return examples() if names is None else copy(names, to)
+    if not names and to is None:
+        return examples()
+    return copy(names or [entry.name for entry in examples()], to or ".")

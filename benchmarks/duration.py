@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from harness import ROOT, Benchmark, Contestant, arguments, digits, measure, table
+from harness import ROOT, Contestant, arguments, digits, measure, table
 
 from fits import Line
 from watched import Watched, watched

@@ -34,7 +34,7 @@ def test_a_scenario_is_packed_with_its_motion(tmp_path: Path, capsys: Capture) -
     assert run(SCENARIOS / "z_positioning.yaml", "--out", out, "--set", change) == 0
     said = capsys.readouterr().out
     assert "axes X, Y, Z; motion of 2.448 s inside; control cycle 125 us" in said
-    assert len(said.splitlines()) == 1
+    assert said.splitlines()[1:] == [f"-> {out}"]
     description = fmpy.read_model_description(str(out))
     assert description.defaultExperiment.stopTime == "2.448"
     assert float(description.defaultExperiment.stepSize) == 1e-3

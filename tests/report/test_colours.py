@@ -36,9 +36,9 @@ WORDS = {
 }
 # Modules whose colours are a list of many alike things: levels of a parameter, bodies, signals, stretches, sources.
 LISTS = {
-    "sweep/figure_plots.py", "sweep/plots.py", "machine/model.py", "machine/pictures.py", "run/axis_plots.py",
-    "identify/plots.py", "identify/stribeck_plots.py", "show/pictures.py", "frf/bode.py", "frf/truncation_plots.py",
-    "chart/model.py", "chart/grid.py",
+    "sweep/figure_plots.py", "sweep/report.py", "machine/model.py", "machine/report.py", "run/axis_plots.py",
+    "identify/report.py", "identify/stribeck_plots.py", "show/report.py", "frf/bode.py", "frf/report.py",
+    "chart/model.py", "chart/svg.py",
 }  # fmt: skip
 RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY"}
 

@@ -56,7 +56,7 @@ def test_the_answer_is_the_run_of_the_table(way: str, choose: Callable[..., Any]
     assert f"feedsim check study.yaml --row {best['run']}" in words
     assert "It lies at the end of what was tried of feed" in answer
     assert_numbers_agree(folder / "out")
-    shown = feedsim("sweep", "study.yaml", "--row", best["run"], fmus=fmus, cwd=folder).stdout
+    shown = feedsim("check", "study.yaml", "--row", best["run"], fmus=fmus, cwd=folder).stdout
     assert shown.startswith("feedsim run")
 
 
@@ -77,7 +77,7 @@ def test_what_is_to_be_explained_comes_first(fmus: Path, folder: Path) -> None:
 )
 def test_questions_that_cannot_be_answered(question: str, said: str, fmus: Path, folder: Path) -> None:
     (folder / "study.yaml").write_text(STUDY.format(question), encoding="utf-8")
-    done = feedsim("sweep", "study.yaml", "--dry-run", fmus=fmus, cwd=folder)
+    done = feedsim("check", "study.yaml", "--trial", fmus=fmus, cwd=folder)
     assert done.returncode == 2
     assert said in done.stderr
     assert not (folder / "results").exists()

@@ -140,6 +140,8 @@ def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus
     content = yaml.safe_load(file.read_text())
     content["identified"] = {"axis": "X", "inertia": {"interval": ["0.05 kg.m2", "0.09 kg.m2"]}}
     file.write_text(yaml.safe_dump(content))
+    other = yaml.safe_load((folder / "friction_Y.yaml").read_text())
+    (folder / "friction_Y.yaml").write_text(yaml.safe_dump({k: v for k, v in other.items() if k != "identified"}))
     scenario = tmp_path / "move.yaml"
     scenario.write_text(
         "name: Move\nmachine: machine\nmotions:\n  - {kind: dwell, duration: 0.05 s}\n"

@@ -159,6 +159,10 @@ def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
     if old:
         result[plain : plain + len(old.split())] = OLD_COMMANDS[old].split()
         notes.append(f"feedsim {old} is called feedsim {OLD_COMMANDS[old]}")
+    elif first == "sweep" and {"--dry-run", "--row"} & set(result):
+        result = ["--trial" if word == "--dry-run" else word for word in result]
+        result[plain] = "check"
+        notes.append("feedsim sweep --dry-run and --row are called feedsim check --trial and --row")
     elif first == "run" and "--try" in result:
         result.remove("--try")
         result[plain : plain + 1] = ["tune", "proposals"]

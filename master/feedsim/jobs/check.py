@@ -105,14 +105,14 @@ def _study(
     planned = design(study)
     if row is not None:
         return Checked([_command(study, planned, row, fmus)], study.warnings)
+    head = f"{file}: valid; {planned.runs} runs of {study.scenario}"
+    if trial:
+        announce(watch, study.base.scenario.machine, fmus, study.base.scenario.coupling)
+        tried = _trial(study, planned, fmus)
+        return Checked([head, *tried.answers], [*study.warnings, *tried.findings])
     run, warnings, failed = trials.check(study, planned, fmus)
     refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
-    valid = Checked([f"{file}: valid; {planned.runs} runs of {study.scenario}"], (*study.warnings, *refused, *warnings))
-    if not trial:
-        return valid
-    announce(watch, study.base.scenario.machine, fmus, study.base.scenario.coupling)
-    tried = _trial(study, planned, fmus)
-    return Checked([*valid.answers, *tried.answers], [*dict.fromkeys((*valid.findings, *tried.findings))])
+    return Checked([head], (*study.warnings, *refused, *warnings))
 
 
 def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:

@@ -188,7 +188,9 @@ def read_annotation(text: str) -> tuple[str, Option | None]:
     node = ast.parse(text, mode="eval").body
     if isinstance(node, ast.Name) and node.id in globals():
         parts = get_args(globals()[node.id])
-        return (node.id, None) if len(parts) < 2 or not isinstance(parts[1], Option) else (str(parts[0]), parts[1])
+        if len(parts) < 2 or not isinstance(parts[1], Option):
+            return node.id, None
+        return parts[0].__name__ if isinstance(parts[0], type) else str(parts[0]), parts[1]
     if not (isinstance(node, ast.Subscript) and ast.unparse(node.value) == "Annotated"):
         return text, None
     assert isinstance(node.slice, ast.Tuple)

@@ -166,7 +166,7 @@ def rows_of(case: Case, fmus: Path | None) -> Iterator[Row]:
 
 def _seen(record: Record, options: Options) -> Record:
     """With what the machine's structure takes of the torque, as identification takes it off."""
-    return record if options.modes is None else with_structure(record, options.modes, options.axis)
+    return record if options.modes is None else with_structure(record, options.modes, options.axes)
 
 
 def _best(model: RecordTorque, values: Mapping[str, float]) -> Array:
@@ -276,8 +276,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.traces:
             machine = load_machine(options.machine) if options.machine else None
             mapping = load_columns(options.columns) if options.columns else None
-            read = read_traces(options.traces, mapping, options.axis, machine)
-            cases: Iterator[Case] = iter([halves(options.traces[0].name, read, machine, options.axis)])
+            read = read_traces(options.traces, mapping, options.axes, machine)
+            cases: Iterator[Case] = iter([halves(options.traces[0].name, read, machine, options.axes)])
         else:
             cases = (case for source in (measured(), simulated(Path(folder), options.fmus)) for case in source)
         rows: list[Row] = []

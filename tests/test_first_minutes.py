@@ -43,7 +43,7 @@ def test_one_unit_in_fmpy(folder: Path) -> None:
 
 
 def test_the_machine_as_one_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (command,) = re.findall(r"```\nfeedsim (ssp .*)\n```", SECTION)
+    (command,) = re.findall(r"```\nfeedsim (export .*\.ssp)\n```", SECTION)
     monkeypatch.chdir(folder)
     assert cli.main(command.split()) == 0
     with zipfile.ZipFile(folder / command.split()[-1]) as written:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import textwrap
 import threading
 from collections.abc import Iterator
@@ -248,11 +249,16 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
-def test_a_pool_of_processes_leaves_little_and_not_for_long(tmp_path: Path, method: str) -> None:
+def test_a_pool_of_processes_leaves_little_and_not_for_long(
+    tmp_path: Path, method: str, request: pytest.FixtureRequest
+) -> None:
     """`with Pool() as pool:` ends workers by SIGTERM: each leaves one folder, until the next first use."""
-    script, temporary = tmp_path / "pool.py", tmp_path / "temporary"
-    temporary.mkdir()
+    script = tmp_path / "pool.py"
     script.write_text(POOL)
+    # multiprocessing binds a socket there, whose path may have some hundred characters.
+    short = tempfile.TemporaryDirectory()
+    request.addfinalizer(short.cleanup)
+    temporary = Path(short.name)
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "master"), "TMPDIR": str(temporary)}
 
     def left_by(end: str) -> set[Path]:

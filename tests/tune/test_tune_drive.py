@@ -382,7 +382,7 @@ def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> N
     again = (*command, "--gain-margin", "300")
     done = feedsim(*again, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "r: its result is of other parameters (axis=X, gain_margin=8 dB, phase_margin=40 deg," in done.stderr
+    assert "r: its result is of other parameters (axes=X, gain_margin=8 dB, phase_margin=40 deg," in done.stderr
     assert re.search(
         r"X: the gain margin of the present drive is [0-9.]+ dB; 300 dB are required \(--gain-margin\). [A-Z]",
         done.stderr,

@@ -67,6 +67,17 @@ class Opened:
 
 
 @contextmanager
+def refusals_of(path: Path) -> Iterator[None]:
+    """A block whose refusals name the file, also those of a value deep in it."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error) or path.name in str(error):
+            raise
+        raise InputError(f"{path}: {error}", error.problems) from error
+
+
+@contextmanager
 def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
     """Read and check an SSP; what it unpacks to is removed when the block ends.
 
@@ -80,23 +91,24 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         TemporaryFolder() as folder,
         ExitStack() as stack,
     ):
-        structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
-        archives = _archives(structure, files, folder, path, stack)
-        result = one.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
-        table = _table(archives[result.setpoint], f"{path}: {result.setpoint}")
-        given = values(structure, files, archives, result.foreign, str(path))
-        coupling = one.coupling(result, given, str(path))
-        if coupling is not None:
-            archives, given = one.split(result, archives, given)
-        if problems := rebuilt.lacking(result, given, str(path)):
-            raise InputError.of(str(path), problems)
-        own = rebuilt.annotation(structure.scenario, files, str(path))
-        T_c, T_pos, guessed = rebuilt.cycles(result, archives, given, table, own, structure.step, str(path))
-        parts = Parts(result, archives, given, table, T_c, T_pos, coupling)
-        if problems := rebuilt.faults(parts, str(path)):
-            raise InputError.of(str(path), problems)
-        _lay_out(folder, files, parts, own, path)
-        program = _sampled(parts, structure, path)
+        with refusals_of(path):
+            structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
+            archives = _archives(structure, files, folder, path, stack)
+            result = one.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
+            table = _table(archives[result.setpoint], f"{path}: {result.setpoint}")
+            given = values(structure, files, archives, result.foreign, str(path))
+            coupling = one.coupling(result, given, str(path))
+            if coupling is not None:
+                archives, given = one.split(result, archives, given)
+            if problems := rebuilt.lacking(result, given, str(path)):
+                raise InputError.of(str(path), problems)
+            own = rebuilt.annotation(structure.scenario, files, str(path))
+            T_c, T_pos, guessed = rebuilt.cycles(result, archives, given, table, own, structure.step, str(path))
+            parts = Parts(result, archives, given, table, T_c, T_pos, coupling)
+            if problems := rebuilt.faults(parts, str(path)):
+                raise InputError.of(str(path), problems)
+            _lay_out(folder, files, parts, own, path)
+            program = _sampled(parts, structure, path)
         with closed(folder), _own_names(path, folder):
             scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
             reported = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)

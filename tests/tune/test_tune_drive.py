@@ -397,7 +397,7 @@ def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> N
     assert "X.peak_before" in page
     assert "X.peak_reduction" not in page
     done = feedsim(*again, "--set", "machine.axes.X.drive.k_ffw=1", fmus=fmus, cwd=tmp_path)
-    assert (done.returncode, "of other parameters (axis=X, gain_margin=300 dB," in done.stderr) == (0, True)
+    assert (done.returncode, "of other parameters (axes=X, gain_margin=300 dB," in done.stderr) == (0, True)
     done = feedsim(*again, "--set", "machine.axes.X.drive.k_ffw=1", fmus=fmus, cwd=tmp_path)
     assert (done.returncode, "of other parameters" in done.stderr) == (0, False), done.stderr
     done = feedsim(*command, "--at", "foo", fmus=fmus, cwd=tmp_path)

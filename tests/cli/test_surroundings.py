@@ -151,7 +151,7 @@ def test_surroundings(name: str, command: str, place: Path, fmus: Path, request:
     if command in ("ssp", "pack"):
         assert not list(out.iterdir())
     elif command == "compare":
-        assert {path.name for path in out.iterdir()} == (set() if command in row.codes else {"a.html", "a.json"})
+        assert {path.name for path in out.iterdir()} == (set() if command in row.codes else {"a.html", "a.xml"})
     else:
         whole_or_nothing(out)
         written = command == "run" and (row.codes.get("run", 0) == 0 or name == "stdout full")

@@ -112,7 +112,7 @@ class Command:
                 continue
             value = getattr(options, parameter.name, None)
             for path in value if isinstance(value, list) else [value]:
-                if path is not None and not path.exists():
+                if path is not None and not _is_there(path):
                     typed = f"{parameter.typed}: " if parameter.typed else ""
                     return typed + no_such_file(path)
         return ""
@@ -239,6 +239,14 @@ def _completer(home: str) -> Callable[..., list[str]]:
         return list(getattr(import_module(f"feedsim.{module}"), function)())
 
     return values
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is a file or folder of that name; of a name that no disk takes the job says what is wrong."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return True
 
 
 def _is_path(parameter: Parameter) -> bool:

@@ -289,7 +289,7 @@ import sys, tracemalloc
 from pathlib import Path
 from feedsim import cosim, nc, scenario
 from feedsim.report import run as report
-from feedsim.trace import table
+from feedsim.trace import trace as table
 table.IN_MEMORY = 0
 def peak(turns):
     settings = [f"motions.0.turns={turns}", "motions.0.radius=5 mm", "recording.interval=250 us", "evaluate=[]"]

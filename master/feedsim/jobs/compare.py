@@ -157,7 +157,7 @@ def compare(
         Option(
             "[PATTERN=]VALUE[,TIME]",
             "1e-6 (of the range of the reference), '2 nm', '1 ms' (in time) or both, for all "
-            "variables or those of a pattern: '*.M_a=1e-3 N.m,1 ms'; several times, later ones "
+            "variables or those of a pattern: 'plant.*=1e-3 N.m,1 ms'; several times, later ones "
             "count more (default: 1e-3)",
             many=True,
             group="tolerances",

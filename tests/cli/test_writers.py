@@ -169,7 +169,9 @@ def test_a_study_goes_on_whatever_has_ended_it(place: Path, fmus: Path) -> None:
             time.sleep(0.01)
         process.send_signal(number)
         process.wait(PATIENCE)
-        assert process.returncode == (-number if number == signal.SIGKILL else 128 + number)
+        # A signal before the first or after the last line of the program ends it as such; a shell says 143 of both.
+        assert process.returncode in {-number, 128 + number}
+        assert number == signal.SIGTERM or process.returncode == -number
         until = time.monotonic() + PATIENCE
         while alive(process.pid):
             assert time.monotonic() < until, "its workers go on"

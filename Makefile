@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run axe ends check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
+.PHONY: help run axe ends check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all wasm-compiler page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -126,9 +126,13 @@ $(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
 # The unit machine for pages: clang with wasi-libc where they are there, else zig from PyPI.
 page-module: fmus/machine.wasm ## build the machine as WebAssembly for feedsim export, with clang or zig
 
-fmus/machine.wasm: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) $(MACHINE_SOURCES) $(wildcard src/page/*.c)
-	@$(PY) -m feedsim_packager web --out $@ || { echo "installing zig from PyPI (requirements-zig.lock)"; \
-	    $(PIP) install -r requirements-zig.lock && $(PY) -m feedsim_packager web --out $@; }
+fmus/machine.wasm: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) $(MACHINE_SOURCES) $(wildcard src/page/*.c) | wasm-compiler
+	$(PY) -m feedsim_packager web --out $@
+
+# Fails where there is none to be had. That alone leaves out pages: sources which do not compile end `make run` and `make test`.
+wasm-compiler: $(VENV)/.run
+	@$(PY) -c 'from feedsim_packager import web; web.find_compiler()' 2> /dev/null || { \
+	    echo "installing zig from PyPI (requirements-zig.lock)"; $(PIP) install -r requirements-zig.lock; }
 
 # Archives carry the reference results of their unit.
 $(FMUS) $(ALL_FMUS): tests/reference/integrators.md
@@ -143,7 +147,8 @@ release: docs $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheels, source archive, ar
 # --- run -----------------------------------------------------------------------------------------------------------
 
 run: fmus $(VENV)/.run ## build, run both scenarios, leave results, figures and reports in results/
-	@set -e; if $(MAKE) -s page-module; then page=--page; else echo "no compiler for WebAssembly here: no pages"; fi; \
+	@set -e; if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; page=--page; \
+	else echo "no compiler for WebAssembly here: no pages"; fi; \
 	for scenario in $(SCENARIOS); do \
 	    $(VENV)/bin/feedsim run scenarios/$$scenario.yaml $$page --out $(RESULTS)/$$scenario; done
 	@echo "open $(RESULTS)/*/report.html"
@@ -186,7 +191,8 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 # What tests start by the hundred finds feedsim compiled, even where the shell lets Python write no bytecode.
 test-python: fmus $(VENV)/.importers
-	@$(MAKE) -s page-module || echo "no compiler for WebAssembly here: tests of pages are left out"
+	@set -e; if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; \
+	else echo "no compiler for WebAssembly here: tests of pages are left out"; fi
 	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
 
 # Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").

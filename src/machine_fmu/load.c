@@ -9,9 +9,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "archive_files.h"
 #include "csv.h"
 #include "embedded_resources.h"
-#include "files.h"
 #include "machine.h"
 
 #define FILE_NAME "settings.csv"

@@ -21,6 +21,7 @@
 #include "../plant_fmu/poses.c"
 #include "../plant_fmu/resources.c"
 #include "../plant_fmu/transmission.c"
+#include "archive_files.c"
 #include "csv.c"
 #include "hash.c"
 #include "numbers.c"

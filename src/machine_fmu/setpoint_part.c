@@ -9,6 +9,7 @@
 #include "../setpoint_fmu/load.c"
 #include "../setpoint_fmu/model.c"
 #include "../setpoint_fmu/setpoints.c"
+#include "archive_files.c"
 #include "csv.c"
 #include "hash.c"
 #include "numbers.c"

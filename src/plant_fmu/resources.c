@@ -1,5 +1,6 @@
 #include "resources.h"
 
+#include "archive_files.h"
 #include "embedded_resources.h"
 #include "files.h"
 #include "hash.h"

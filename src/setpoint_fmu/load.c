@@ -2,8 +2,8 @@
 
 #include <stdio.h>
 
+#include "archive_files.h"
 #include "embedded_resources.h"
-#include "files.h"
 #include "hash.h"
 
 #define FILE_NAME "setpoints.csv"

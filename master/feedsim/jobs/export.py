@@ -13,8 +13,8 @@ from feedsim.arguments import Changes, Pairs, Value, by_name, listed, pairs, set
 from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.errors import InputError
 from feedsim.files.source import is_ssp
-from feedsim.jobs.machine import Positions, positions
-from feedsim.jobs.parameters import Archives, Argument, File, Force, Option, Settings, job, out_file
+from feedsim.jobs.machine import positions
+from feedsim.jobs.parameters import Archives, File, Force, Option, Positions, Settings, SubjectArgument, job, out_file
 from feedsim.jobs.result import Kind, Made
 from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
 from feedsim.judge import judged
@@ -45,7 +45,7 @@ OF_PLANT = ("at", "poses", "name", "note")
 
 @job("write a unit (.fmu), an SSP file (.ssp) or a page (.html)")
 def export(
-    subject: Annotated[File, Argument("SCENARIO-or-MACHINE", "scenario file, machine file or machine folder")],
+    subject: SubjectArgument,
     out: Annotated[
         File | None, out_file("FILE", "file to write; its ending, .fmu, .ssp or .html, says what it is")
     ] = None,

@@ -15,7 +15,17 @@ from feedsim.arguments import Band, Value, between, listed, quantity, settings, 
 from feedsim.cosim.plant import plant_modes
 from feedsim.errors import FeedsimError, InputError
 from feedsim.findings import severity
-from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
+from feedsim.jobs.parameters import (
+    Archives,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    SubjectArgument,
+    job,
+    out,
+)
 from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.judge.run import control as control_findings
@@ -123,7 +133,7 @@ class FrfResult(Result, Mapping[str, Complexes]):
 
 @job("frequency responses of drives and structure")
 def frf(
-    subject: Annotated[File, Argument("SCENARIO-or-MACHINE", "scenario file, machine file or machine folder")],
+    subject: SubjectArgument,
     axes: Annotated[str | Sequence[str] | None, Option("X,Z", "axes to look at (default: all)")] = None,
     *,
     set: Settings = None,

@@ -14,12 +14,15 @@ from feedsim.arguments import Value, quantity, spelt
 from feedsim.errors import InputError
 from feedsim.jobs.parameters import (
     Archives,
-    Argument,
     ControlName,
     FigureKinds,
     File,
     Force,
     Option,
+    RecordArgument,
+    RecordAxes,
+    RecordColumns,
+    RecordWindow,
     Settings,
     job,
     out,
@@ -101,13 +104,8 @@ class DriveResult(Result):
 
 @job("drive, inertia and friction from a record of a control")
 def identify_drive(
-    record: Annotated[
-        File, Argument("RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)")
-    ],
-    axes: Annotated[
-        str | Sequence[str] | None,
-        Option("NAMES", "axes, separated by commas, such as X,Y (default: all of the machine)"),
-    ] = None,
+    record: RecordArgument,
+    axes: RecordAxes = None,
     machine: Annotated[
         File | None,
         Option(
@@ -116,17 +114,8 @@ def identify_drive(
         ),
     ] = None,
     *,
-    columns: Annotated[
-        File | None, Option("MAPPING.yaml", "which columns of the record are what (docs/traces.md)")
-    ] = None,
-    window: Annotated[
-        str | None,
-        Option(
-            "BEGIN..END",
-            "the part of the record that counts, by times or by blocks of its program, e.g. '0.5 "
-            "s..2 s', 'N7..N20', 'N7' (default: all of it)",
-        ),
-    ] = None,
+    columns: RecordColumns = None,
+    window: RecordWindow = None,
     position_cycle: Annotated[
         Value | None,
         Option(

@@ -12,9 +12,21 @@ from typing import Annotated, Any
 import numpy as np
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Pairs, Value, lengths, pairs, quantity, spelt
+from feedsim.arguments import Value, lengths, pairs, quantity, spelt
 from feedsim.errors import InputError
-from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
+from feedsim.jobs.parameters import (
+    AxisPositions,
+    CouplingStep,
+    Cutoff,
+    File,
+    Force,
+    Option,
+    Positions,
+    StaticCorrection,
+    StructureArgument,
+    job,
+    out,
+)
 from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import begins_with, forced, replacing
@@ -37,7 +49,6 @@ USUAL_MODES = 20  # that are listed
 TABLE_FILE, BUILD_FILE = "modes.csv", "build.json"
 # A frequency that is asked for belongs to the nearest mode if that is not farther away than this share.
 MODE_DISTANCE = 0.1
-Positions = Pairs[Value]  # axis -> position [m] or a text with a unit, or texts AXIS=POSITION
 POSITION_NEEDED = "AXIS=POSITION is needed, e.g. X=800mm"
 
 
@@ -196,31 +207,12 @@ def _of_build(folder: Path) -> Sequence[str]:
 
 @job("masses, inertias, leads, coupling limits and modes")
 def machine_info(
-    machine: Annotated[
-        File,
-        Argument(
-            "MACHINE",
-            "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
-        ),
-    ],
+    machine: StructureArgument,
     *,
-    at: Annotated[
-        Positions,
-        Option(
-            "AXIS=POSITION",
-            "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
-            several=True,
-        ),
-    ] = None,
-    cutoff: Annotated[
-        Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")
-    ] = None,
-    static_correction: Annotated[
-        bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
-    ] = False,
-    step: Annotated[
-        Value | None, Option("TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
-    ] = None,
+    at: AxisPositions = None,
+    cutoff: Cutoff = None,
+    static_correction: StaticCorrection = False,
+    step: CouplingStep = None,
     modes: Annotated[int | str | None, Option("N", "modes to list: number or all (default: 20)")] = USUAL_MODES,
     watch: Watch = NO_WATCH,
 ) -> MachineResult:
@@ -242,29 +234,12 @@ def machine_info(
 
 @job("compute a machine's modes from its structure")
 def machine_build(
-    machine: Annotated[
-        File,
-        Argument(
-            "MACHINE",
-            "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
-        ),
-    ],
+    machine: StructureArgument,
     out: Annotated[File | None, out("build_{machine}")] = None,
     *,
-    at: Annotated[
-        Positions,
-        Option(
-            "AXIS=POSITION",
-            "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
-            several=True,
-        ),
-    ] = None,
-    cutoff: Annotated[
-        Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")
-    ] = None,
-    static_correction: Annotated[
-        bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
-    ] = False,
+    at: AxisPositions = None,
+    cutoff: Cutoff = None,
+    static_correction: StaticCorrection = False,
     force: Force = False,
     watch: Watch = NO_WATCH,
 ) -> BuildResult:
@@ -296,32 +271,13 @@ def machine_build(
 
 @job("draw a machine's structure and its modes", needs=("figures",))
 def machine_view(
-    machine: Annotated[
-        File,
-        Argument(
-            "MACHINE",
-            "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
-        ),
-    ],
+    machine: StructureArgument,
     out: Annotated[File | None, out("view_{machine}")] = None,
     *,
-    at: Annotated[
-        Positions,
-        Option(
-            "AXIS=POSITION",
-            "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
-            several=True,
-        ),
-    ] = None,
-    cutoff: Annotated[
-        Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")
-    ] = None,
-    static_correction: Annotated[
-        bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
-    ] = False,
-    step: Annotated[
-        Value | None, Option("TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
-    ] = None,
+    at: AxisPositions = None,
+    cutoff: Cutoff = None,
+    static_correction: StaticCorrection = False,
+    step: CouplingStep = None,
     mode: Annotated[
         Sequence[int | str],
         Option(

@@ -15,8 +15,19 @@ from feedsim.control.archive import Archive
 from feedsim.control.reading import Value
 from feedsim.control.writing import Written, changed
 from feedsim.errors import InputError
-from feedsim.jobs.machine_import import Names, assumed, axes_of, inputs_of, read_files
-from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
+from feedsim.jobs.machine_import import assumed, axes_of, inputs_of, read_files
+from feedsim.jobs.parameters import (
+    Argument,
+    AssumedValues,
+    CheckedUnits,
+    ControlAxes,
+    ControlDrives,
+    File,
+    Force,
+    Option,
+    job,
+    out,
+)
 from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
@@ -88,30 +99,11 @@ class MachineExportResult(Result):
 def machine_export(
     machine: Annotated[File, Argument("MACHINE", "machine file, or a folder with a machine.yaml")],
     like: Annotated[File | Sequence[File], Option("FILE", "files of the control as it is now", several=True)],
-    axes: Annotated[
-        Names,
-        Option(
-            "NAMES",
-            "axes of the control, X1,Y1; with the machine's name ahead where it is another one, "
-            "X=X1,Y=Y1 (default: the axes of the machine)",
-        ),
-    ] = None,
+    axes: ControlAxes = None,
     *,
-    drives: Annotated[
-        Names, Option("AXIS=LIST", "which drive object or list is that of an axis, such as X=PS000003,Y=PS000004")
-    ] = None,
-    assume: Annotated[
-        Names,
-        Option(
-            "NAME=VALUE",
-            "value of a parameter that the files do not have, such as FFW_MODE=3; may be given several times",
-            many=True,
-        ),
-    ] = None,
-    checked: Annotated[
-        str | Sequence[str],
-        Option("NUMBERS", "numbers whose unit you have checked at the control, such as MD32810,MD32000, or all"),
-    ] = (),
+    drives: ControlDrives = None,
+    assume: AssumedValues = None,
+    checked: CheckedUnits = (),
     out: Annotated[File | None, out("export_{machine}")] = None,
     force: Force = False,
     watch: Watch = NO_WATCH,

@@ -10,13 +10,25 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Pairs, listed, pairs, spelt
+from feedsim.arguments import listed, pairs, spelt
 from feedsim.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
 from feedsim.control.formats import opened
 from feedsim.control.reading import Reading, read
 from feedsim.errors import InputError, no_such_file
 from feedsim.files.regular import content
-from feedsim.jobs.parameters import Argument, File, Force, Option, job, out
+from feedsim.jobs.parameters import (
+    Argument,
+    AssumedValues,
+    CheckedUnits,
+    ControlAxes,
+    ControlDrives,
+    File,
+    Force,
+    Names,
+    Option,
+    job,
+    out,
+)
 from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
@@ -24,8 +36,6 @@ from feedsim.report.control_files import imported as page
 from feedsim.report.results import Content
 from feedsim.scenario.imported import Imported, imported
 from feedsim.scenario.machine import Machine
-
-Names = Pairs[str]  # axis of the machine -> that of the control, or texts X1 and X=X1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,33 +108,14 @@ def machine_import(
             many=True,
         ),
     ],
-    axes: Annotated[
-        Names,
-        Option(
-            "NAMES",
-            "axes of the control, X1,Y1; with the machine's name ahead where it is another one, "
-            "X=X1,Y=Y1 (default: the axes of the machine)",
-        ),
-    ] = None,
+    axes: ControlAxes = None,
     machine: Annotated[
         File | None, Option("MACHINE", "machine file or folder that the values are laid into (default: a draft)")
     ] = None,
     *,
-    drives: Annotated[
-        Names, Option("AXIS=LIST", "which drive object or list is that of an axis, such as X=PS000003,Y=PS000004")
-    ] = None,
-    assume: Annotated[
-        Names,
-        Option(
-            "NAME=VALUE",
-            "value of a parameter that the files do not have, such as FFW_MODE=3; may be given several times",
-            many=True,
-        ),
-    ] = None,
-    checked: Annotated[
-        str | Sequence[str],
-        Option("NUMBERS", "numbers whose unit you have checked at the control, such as MD32810,MD32000, or all"),
-    ] = (),
+    drives: ControlDrives = None,
+    assume: AssumedValues = None,
+    checked: CheckedUnits = (),
     name: Annotated[str | None, Option("NAME", "of the machine in a draft (default: name of the file)")] = None,
     out: Annotated[File | None, out("machine_{files}")] = None,
     force: Force = False,

@@ -13,10 +13,11 @@ import inspect
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar
 
-from feedsim.arguments import Changes
+from feedsim.arguments import Changes, Pairs, Value
 
 F = TypeVar("F", bound=Callable[..., Any])
 File = str | Path
@@ -89,6 +90,9 @@ class Declaration:
     parameters: Sequence[Parameter]
 
 
+Names = Pairs[str]  # axis of the machine -> that of the control, or texts X1 and X=X1
+Positions = Pairs[Value]  # axis -> position [m] or a text with a unit, or texts AXIS=POSITION
+
 Archives = Annotated[
     File | None,
     Option("DIR", "folder of the units' archives (default: $FEEDSIM_FMUS, else those that come along)"),
@@ -126,6 +130,69 @@ Draws = Annotated[
 ]
 Base = Annotated[File | None, Option("UNIT.fmu", "archive whose binaries are taken (default: that of --fmus)")]
 NamesOfAxes = Annotated[str | Sequence[str] | None, Option("A,B", "names of axes with commas between them")]
+
+SubjectArgument = Annotated[File, Argument("SCENARIO-or-MACHINE", "scenario file, machine file or machine folder")]
+RecordArgument = Annotated[
+    File, Argument("RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)")
+]
+RecordAxes = Annotated[
+    str | Sequence[str] | None,
+    Option("NAMES", "axes, separated by commas, such as X,Y (default: all of the machine)"),
+]
+RecordColumns = Annotated[File | None, Option("MAPPING.yaml", "which columns of the record are what (docs/traces.md)")]
+RecordWindow = Annotated[
+    str | None,
+    Option(
+        "BEGIN..END",
+        "the part of the record that counts, by times or by blocks of its program, e.g. '0.5 "
+        "s..2 s', 'N7..N20', 'N7' (default: all of it)",
+    ),
+]
+StructureArgument = Annotated[
+    File,
+    Argument(
+        "MACHINE",
+        "machine file with the key structure, structure file, or a folder with a machine.yaml or structure.yaml",
+    ),
+]
+AxisPositions = Annotated[
+    Positions,
+    Option(
+        "AXIS=POSITION",
+        "axis positions, e.g. X=800mm Z=100mm; axes that are not named stay at the machine's pose",
+        several=True,
+    ),
+]
+Cutoff = Annotated[Value | None, Option("FREQUENCY", "drop modes above, e.g. 1500Hz (default: the structure's)")]
+StaticCorrection = Annotated[
+    bool, Option("", "append pseudo-modes that make up for the static compliance of the dropped modes")
+]
+CouplingStep = Annotated[
+    Value | None, Option("TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
+]
+ControlAxes = Annotated[
+    Names,
+    Option(
+        "NAMES",
+        "axes of the control, X1,Y1; with the machine's name ahead where it is another one, "
+        "X=X1,Y=Y1 (default: the axes of the machine)",
+    ),
+]
+ControlDrives = Annotated[
+    Names, Option("AXIS=LIST", "which drive object or list is that of an axis, such as X=PS000003,Y=PS000004")
+]
+AssumedValues = Annotated[
+    Names,
+    Option(
+        "NAME=VALUE",
+        "value of a parameter that the files do not have, such as FFW_MODE=3; may be given several times",
+        many=True,
+    ),
+]
+CheckedUnits = Annotated[
+    str | Sequence[str],
+    Option("NUMBERS", "numbers whose unit you have checked at the control, such as MD32810,MD32000, or all"),
+]
 
 
 def out(default: str) -> Option:
@@ -186,16 +253,25 @@ def _argument_line(entry: Parameter) -> str:
 def read_annotation(text: str) -> tuple[str, Option | None]:
     """Type and option of an annotation, given as text; of a name of this module, such as Archives, what that is."""
     node = ast.parse(text, mode="eval").body
-    if isinstance(node, ast.Name) and node.id in globals():
-        parts = get_args(globals()[node.id])
-        if len(parts) < 2 or not isinstance(parts[1], Option):
-            return node.id, None
-        return parts[0].__name__ if isinstance(parts[0], type) else str(parts[0]), parts[1]
+    if isinstance(node, ast.Name):
+        node = _shared_annotations().get(node.id, node)
     if not (isinstance(node, ast.Subscript) and ast.unparse(node.value) == "Annotated"):
         return text, None
     assert isinstance(node.slice, ast.Tuple)
     kind, option = node.slice.elts
     return ast.unparse(kind), eval(compile(ast.Expression(option), text, "eval"), globals())
+
+
+@cache
+def _shared_annotations() -> dict[str, ast.expr]:
+    """Annotations that several jobs share, by the name that this module gives them, such as Archives."""
+    return {
+        node.targets[0].id: node.value
+        for node in ast.parse(Path(__file__).read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Name)
+        and ast.unparse(node.value).startswith("Annotated[")
+    }
 
 
 def _text(node: ast.expr | None) -> str | None:

@@ -11,12 +11,15 @@ from typing import Annotated, Any
 from feedsim.analysis import Figure, Named
 from feedsim.jobs.parameters import (
     Archives,
-    Argument,
     ControlName,
     FigureKinds,
     File,
     Force,
     Option,
+    RecordArgument,
+    RecordAxes,
+    RecordColumns,
+    RecordWindow,
     Settings,
     job,
     out,
@@ -95,26 +98,12 @@ class ReplayResult(Result):
 
 @job("run a record's setpoints on simulated axes, and compare")
 def replay(
-    record: Annotated[
-        File, Argument("RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)")
-    ],
+    record: RecordArgument,
     machine: Annotated[File, Option("MACHINE-or-SCENARIO", "the machine that follows the record")],
-    axes: Annotated[
-        str | Sequence[str] | None,
-        Option("NAMES", "axes, separated by commas, such as X,Y (default: all of the machine)"),
-    ] = None,
+    axes: RecordAxes = None,
     *,
-    columns: Annotated[
-        File | None, Option("MAPPING.yaml", "which columns of the record are what (docs/traces.md)")
-    ] = None,
-    window: Annotated[
-        str | None,
-        Option(
-            "BEGIN..END",
-            "the part of the record that counts, by times or by blocks of its program, e.g. '0.5 "
-            "s..2 s', 'N7..N20', 'N7' (default: all of it)",
-        ),
-    ] = None,
+    columns: RecordColumns = None,
+    window: RecordWindow = None,
     open_loop: Annotated[
         bool,
         Option(

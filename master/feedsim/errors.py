@@ -90,10 +90,10 @@ def nearest(word: str, known: Sequence[str]) -> str:
     return next(iter(get_close_matches(word, known[:MAX_KNOWN], n=1, cutoff=0.6)), "")
 
 
-def no_such_file(path: str | Path) -> str:
-    """Message about a file that is not there, with the one beside it that was most likely meant."""
+def no_such_file(path: str | Path, what: str = "file") -> str:
+    """Message about a file, or folder, that is not there, with the one beside it that was most likely meant."""
     try:
         near = nearest(Path(path).name, [other.name for other in Path(path).parent.iterdir()])
     except (OSError, ValueError):
         near = ""
-    return f"no such file: {path}" + (f"; did you mean {Path(path).parent / near}?" if near else "")
+    return f"no such {what}: {path}" + (f"; did you mean {Path(path).parent / near}?" if near else "")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import feedsim as fs
-from feedsim.cli import parser
+from feedsim.cli import main, parser
 from feedsim.cli.commands import COMMANDS, COMMON, GROUPS, OLD_COMMANDS, Command, commands, renamed
 from feedsim.jobs.parameters import read_annotation
 
@@ -62,6 +62,38 @@ def test_identify_alone_is_of_friction() -> None:
     assert len(notes) == 2
     assert renamed(["identify", "drive", "x.csv"]) == (["identify", "drive", "x.csv"], [])
     assert renamed(["identify", "--help"]) == (["identify", "--help"], [])
+
+
+@pytest.mark.parametrize(
+    ("old", "today"),
+    [
+        ("sweep a.yaml --dry-run", "check a.yaml --trial"),
+        ("sweep a.yaml --row=3 --set x=1", "check a.yaml --row=3 --set x=1"),
+        ("-q sweep a.yaml --out x --row 3", "-q check a.yaml --row 3"),
+        ("sweep -o x --workers 2 --scheduler=tcp://h:1 --format csv --restart a.yaml --dry-run -v",
+         "check a.yaml --trial -v"),
+        ("sweep a.yaml --out x", "sweep a.yaml --out x"),
+    ],
+)  # fmt: skip
+def test_dry_runs_of_studies_are_checks_without_the_options_that_these_lack(old: str, today: str) -> None:
+    words, notes = renamed(old.split())
+    assert words == today.split()
+    assert len(notes) == (old != today)
+
+
+@pytest.mark.parametrize("typed", ["--json verdict.json", "--json=verdict.json"])
+def test_the_file_of_a_comparison_is_refused_with_what_to_type(typed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["compare", "a", "b", *typed.split()])
+    assert end.value.code == 2
+    assert "--json > verdict.json" in capsys.readouterr().err
+    assert renamed(["compare", "a", "b", "--json"]) == (["compare", "a", "b", "--json"], [])
+
+
+def test_defaults_in_the_help_name_the_arguments_in_capitals() -> None:
+    option = next(p.option for c in commands() if c.name == "circle" for p in c.options if p.name == "out")
+    assert option is not None
+    assert option.help.endswith("results/circle_RECORDS)")
 
 
 @pytest.mark.parametrize("old", ["identify", "validate", "show", "compensate", "pack", "machine_show"])

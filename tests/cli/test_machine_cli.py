@@ -53,6 +53,23 @@ def export(*words: str | Path) -> int:
     return cli.main(["export", "--plant", *map(str, words)])
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--inputs"], "--inputs: --plant has no motion to leave out"),
+        (["--fmus", "nowhere"], "--fmus: no such folder: nowhere"),
+        (["--fmus", "."], "plant.fmu"),
+    ],
+)
+def test_options_of_the_plant_are_taken_or_refused(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert export(TEST_CENTRE, "--out", tmp_path / "plant.fmu", *words) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "plant.fmu").exists()
+
+
 def test_build_as_documented(tmp_path: Path, capsys: Capture) -> None:
     out = tmp_path / "deep" / "out"
     assert run("build", TEST_CENTRE, "--at", "X=800mm", "Y=327mm", "Z=100mm", "--out", out) == 0

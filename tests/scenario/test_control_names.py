@@ -14,6 +14,7 @@ from feedsim import units, variables
 from feedsim.control import CONTROLS, known, names_of
 from feedsim.control.names import table
 from feedsim.errors import InputError
+from feedsim.jobs.parameters import CONTROL_CHOICES
 from feedsim.scenario import load, load_machine
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -83,6 +84,11 @@ def test_of_all_axes() -> None:
     axes = load(CIRCLE, ["MD32200=5"]).machine.axes
     assert {axis.drive.K_v for axis in axes.values()} == {axes["X"].drive.K_v}
     assert axes["X"].drive.K_v == pytest.approx(5000 / 60, rel=1e-15)
+
+
+def test_the_command_line_offers_every_control() -> None:
+    """Options are declared without the table of names, which takes time to load."""
+    assert CONTROL_CHOICES == CONTROLS
 
 
 def test_a_scenario_sets_it(tmp_path: Path) -> None:

@@ -66,6 +66,22 @@ def test_what_is_to_be_explained_comes_first(fmus: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("study.yaml", "--trial", "--row", 3), "--trial and --row 3: one of them"),
+        (("xz_circle.yaml", "--trial"), "--trial: is for a study; xz_circle.yaml is none"),
+        (("xz_circle.yaml", "--row", 3), "--row 3: is for a study; xz_circle.yaml is none"),
+    ],
+)
+def test_options_of_a_check_that_do_not_fit(words: tuple[object, ...], said: str, fmus: Path, folder: Path) -> None:
+    (folder / "study.yaml").write_text(STUDY.format("explain: Z.duration"), encoding="utf-8")
+    (folder / "xz_circle.yaml").write_text("", encoding="utf-8")
+    done = feedsim("check", *words, fmus=fmus, cwd=folder)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+@pytest.mark.parametrize(
     ("question", "said"),
     [
         ("goal: least Z.overshoot", "'smallest FIGURE' or 'largest FIGURE' is expected"),

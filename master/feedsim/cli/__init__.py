@@ -16,7 +16,6 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from feedsim.cli.commands import Command, Parser, add_commands, arguments, given_files, refuse_missing_files, renamed
@@ -137,9 +136,11 @@ def _done(command: Command, options: argparse.Namespace) -> int:
 
     ask(options.called, *command.declared.needs, *(["figures"] if getattr(options, "figures", ()) else []))
     refuse_missing_files(command, options)
+    from feedsim.jobs.result import in_words_of  # behind the look at the files: it loads what takes longer
+
     named = arguments(command, options)
     several = next((p.name for p in command.options if p.type.startswith("*")), None)
-    with as_options(), replacing(getattr(options, "force", False)), _in_words_of(getattr(options, "control", "")):
+    with as_options(), replacing(getattr(options, "force", False)), in_words_of(getattr(options, "control", "")):
         job = command.job()
         listed = named.pop(several, ()) if several else ()
         silent = options.quiet or options.json is True
@@ -149,15 +150,6 @@ def _done(command: Command, options: argparse.Namespace) -> int:
         else:
             result = job(*listed, **named)
         return finish(result, named.get("out"), options)
-
-
-def _in_words_of(control: str) -> AbstractContextManager[None]:
-    """Reports in the names of a control; without one their code is not loaded."""
-    if not control:
-        return nullcontext()
-    from feedsim.report.control import control_names
-
-    return control_names(control)
 
 
 def _kind_meant(command: Command, options: argparse.Namespace) -> str:

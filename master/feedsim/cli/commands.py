@@ -108,13 +108,14 @@ class Command:
     def missing_file(self, options: Namespace) -> str:
         """A sentence on the first file that is named and is not there; "" where all are."""
         for parameter in self.options:
-            if not _is_path(parameter) or (parameter.option or Option()).writes:
+            option = parameter.option or Option()
+            if not _is_path(parameter) or option.writes:
                 continue
             value = getattr(options, parameter.name, None)
             for path in value if isinstance(value, list) else [value]:
                 if path is not None and not _is_there(path):
                     typed = f"{parameter.typed}: " if parameter.typed else ""
-                    return typed + no_such_file(path)
+                    return typed + no_such_file(path, "folder" if option.value == "DIR" else "file")
         return ""
 
     def default_out(self, options: Namespace) -> Path | None:
@@ -145,11 +146,6 @@ def commands() -> tuple[Command, ...]:
     return tuple(Command(name, home) for name, home in COMMANDS.items())
 
 
-def by_name(name: str) -> Command:
-    """The command of that name."""
-    return next(command for command in commands() if command.name == name)
-
-
 def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
     """Words of the command line in names of today, and a sentence on every name that was another one."""
     result, notes = [*words], []
@@ -159,10 +155,11 @@ def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
     if old:
         result[plain : plain + len(old.split())] = OLD_COMMANDS[old].split()
         notes.append(f"feedsim {old} is called feedsim {OLD_COMMANDS[old]}")
-    elif first == "sweep" and {"--dry-run", "--row"} & set(result):
-        result = ["--trial" if word == "--dry-run" else word for word in result]
-        result[plain] = "check"
+    elif first == "sweep" and {"--dry-run", "--row"} & {word.partition("=")[0] for word in result}:
+        result = [*result[:plain], "check", *_words_of_check(result[plain + 1 :])]
         notes.append("feedsim sweep --dry-run and --row are called feedsim check --trial and --row")
+    elif first == "compare" and (file := _file_of_json(result)):
+        Parser(prog="feedsim compare").error(f"--json prints the result now: feedsim compare ... --json > {file}")
     elif first == "run" and "--try" in result:
         result.remove("--try")
         result[plain : plain + 1] = ["tune", "proposals"]
@@ -176,6 +173,32 @@ def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
             result[k] = OLD_OPTIONS[name] + equals + value
             notes.append(f"the option {name} is called {OLD_OPTIONS[name]}")
     return result, [f"{note} now; the old name goes with the next version" for note in dict.fromkeys(notes)]
+
+
+def _file_of_json(words: Sequence[str]) -> str:
+    """The file that ``compare --json FILE`` of version 0.2 wrote; "" where the words are of today."""
+    behind = next((words[k : k + 2] for k, word in enumerate(words) if word.partition("=")[0] == "--json"), [])
+    named = [*behind[:1][0].split("=")[1:], *behind[1:]] if behind else []
+    return next((word for word in named if word.lower().endswith(".json")), "")
+
+
+def _words_of_check(words: Sequence[str]) -> Iterator[str]:
+    """Words behind ``sweep`` of version 0.2 as ``check`` takes them: options that it lacks, such as --out, go."""
+    takes_value = {
+        command.name: {
+            flag: bool(parameter.option.value or parameter.option.choices)
+            for parameter in command.options if parameter.option
+            for flag in (parameter.typed, parameter.option.short)
+        }
+        for command in commands() if command.name in ("sweep", "check")
+    }  # fmt: skip
+    rest = iter(words)
+    for word in rest:
+        name, equals, _ = word.partition("=")
+        if name in takes_value["check"] or name not in takes_value["sweep"]:
+            yield "--trial" if word == "--dry-run" else word
+        elif takes_value["sweep"][name] and not equals:
+            next(rest, None)
 
 
 def _below(group: str) -> set[str]:

@@ -76,9 +76,9 @@ def check(
     """
     if not isinstance(scenario, Scenario) and is_study(Path(scenario)):
         return _study(Path(scenario), settings(set), runs, trial, row, None if fmus is None else Path(fmus), watch)
-    for name, value in (("runs", runs), ("trial", trial or None), ("row", row)):
+    for name, value in (("runs", runs), ("trial", "" if trial else None), ("row", row)):
         if value is not None:
-            raise InputError(f"{spelt(name)} {value}: is for a study; {scenario} is none")
+            raise InputError(f"{f'{spelt(name)} {value}'.strip()}: is for a study; {scenario} is none")
     with opened(scenario, set, fmus) as subject:
         plan, program = subject.plan, subject.program
         analysis.check(plan, program)
@@ -101,6 +101,8 @@ def _study(
     from feedsim.sweep import design
     from feedsim.sweep import trial as trials
 
+    if trial and row is not None:
+        raise InputError(f"{spelt('trial')} and {spelt('row')} {row}: one of them; a row is not made, but named")
     study = load_study(file, changes, runs=runs)
     planned = design(study)
     if row is not None:

@@ -148,22 +148,18 @@ def export(
     }  # fmt: skip
     asked = {key: value for key, value in given.items() if value}
     known = (*ENDINGS[ending], *(OF_PLANT if plant else ()))
+    if plant and inputs:
+        raise InputError(f"{spelt('inputs')}: {spelt('plant')} has no motion to leave out")
     if wrong := next((key for key in asked if key not in known), ""):
         needs = (
             f"{spelt('plant')}" if wrong in OF_PLANT else next(end for end, keys in ENDINGS.items() if wrong in keys)
         )
         raise InputError(f"{spelt(wrong)}: is for {needs}, not for {ending}")
     if ending == ".ssp":
-        pass
-
-        return write_ssp(subject, out, one=one, fmus=fmus, set=set, force=force, watch=watch)
+        return write_ssp(subject, out, one=one, fmus=fmus, set=set, force=force)
     if ending == ".html":
-        pass
-
         return write_page(subject, out, knobs=knobs, fmus=fmus, set=set, force=force, watch=watch)
     if plant:
-        pass
-
         if set:
             raise InputError(
                 f"{spelt('set')}: changes are for a scenario; {spelt('plant')} takes the machine file as it is"
@@ -177,11 +173,10 @@ def export(
             note=note,
             base=base,
             terminals=terminals,
+            fmus=fmus,
             force=force,
             watch=watch,
         )
-    pass
-
     return pack(
         subject, out, inputs=inputs, base=base, terminals=terminals, fmus=fmus, set=set, force=force, watch=watch
     )
@@ -348,7 +343,6 @@ def write_ssp(
     fmus: File | None = None,
     set: Changes = None,
     force: bool = False,
-    watch: Watch = NO_WATCH,
 ) -> Made:
     """Write a scenario as one SSP file (System Structure and Parameterization 1.0): units, parameters, wiring, motion.
 
@@ -359,7 +353,6 @@ def write_ssp(
         fmus: folder of the archives.
         set: changes of the file, as behind ``--set``.
         force: `out` may be a file that feedsim did not write.
-        watch: who hears how far the job is.
 
     Raises:
         InputError: a faulty file, a motion that violates a limit, loads over time, a name that does not end in .ssp.
@@ -421,6 +414,7 @@ def machine_pack(
     note: str | None = None,
     terminals: bool = True,
     base: File | None = None,
+    fmus: File | None = None,
     force: bool = False,
     watch: Watch = NO_WATCH,
 ) -> Made:
@@ -433,7 +427,8 @@ def machine_pack(
         poses: axis -> size of the cells of a grid of poses [m], or a text "20mm" or "0mm..400mm/20mm".
         name, note: of the machine in the archive; None: the machine's own.
         terminals: with terminals and icons, which FMI Library 3 refuses in units of FMI 2.0.
-        base: archive whose binaries are taken; None: plant.fmu of those that come along.
+        base: archive whose binaries are taken; None: plant.fmu in `fmus`.
+        fmus: folder of the archives; None: those that come along.
         force: `out` may be a file that feedsim did not write.
         watch: who hears how far the job is.
 
@@ -465,7 +460,7 @@ def machine_pack(
                 grid = folder / "poses.bin"
                 follows = f"; {_write_grid(loaded, pose, modes, poses, watch, grid)}"
             packed = archive.pack(
-                own or cosim.fmus_directory() / "plant.fmu",
+                own or (cosim.fmus_directory() if fmus is None else Path(fmus)) / "plant.fmu",
                 folder / "plant.fmu",
                 modes=modes,
                 pose=pose,

@@ -73,7 +73,7 @@ class MachineImportResult(Result):
     @property
     def answers(self) -> Sequence[str]:
         """How many values each axis has."""
-        return page.answers(self.archives, self.reading, self.made)
+        return page.answers(self.reading, self.made)
 
     @property
     def lines(self) -> Sequence[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -128,8 +129,6 @@ Draws = Annotated[
         "intervals, curves bands; tuning judges its values on them; 0: none",
     ),
 ]
-Base = Annotated[File | None, Option("UNIT.fmu", "archive whose binaries are taken (default: that of --fmus)")]
-NamesOfAxes = Annotated[str | Sequence[str] | None, Option("A,B", "names of axes with commas between them")]
 
 SubjectArgument = Annotated[File, Argument("SCENARIO-or-MACHINE", "scenario file, machine file or machine folder")]
 RecordArgument = Annotated[
@@ -209,7 +208,7 @@ def out_file(value: str, help: str) -> Option:
 
 def _shown(template: str) -> str:
     """A name of a folder as the help shows it: "circle_{records}" is circle_RECORDS."""
-    return template.replace("{", "<").replace("}", ">")
+    return re.sub(r"{(\w+)}", lambda found: found[1].upper(), template)
 
 
 def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:

@@ -124,7 +124,7 @@ def from_signals(
     return Measured(result.frequency, values, result.relative, unit, linear, result.method, recording.notes)
 
 
-def from_responses(path: Path, outputs: Mapping[str, Channel], input_unit: str = "") -> Measured:
+def from_responses(path: Path, outputs: Mapping[str, Channel]) -> Measured:
     """Responses of a file of frequency responses. A unit is one of output over input, such as (rad/s)/(N.m).
 
     Raises InputError: no such response; a unit that is not understood.

@@ -47,7 +47,6 @@ SETTINGS = (
 FIXED = ("T_c", "T_pos", "I_P")
 # How far a slider goes about the scenario's value; a number may be typed beyond, within the table's range.
 REACH = 4.0
-UNIT_TEXTS = {"1": ""}
 SHOWN_UNIT = {"1/s": "(m/min)/mm"}
 
 

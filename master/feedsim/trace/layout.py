@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from feedsim.errors import InputError
 from feedsim.files.spellings import known_unit
 from feedsim.trace.stamps import is_stamp
+from feedsim.units import NUMBER
 
 _SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
-_PLAIN = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NO_NUMBERS = ("nan", "inf", "infinity")  # which stand in place of one
 # A signal of a SINUMERIK by its path: "+/Nck/!SD/nckServoDataActPos1stEnc64 [u1, 2]", of unit 1, axis 2.
 _SIGNAL = re.compile(r"(?P<path>.*?)\s*\[u\d+\s*[,;]\s*(?P<axis>\d+)\](?P<rest>.*)")
@@ -101,7 +101,7 @@ def _is_value(cell: str) -> bool:
 
 def plain_number(cell: str) -> bool:
     """Whether a cell is a number with a decimal point, or without one."""
-    return _PLAIN.fullmatch(cell.strip()) is not None
+    return re.fullmatch(NUMBER, cell.strip()) is not None
 
 
 def split_cells(line: str, separator: str) -> list[str]:

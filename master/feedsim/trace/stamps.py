@@ -77,7 +77,7 @@ def stamps(cells: Sequence[str], lines: Sequence[int], where: str, name: str) ->
     offsets = {zone: _offset(zone) for zone in set(zones)}
     clocks -= np.array([offsets[zone] for zone in zones])
     if days[0]:
-        numbers = _numbered(days, clocks, where, lines[0], name)
+        numbers = _numbered(days, where, lines[0], name)
         whole = DAY * np.array([numbers[day] - numbers[days[0]] for day in days], dtype=np.float64) + clocks
     else:  # half a day back is midnight
         whole = clocks + DAY * np.cumsum(np.diff(clocks, prepend=clocks[0]) < -DAY / 2)
@@ -103,7 +103,7 @@ def _offset(zone: str | None) -> int:
     return (1 if zone[0] == "+" else -1) * (3600 * int(digits[:2]) + 60 * int(digits[2:]))
 
 
-def _numbered(days: Sequence[str], clocks: Array, where: str, line: int, name: str) -> Mapping[str, int]:
+def _numbered(days: Sequence[str], where: str, line: int, name: str) -> Mapping[str, int]:
     """Date -> its number. Of one date any will do; of several the order of their parts must show."""
     changes = [row for row in range(1, len(days)) if days[row] != days[row - 1]]
     if not changes:

@@ -9,11 +9,10 @@ all terms of the model. Start reading at fitted().
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import Fit, blocks_of, fit
@@ -40,9 +39,6 @@ SCREENED_SAMPLES = 2000  # samples of all paths for the search among the orders
 RESPONSE_UNCERTAINTY = 0.03
 FINE_GRID_FREQUENCY = 30.0  # up to this frequency [Hz] the response is taken at more points
 FINE_GRID_POINTS, GRID_POINTS = 100, 160
-
-# x_a over a torque at the motor (F,) [m/(N.m)], of an axis at frequencies (F,) [Hz].
-Response = Callable[[str, Array], NDArray[np.complex128]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ def pictures_of(compensation: Compensation) -> list[Picture]:
     plane = f"{turn.axes[0]}-{turn.axes[1]}"
     pictures: list[Picture | None] = [
         _contour_picture(turn, before, after, plane),
-        _reversals_picture(turn, before, after, plane),
+        _reversals_picture(before, after, plane),
         _torque_picture(compensation),
     ]
     pictures += [_errors_picture(compensation)] if compensation.table else []
@@ -62,7 +62,7 @@ def _both(before: Contour, after: Contour) -> list[tuple[str, str, Contour]]:
     return [("without", BEFORE, before), ("with compensation", AFTER, after)]
 
 
-def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
+def _reversals_picture(before: Contour, after: Contour, plane: str) -> Picture:
     title = f"Circular test in the plane {plane}: the contour around the reversals"
     caption = (
         "Radius deviation by the linear scales within ±45° of every crossing. Below: the compensated contour "

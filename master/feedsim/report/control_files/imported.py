@@ -81,7 +81,7 @@ def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> l
     return [*result, *(Note(text) for text in reading.notes)]
 
 
-def answers(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[str]:
+def answers(reading: Reading, made: Imported) -> list[str]:
     """How many values each axis has from the files."""
     per_axis = {axis: [value for value in made.values if value.axis == axis] for axis in reading.axes}
     said = [
@@ -131,7 +131,7 @@ def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inp
     return Report(
         f"Machine file from {', '.join(archive.name for archive in archives)}",
         f"{reading.control} · {archives[0].form} · axes {', '.join(reading.axes)}",
-        answer=answers(archives, reading, made),
+        answer=answers(reading, made),
         warnings=findings(archives, reading, made),
         tiles=[
             Tile(f"{int(figures[name].value)}", label, figures[name].meaning)
@@ -230,7 +230,7 @@ def summary(
     """Content of summary.json."""
     return {
         "kind": KIND,
-        "answer": answers(archives, reading, made),
+        "answer": answers(reading, made),
         "control": reading.control,
         "axes": dict(reading.axes),
         "figures": figures_part(figures_of(archives, reading, made)),

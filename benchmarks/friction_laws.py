@@ -12,7 +12,7 @@ speed, fitted by least squares with the inertia and the delay that LuGre's fit h
                                                              many drawn axes (gms_intervals.py; ten seconds of one core
                                                              an axis); what is in build/friction-laws is not drawn again
 
-Prints the table; `make friction-laws` writes it into docs/friction-laws.md.
+Prints the table; `make friction-laws` writes it into docs/trust.md.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS, GMS
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "friction-laws.md"
+PAGE = ROOT / "docs" / "trust.md"
 MACHINES = ROOT / "scenarios" / "machines"
 LAWS = {"LuGre": (Friction.law, FRICTION_ROLE.shipped), "GMS": (GMS, FRICTION_UNITS[GMS])}
 MOVES = 0.01  # of the highest speed: above, an axis moves

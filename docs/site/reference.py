@@ -76,12 +76,14 @@ def gallery() -> str:
     for script in scripts:
         text = script.read_text(encoding="utf-8")
         title, _, words = (ast.get_docstring(ast.parse(text)) or "").partition("\n")
+        anchor = script.stem.replace("_", "-")
         title, code = title.rstrip("."), text.partition('\n"""\n')[2].strip()
         picture = f"{script.stem}.png"
         cards.append(
-            f'<a href="#{script.stem}"><img src="../_images/{picture}" alt="" loading="lazy"><span>{title}</span></a>'
+            f'<a href="#{anchor}"><img src="../_images/{picture}" alt="{title}, picture" loading="lazy">'
+            f"<span>{title}</span></a>"
         )
-        parts += [f"({script.stem})=", f"## {title}", "", words.strip(), "", f"![{title}](../images/gallery/{picture})",
+        parts += [f"({anchor})=", f"## {title}", "", words.strip(), "", f"![{title}](../images/gallery/{picture})",
                   "", f"`examples/{script.name}`", "", f"```python\n{code}\n```", ""]  # fmt: skip
     return "\n".join([
         "# Gallery", "", "Small scripts that run as they stand, in any folder. All numbers of the machines are synthetic.",

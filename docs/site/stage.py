@@ -82,6 +82,12 @@ _NO_PROSE = re.compile(
     r"|!?\[[^\]]*\](?:\([^)]*\))?|<[^>]*>|\*\*[^*]*\*\*)",
     re.DOTALL | re.MULTILINE,
 )
+# The same with rows let through, but for their heads, and links that stand already left out whole.
+_NO_CELL = re.compile(
+    r"""(<a class="term".*?</a>|^\|[^\n]*\n(?=\|[-|: ]+\|$)|"""
+    + _NO_PROSE.pattern[1:].replace(r"^(?:\||#|    |!\[)", r"^(?:#|    |!\[)"),
+    re.DOTALL | re.MULTILINE,
+)
 _UNLINKED = ("glossary.md", "changelog.md", "contributing.md", "style.md", "index.md")
 
 
@@ -111,13 +117,19 @@ def with_terms(text: str, page: str) -> str:
         return _ROW.sub(lambda row: _entry(row[1], row[2]) if row[1] != "term" else row[0], text)
     if page in _UNLINKED:
         return text
-    up = "../" * page.count("/")
-    left = terms()
+    up, left = "../" * page.count("/"), terms()
+    for skipped in (_NO_PROSE, _NO_CELL):  # a term that no prose of the page has, in its tables
+        text = _linked(text, skipped, left, up)
+    return text
+
+
+def _linked(text: str, skipped: re.Pattern[str], left: list[str], up: str) -> str:
+    """The text with the first mention of the terms in `left` as a link, which are taken out of it; not in `skipped`."""
     parts = []
     at = 0
-    for skipped in [*_NO_PROSE.finditer(text), None]:
-        parts += [text[at : skipped.start() if skipped else len(text)], skipped[0] if skipped else ""]
-        at = skipped.end() if skipped else at
+    for each in [*skipped.finditer(text), None]:
+        parts += [text[at : each.start() if each else len(text)], each[0] if each else ""]
+        at = each.end() if each else at
     for number in range(0, len(parts), 2):
         found = []  # place, words and term, of this stretch of prose
         for term in list(left):

@@ -241,8 +241,9 @@ bench: fmus $(VENV)/.importers ## measure everything, other simulators too; writ
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py
 
-docs: $(VENV)/.dev $(VARIABLES) ## build the documentation as a site that opens from disk, into build/site
+docs: fmus $(VENV)/.dev ## build the documentation as a site that opens from disk, into build/site
 	rm -rf $(BUILD)/site
+	@if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; else echo "no compiler for WebAssembly here: a picture in place of the machine"; fi
 	$(PY) docs/site/stage.py $(BUILD)/site-source
 	$(PY) -m sphinx -q -W --keep-going -b html -c docs/site -d $(BUILD)/site-trees $(BUILD)/site-source $(BUILD)/site
 	@echo "open $(BUILD)/site/index.html"

@@ -18,7 +18,8 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS / "site"))
 import commands  # noqa: E402  (a tool of the documentation, in no package)
 
-QUICK = [ROOT / "README.md", DOCS / "index.md", DOCS / "circles.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("how-to/*.md"))]
+QUICK = [ROOT / "README.md", DOCS / "index.md", DOCS / "circles.md",
+         *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("how-to/*.md"))]  # fmt: skip
 EVERY = os.environ.get("FEEDSIM_DOCS_ALL") == "1"
 
 

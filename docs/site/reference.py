@@ -86,8 +86,8 @@ def gallery() -> str:
         parts += [f"({anchor})=", f"## {title}", "", words.strip(), "", f"![{title}](../images/gallery/{picture})",
                   "", f"`examples/{script.name}`", "", f"```python\n{code}\n```", ""]  # fmt: skip
     return "\n".join([
-        "# Gallery", "", "Small scripts that run as they stand, in any folder. All numbers of the machines are synthetic.",
-        "", '<nav class="gallery" aria-label="Examples">', *cards, "</nav>", "", *parts,
+        "# Gallery", "", "Small scripts that run as they stand, in any folder. All numbers are synthetic.", "",
+        '<nav class="gallery" aria-label="Examples">', *cards, "</nav>", "", *parts,
     ])  # fmt: skip
 
 
@@ -100,8 +100,8 @@ def commands() -> str:
     """All commands: what each is for, its arguments and options, examples."""
     os.environ["COLUMNS"] = "78"
     top = cli.parser()
-    lines = ["# Commands", "", "A command has a section, with its arguments and options. `feedsim COMMAND --help` prints "
-             "the same in a terminal.", ""]  # fmt: skip
+    lines = ["# Commands", "", "Arguments and options of every command. `feedsim COMMAND --help` prints them in a "
+             "terminal.", ""]  # fmt: skip
     found = list(_subcommands(top))
     lines += ["## Every command takes", "", *_options(_group(found[0][1], SHARED)), ""]
     for name, parser in found:
@@ -261,7 +261,8 @@ def control_names() -> str:
     lines = ["# Names of parameters in controls", "", "A value in the control's unit, times the factor, is that of a "
              "machine file. [How to use it](../controls.md).", ""]  # fmt: skip
     for name in control.CONTROLS:
-        lines += [f"## `{name}`: {CONTROLS[name]}", "", "| ours | number | name | unit | times this is ours | confirmed | source |",
+        lines += [f"## `{name}`: {CONTROLS[name]}", "",
+                  "| ours | number | name | unit | times this is ours | confirmed | source |",
                   "|---|---|---|---|---|---|---|"]  # fmt: skip
         for row in (row for row in control.table() if row.control == name):
             factor = f"{row.factor:.6g} {row.si}".strip()
@@ -274,8 +275,8 @@ def control_names() -> str:
 
 def signal_names() -> str:
     """Names of columns that are known without a mapping file."""
-    lines = ["# Names of signals", "", "Columns of records that are known by their names. Case, blanks, underscores, hyphens "
-             "and the axis before or behind do not matter. [How records are read](../traces.md).", "",
+    lines = ["# Names of signals", "", "Columns of records that are known by their names. Case, blanks, underscores, "
+             "hyphens and the axis before or behind do not matter. [How records are read](../traces.md).", "",
              "| signal | where from | names |", "|---|---|---|"]  # fmt: skip
     rows: dict[tuple[str, str], list[str]] = {}
     for alias in ALIASES:
@@ -286,12 +287,13 @@ def signal_names() -> str:
 
 def benchmarks() -> str:
     """All tables of docs/benchmarks, with what they were measured on, and the plots."""
-    lines = ["# Benchmarks", "", "What `make bench` has measured. [Performance](../performance.md) has the figures that "
-             "matter most.", ""]  # fmt: skip
+    lines = ["# Benchmarks", "", "What `make bench` has measured. [Performance](../performance.md) has what matters "
+             "most.", ""]  # fmt: skip
     for file in sorted((ROOT / "docs" / "benchmarks").glob("*.json")):
         found = json.loads(file.read_text(encoding="utf-8"))
-        lines += [f"## {file.stem.replace('_', ' ')}", "", f"{found['date'][:10]}, version {found['versions']['feedsim']}, "
-                  f"{found['machine']['processor']}, {found['machine']['cores']} cores: `{found['command']}`", ""]  # fmt: skip
+        on = f"{found['machine']['processor']}, {found['machine']['cores']} cores: `{found['command']}`"
+        what = f"{found['date'][:10]}, version {found['versions']['feedsim']}, {on}"
+        lines += [f"## {file.stem.replace('_', ' ')}", "", what, ""]
         for number, table_ in enumerate(found["tables"]):
             lines += [table_, ""]
             for plot in PLOTS.get((file.stem, number), ()):

@@ -15,9 +15,8 @@ import shutil
 import sys
 from pathlib import Path
 
-import reference
-
 import feedsim
+import reference
 from feedsim.installation import shipped
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -164,8 +163,7 @@ def first_page(text: str, folder: Path) -> str:
 
 
 def main(folder: Path) -> None:
-    """Write the sources of the site into `folder`, which is made anew; what lies in its folder beside belongs beside the
-    pages as it is."""
+    """Write the sources of the site into `folder`, which is made anew; its folder `beside` is for beside the pages."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     shutil.copytree(DOCS / "images", folder / "images")

@@ -33,7 +33,7 @@ def slug(heading: str) -> str:
 
 def tasks() -> dict[str, list[str]]:
     """Every task of the first page -> the links that lead to how it is done."""
-    section = (DOCS / "index.md").read_text(encoding="utf-8").partition("## First tasks")[2]
+    section = (DOCS / "index.md").read_text(encoding="utf-8").partition("## First tasks")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", section, re.MULTILINE)[1:]
     return {task: re.findall(r"\]\(([^)]+)\)", links) for task, links in rows if "---" not in task}
 

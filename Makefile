@@ -241,8 +241,9 @@ bench: fmus $(VENV)/.importers ## measure everything, other simulators too; writ
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py
 
-docs: $(VENV)/.dev $(VARIABLES) ## build the documentation as a site that opens from disk, into build/site
+docs: fmus $(VENV)/.dev ## build the documentation as a site that opens from disk, into build/site
 	rm -rf $(BUILD)/site
+	@if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; else echo "no compiler for WebAssembly here: a picture in place of the machine"; fi
 	$(PY) docs/site/stage.py $(BUILD)/site-source
 	$(PY) -m sphinx -q -W --keep-going -b html -c docs/site -d $(BUILD)/site-trees $(BUILD)/site-source $(BUILD)/site
 	@echo "open $(BUILD)/site/index.html"
@@ -254,31 +255,31 @@ pictures: fmus $(VENV)/.run ## draw README's and docs' pictures anew (docs/image
 	$(PY) docs/pictures.py $(ARGS)
 	$(PY) docs/diagrams.py
 
-causes: fmus $(VENV)/.run ## put causes into the machine, diagnose its circles, write docs/causes.md and its picture (minutes)
+causes: fmus $(VENV)/.run ## put causes into the machine, diagnose its circles, write docs/trust.md and its picture (minutes)
 	$(PY) docs/causes.py
 
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py
 
-identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320 logs of known axes, good and flawed (half an hour; docs/identification.md)
+identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320 logs of known axes, good and flawed (half an hour; docs/trust.md)
 	$(PY) benchmarks/identification_study.py
 
-drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of eleven (half an hour of one core; docs/replay.md)
+drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of eleven (half an hour of one core; docs/trust.md)
 	$(PY) benchmarks/drive_study.py
 
-circle-study: fmus $(VENV)/.run ## whether causes come out of circles that no rule was set on (a minute; ARGS='--seed 7': others; docs/causes.md)
+circle-study: fmus $(VENV)/.run ## whether causes come out of circles that no rule was set on (a minute; ARGS='--seed 7': others; docs/trust.md)
 	$(PY) benchmarks/circle_study.py $(ARGS)
 
-compensation-study: fmus $(VENV)/.run ## what friction compensations take off on three machines (some five minutes; docs/tuning.md)
+compensation-study: fmus $(VENV)/.run ## what friction compensations take off on three machines (some five minutes; docs/trust.md)
 	$(PY) benchmarks/compensation_study.py
 
-band-coverage: fmus $(VENV)/.run ## whether bands from sets identified at 5 % noise hold the truth (some ten minutes; docs/uncertainty.md)
+band-coverage: fmus $(VENV)/.run ## whether bands from sets identified at 5 % noise hold the truth (some ten minutes; docs/trust.md)
 	$(PY) benchmarks/coverage.py
 
-friction-laws: fmus $(VENV)/.run ## compare Coulomb, Stribeck, LuGre and Maxwell slip in and out of sample (two minutes; ARGS='--intervals 60': whether intervals of Maxwell slip hold; docs/friction-laws.md)
+friction-laws: fmus $(VENV)/.run ## compare Coulomb, Stribeck, LuGre and Maxwell slip in and out of sample (two minutes; ARGS='--intervals 60': whether intervals of Maxwell slip hold; docs/trust.md)
 	$(PY) benchmarks/friction_laws.py --write $(ARGS)
 
-identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/identification.md)
+identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/trust.md)
 	$(PY) benchmarks/identification.py
 
 # --- keep ----------------------------------------------------------------------------------------------------------

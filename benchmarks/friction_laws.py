@@ -12,7 +12,7 @@ speed, fitted by least squares with the inertia and the delay that LuGre's fit h
                                                              many drawn axes (gms_intervals.py; ten seconds of one core
                                                              an axis); what is in build/friction-laws is not drawn again
 
-Prints the table; `make friction-laws` writes it into docs/friction-laws.md.
+Prints the table; `make friction-laws` writes its summary into docs/trust.md.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS, GMS
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "friction-laws.md"
+PAGE = ROOT / "docs" / "trust.md"
 MACHINES = ROOT / "scenarios" / "machines"
 LAWS = {"LuGre": (Friction.law, FRICTION_ROLE.shipped), "GMS": (GMS, FRICTION_UNITS[GMS])}
 MOVES = 0.01  # of the highest speed: above, an axis moves
@@ -241,6 +241,19 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def summary(rows: Sequence[Row]) -> str:
+    """A line per record: of each law what is left out of sample, and of its slow rows, in %; the least in bold."""
+    laws = list(dict.fromkeys(row.law for row in rows))
+    lines = [f"| record | {' | '.join(laws)} |", f"|---|{'---|' * len(laws)}"]
+    for case in dict.fromkeys(row.case for row in rows):
+        own = [row for row in rows if row.case == case]
+        best = min(row.outside for row in own)
+        cells = [f"{100 * row.outside:.2f}, {100 * row.slow:.2f}" for row in own]
+        cells = [f"**{cell}**" if row.outside == best else cell for row, cell in zip(own, cells, strict=True)]
+        lines.append(f"| {case} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def _page(name: str) -> tuple[str, str, str]:
     """The page up to its table of that name, the table, and what follows it."""
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
@@ -288,7 +301,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         head, before, rest = _page("laws")
         own = {row.case for row in rows}
         kept = [line for line in before.strip().splitlines()[2:] if line.split("|")[1].strip() not in own]
-        titles, line, *made = table(rows).splitlines()
+        titles, line, *made = summary(rows).splitlines()
         whole = "\n".join([titles, line, *kept, *made])
         PAGE.write_text(f"{head}\n\n{whole}\n\n{rest}", encoding="utf-8")
     return 0

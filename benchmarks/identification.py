@@ -2,7 +2,7 @@
 
 Run by ``make identification-accuracy`` (some ten minutes). The experiments of scenarios/identify_*.yaml run once on the
 whole machine and are then logged again and again, with other noise. The default machine, whose numbers are synthetic
-and known. Writes table.md; what it shows is explained in docs/identification.md.
+and known. Writes table.md; what it shows is explained in docs/trust.md.
 """
 
 from __future__ import annotations

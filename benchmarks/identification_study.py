@@ -3,7 +3,7 @@
 Run by ``make identification-study`` (some half an hour on one core). Every log of identification_logs.py is written
 as files, read and identified as feedsim does it, and judged: what is called "estimated" must hold the
 truth in its 95 % interval, and where it does not, a warning must name the cause. Leaves study.jsonl, a line per log,
-and table.md; what they show is explained in docs/identification.md.
+and table.md; what they show is explained in docs/trust.md.
 """
 
 from __future__ import annotations

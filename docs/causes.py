@@ -1,4 +1,4 @@
-"""The table of docs/causes.md, and its picture: causes put into the machine, and what the diagnosis says.
+"""The table of docs/trust.md, and its picture: causes put into the machine, and what the diagnosis says.
 
 May use: the package. Start reading at main(). `make causes` runs it; every figure follows from the units in fmus/.
 """
@@ -78,25 +78,24 @@ CAUSES = (
 
 
 def main() -> None:
-    """Write table and picture anew."""
+    """Write table and picture anew; all feeds and radii are printed, the page has those of the picture."""
     rows, shown = [], {}
     for cause in CAUSES:
         for feed in cause.feeds:
-            cells = []
             for radius in RADII:
                 found, paths = diagnosis(cause, feed, radius)
-                cells.append(words(found, cause))
+                said = words(found, cause)
                 if (feed, radius) == SHOWN:
+                    rows.append((cause.title, said))
                     shown[cause.title] = paths
-                print(cause.title, feed, radius, cells[-1], flush=True)
-            rows.append((cause.title if feed == cause.feeds[0] else "", feed, cells))
+                print(cause.title, feed, radius, said, flush=True)
     write(rows, shown)
 
 
-def write(rows: Sequence[tuple[str, float, list[str]]], shown: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> None:
+def write(rows: Sequence[tuple[str, str]], shown: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> None:
     """Table into the page, and the picture."""
     picture(shown, HERE / "images" / "causes.svg")
-    page = HERE / "causes.md"
+    page = HERE / "trust.md"
     text = page.read_text(encoding="utf-8")
     head, rest = text.split(BEGIN)
     page.write_text(f"{head}{BEGIN}\n{table(rows)}{END}{rest.split(END)[1]}", encoding="utf-8")
@@ -144,9 +143,8 @@ def words(found: Diagnosis, cause: Cause) -> str:
     return "; ".join(named) or "none"
 
 
-def table(rows: Sequence[tuple[str, float, list[str]]]) -> str:
-    head = f"| cause | feed | {' | '.join(f'R {radius} mm' for radius in RADII)} |\n|---|---|{'---|' * len(RADII)}\n"
-    return head + "".join(f"| {title} | {feed / 1000:g} m/min | {' | '.join(cells)} |\n" for title, feed, cells in rows)
+def table(rows: Sequence[tuple[str, str]]) -> str:
+    return "| cause | what a report names |\n|---|---|\n" + "".join(f"| {title} | {said} |\n" for title, said in rows)
 
 
 def picture(shown: dict[str, list[tuple[np.ndarray, np.ndarray]]], file: Path) -> None:

@@ -18,7 +18,8 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS / "site"))
 import commands  # noqa: E402  (a tool of the documentation, in no package)
 
-QUICK = [ROOT / "README.md", DOCS / "index.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("how-to/*.md"))]
+QUICK = [ROOT / "README.md", DOCS / "index.md", DOCS / "circles.md",
+         *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("how-to/*.md"))]  # fmt: skip
 EVERY = os.environ.get("FEEDSIM_DOCS_ALL") == "1"
 
 
@@ -32,7 +33,7 @@ def slug(heading: str) -> str:
 
 def tasks() -> dict[str, list[str]]:
     """Every task of the first page -> the links that lead to how it is done."""
-    section = (DOCS / "index.md").read_text(encoding="utf-8").partition("## First tasks")[2]
+    section = (DOCS / "index.md").read_text(encoding="utf-8").partition("## First tasks")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", section, re.MULTILINE)[1:]
     return {task: re.findall(r"\]\(([^)]+)\)", links) for task, links in rows if "---" not in task}
 

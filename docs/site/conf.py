@@ -6,6 +6,7 @@ Start with stage.py, which lays the pages out that are read here.
 
 from __future__ import annotations
 
+import shutil
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -40,6 +41,7 @@ html_theme = "furo"
 html_title = "feedsim"
 html_static_path = ["_static"]
 html_css_files = ["feedsim.css"]
+html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 html_show_sourcelink = False
 html_copy_source = False
 html_show_sphinx = False
@@ -73,12 +75,14 @@ ACCESSIBLE = (
 
 
 def _accessible(app: Sphinx, exception: Exception | None) -> None:
-    """Complete the pages as they were written; the theme has no setting for this."""
+    """Complete the pages as they were written; the theme has no setting for this. Then what lies beside them."""
     for path in Path(app.outdir).rglob("*.html") if exception is None else ():
         text = path.read_text(encoding="utf-8")
         for before, after in ACCESSIBLE:
             text = text if after in text and after != "<td></td>" else text.replace(before, after)  # written before
         path.write_text(text, encoding="utf-8")
+    if exception is None and (beside := Path(app.srcdir) / "beside").is_dir():
+        shutil.copytree(beside, app.outdir, dirs_exist_ok=True)
 
 
 def setup(app: Sphinx) -> None:

@@ -15,7 +15,9 @@ import shutil
 import sys
 from pathlib import Path
 
+import feedsim
 import reference
+from feedsim.installation import shipped
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -25,19 +27,25 @@ ELSEWHERE = {
     ROOT / "CHANGELOG.md": "changelog.md",
     ROOT / "README.md": "index.md",
     ROOT / "SECURITY.md": "security.md",
-    DOCS / "README.md": "index.md",
     ROOT / "examples" / "README.md": "reference/gallery.md",
     **{ROOT / "src" / unit / "README.md": f"units/{unit.removesuffix('_fmu')}.md"
        for unit in ("plant_fmu", "controller_fmu", "friction_fmu", "friction_gms_fmu", "setpoint_fmu", "machine_fmu",
                     "exchange", "page")},
 }  # fmt: skip
+# Sources of pages of the reference: a link to one is a link to the page.
+MADE = {
+    DOCS / "benchmarks": "reference/benchmarks.md",
+    ROOT / "master" / "feedsim" / "control" / "names.csv": "reference/control-names.md",
+    ROOT / "master" / "feedsim" / "identify" / "signals.py": "reference/signal-names.md",
+    ROOT / "scenarios" / "schemas": "reference/files.md",
+}
 _LINK = re.compile(r"(?P<text>!?\[(?:[^\[\]]|\[[^\]]*\])*\])\((?P<target>[^)#\s]+)(?P<anchor>#[^)\s]*)?\)")
 
 
 def place(document: Path) -> str | None:
     """Where a document of the repository stands on the site; None: it is no page."""
-    if document in ELSEWHERE:
-        return ELSEWHERE[document]
+    if document in ELSEWHERE or document in MADE:
+        return ELSEWHERE.get(document) or MADE[document]
     if document.is_relative_to(DOCS) and document.suffix == ".md":
         return document.relative_to(DOCS).as_posix()
     return None
@@ -66,11 +74,17 @@ def relinked(text: str, document: Path) -> str:
     return "".join(shown).replace("```csv\n", "```text\n")  # Pygments knows no tables
 
 
-_ROW = re.compile(r"^\| ([A-Za-z][A-Za-z -]+?) \|", re.MULTILINE)
+_ROW = re.compile(r"^\| ([A-Za-z][A-Za-z -]+?) \| ([^|]*?) \|", re.MULTILINE)
 # What is no prose: blocks and rows, headings, code, formulas, links, tags.
 _NO_PROSE = re.compile(
     r"(^ *(`{3,}|:{3,}).*?^ *\2|^\$\$.*?\$\$|^(?:\||#|    |!\[).*?$|<!--.*?-->|`[^`]*`|\$[^$]*\$"
     r"|!?\[[^\]]*\](?:\([^)]*\))?|<[^>]*>|\*\*[^*]*\*\*)",
+    re.DOTALL | re.MULTILINE,
+)
+# The same with rows let through, but for their heads, and links that stand already left out whole.
+_NO_CELL = re.compile(
+    r"""(<a class="term".*?</a>|^\|[^\n]*\n(?=\|[-|: ]+\|$)|"""
+    + _NO_PROSE.pattern[1:].replace(r"^(?:\||#|    |!\[)", r"^(?:#|    |!\[)"),
     re.DOTALL | re.MULTILINE,
 )
 _UNLINKED = ("glossary.md", "changelog.md", "contributing.md", "style.md", "index.md")
@@ -79,7 +93,7 @@ _UNLINKED = ("glossary.md", "changelog.md", "contributing.md", "style.md", "inde
 def terms() -> list[str]:
     """Terms of the glossary, the longest first."""
     text = (DOCS / "glossary.md").read_text(encoding="utf-8")
-    return sorted((term for term in _ROW.findall(text) if term != "term"), key=len, reverse=True)
+    return sorted((term for term, _ in _ROW.findall(text) if term != "term"), key=len, reverse=True)
 
 
 def anchor_of(term: str) -> str:
@@ -87,21 +101,34 @@ def anchor_of(term: str) -> str:
     return "term-" + term.replace(" ", "-")
 
 
+def _entry(term: str, german: str) -> str:
+    """Begin of a term's row: anchor, and entries of the index, which the search ranks first (`!`)."""
+    return (
+        f'| <a id="{anchor_of(term)}"></a>{{index}}`{term} <!{term}>` | '
+        f"{', '.join(f'{{index}}`{each} <!{each}>`' for each in german.split(', '))} |"
+    )
+
+
 def with_terms(text: str, page: str) -> str:
-    """The text of a page with the first mention of every glossary term as a link; the glossary with its anchors."""
+    """The text of a page with the first mention of every glossary term as a link; the glossary with its anchors, and
+    with its terms in both languages for the search."""
     if page == "glossary.md":
-        return _ROW.sub(
-            lambda row: f'| <a id="{anchor_of(row[1])}"></a>{row[1]} |' if row[1] != "term" else row[0], text
-        )
+        return _ROW.sub(lambda row: _entry(row[1], row[2]) if row[1] != "term" else row[0], text)
     if page in _UNLINKED:
         return text
-    up = "../" * page.count("/")
-    left = terms()
+    up, left = "../" * page.count("/"), terms()
+    for skipped in (_NO_PROSE, _NO_CELL):  # a term that no prose of the page has, in its tables
+        text = _linked(text, skipped, left, up)
+    return text
+
+
+def _linked(text: str, skipped: re.Pattern[str], left: list[str], up: str) -> str:
+    """The text with the first mention of the terms in `left` as a link, which are taken out of it; not in `skipped`."""
     parts = []
     at = 0
-    for skipped in [*_NO_PROSE.finditer(text), None]:
-        parts += [text[at : skipped.start() if skipped else len(text)], skipped[0] if skipped else ""]
-        at = skipped.end() if skipped else at
+    for each in [*skipped.finditer(text), None]:
+        parts += [text[at : each.start() if each else len(text)], each[0] if each else ""]
+        at = each.end() if each else at
     for number in range(0, len(parts), 2):
         found = []  # place, words and term, of this stretch of prose
         for term in list(left):
@@ -117,8 +144,26 @@ def with_terms(text: str, page: str) -> str:
     return "".join(parts)
 
 
+_KNOBS = re.compile(r"<!-- knobs -->.*?<!-- knobs end -->", re.DOTALL)
+KNOBS = (
+    '<iframe class="machine" src="machine.html#lesson=1" title="The machine with its knobs: circle, diagnosis, lesson">'
+    '</iframe>\n\n<p class="machine"><a href="machine.html">The machine in a window of its own</a>. Its numbers are '
+    "<strong>synthetic</strong>: credible for a machining centre of nine tonnes, measured on none.</p>"
+)
+
+
+def first_page(text: str, folder: Path) -> str:
+    """The first page, with the machine in place of its picture where there is a module to compute it; no list of its
+    sections beside it."""
+    if (shipped("fmus") / "machine.wasm").is_file():
+        (folder / "beside").mkdir()
+        feedsim.export(ROOT / "scenarios" / "xz_circle.yaml", out=folder / "beside" / "machine.html")
+        text = _KNOBS.sub(KNOBS, text)
+    return f"---\nhide-toc: true\n---\n\n{text}"
+
+
 def main(folder: Path) -> None:
-    """Write the sources of the site into `folder`, which is made anew."""
+    """Write the sources of the site into `folder`, which is made anew; its folder `beside` is for beside the pages."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     shutil.copytree(DOCS / "images", folder / "images")
@@ -128,6 +173,7 @@ def main(folder: Path) -> None:
         target = folder / str(place(document))
         target.parent.mkdir(parents=True, exist_ok=True)
         text = with_terms(relinked(document.read_text(encoding="utf-8"), document), str(place(document)))
+        text = first_page(text, folder) if document == DOCS / "index.md" else text
         target.write_text(text, encoding="utf-8")
     for name, text in reference.pages().items():
         (folder / "reference").mkdir(exist_ok=True)

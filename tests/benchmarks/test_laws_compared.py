@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
-from friction_laws import Row, halves, main, table  # noqa: E402
+from friction_laws import Row, halves, main, summary, table  # noqa: E402
 
 from feedsim.identify.read import Provenance, Recorded  # noqa: E402
 from feedsim.identify.record import Record  # noqa: E402
@@ -49,6 +49,9 @@ def test_the_least_out_of_sample_is_in_bold() -> None:
     assert lines[0] == "| a | LuGre | 5 | 2.00 % | 3.00 % | 5.00 % |"
     assert "**2.00 %**" in lines[1]
     assert "**100.00 %**" in lines[2]
+    assert summary(rows[:2]).splitlines() == [
+        "| record | LuGre | GMS |", "|---|---|---|", "| a | 3.00, 5.00 | **2.00, 6.00** |"
+    ]  # fmt: skip
 
 
 def test_a_record_of_ones_own(fmus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -137,7 +137,7 @@ def test_the_page_of_an_index_has_no_link_that_leads_nowhere() -> None:
     addressed = table() | {"urls": {"Repository": "https://repository.example/feedsim/"}}
     page = metadata.readable_anywhere((ROOT / "README.md").read_text(encoding="utf-8"), addressed)
     assert not target.search(page)
-    assert f"(https://repository.example/feedsim/blob/v{VERSION}/docs/user-guide.md#python)" in page
+    assert f"(https://repository.example/feedsim/blob/v{VERSION}/docs/python.md)" in page
     assert f"](https://repository.example/feedsim/raw/v{VERSION}/docs/images/contour-XZ.png)" in page
 
 

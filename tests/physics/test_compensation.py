@@ -228,8 +228,8 @@ def test_a_changed_machine_has_the_same_compensation(done: Compensation, tmp_pat
 
 
 def test_table_of_the_document(done: Compensation) -> None:
-    """The rows of docs/compensation.md that are at hand, to the digits they are written with."""
-    text = (CIRCLE.parents[1] / "docs" / "compensation.md").read_text(encoding="utf-8")
+    """The rows of docs/tuning.md that are at hand, to the digits they are written with."""
+    text = (CIRCLE.parents[1] / "docs" / "tuning.md").read_text(encoding="utf-8")
     lines = text[text.index("| compensation | error |") :].split("\n\n")[0].splitlines()[2:]
     written = {tuple(cells[:2]): cells[2:] for cells in map(cells_of, lines)}
     for what, change, unit, left in rows_of(done):

@@ -113,7 +113,7 @@ def test_intervals_hold_as_often_as_they_say() -> None:
 
 @pytest.mark.parametrize(
     ("n", "least", "most"),
-    # docs/sweeps.md says 0.83 to 1 with 64 points. 60 seeds scatter by 0.05 (one deviation) at 0.83.
+    # docs/trust.md says 0.83 to 1 with 64 points. 60 seeds scatter by 0.05 (one deviation) at 0.83.
     [(64, 0.7, 1.0), (16, 0.5, 0.97)],
 )
 def test_total_intervals_of_the_g_function_hold_as_often_as_told(n: int, least: float, most: float) -> None:

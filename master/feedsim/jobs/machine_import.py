@@ -104,7 +104,7 @@ def machine_import(
         File | Sequence[File],
         Argument(
             "FILE",
-            "files of one control: archive, machine data, parameters of drives, lists, INI (docs/control_files.md)",
+            "files of one control: archive, machine data, parameters of drives, lists, INI (docs/controls.md)",
             many=True,
         ),
     ],

@@ -191,9 +191,9 @@ def _pictures(run: JudgedRun, shown: Sequence[CircleTask | PositioningTask]) -> 
         end = _slug(task.prefix)
         if isinstance(task, CircleTask):
             diagnosis = task.diagnosis(run.trace)
-            yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back, diagnosis))
             if diagnosis is not None:
                 yield _why(task.prefix, end, diagnosis)
+            yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back, diagnosis))
             if (torque := torque_picture(run.trace, task.turn, signs, f"torque-{end}")) is not None:
                 yield _figure(torque, bare=True)
         else:
@@ -245,9 +245,9 @@ def _keys(shown_tasks: Sequence[CircleTask | PositioningTask], figures: Mapping[
             for axis in task.turn.axes:  # the one height of a peak on a page, where a diagnosis has it
                 known = f"{task.prefix}.peak_{axis}" in figures
                 words[f"{'peak' if known else 'glitch'}_{axis}"] = (
-                    f"reversal peak, {axis} reverses" if known else f"quadrant glitch where {axis} reverses"
+                    f"reversal peak of {axis}" if known else f"quadrant glitch where {axis} reverses"
                 )
-            words |= {"G_b": "circular deviation G(b) of both directions"} if task.back is not None else {}
+            words |= {"G_b": "G(b), both directions"} if task.back is not None else {}
         else:
             axis = task.approach.axis
             words = {"overshoot": f"overshoot of {axis}", "settling_time": f"settling time of {axis}",

@@ -20,7 +20,7 @@ OF_CIRCLES = (
 )  # fmt: skip
 NOTE = (
     "Confirmed: a public source with meaning and unit was opened. Of all others the unit is an assumption: check it at "
-    "the control before you type a value. Names, units and sources: docs/control_names.md."
+    "the control before you type a value. Names, units and sources: docs/controls.md."
 )
 
 

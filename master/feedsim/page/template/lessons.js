@@ -45,7 +45,7 @@ const LESSONS = [
       `But look at the contour beside the reversals, and at what the diagnosis says: the axis does not lose motion there, it gains it, and G is larger than without. Turn the backlash compensation of ${b} back until no motion is gained.`],
     look: (held, view) => { const b = held.plane[1], at = figure_of(view, `.lost_motion_${b}`), G = um(figure_of(view, ".G")), glitch = um(figure_of(view, `.glitch_${b}`));
       return { done: at !== null && Math.abs(at) < 1, text: `glitch_${b} ${glitch}, G ${G}${at === null ? "" : `, ${b} ${at > 0 ? "loses" : "gains"} ${um(Math.abs(at))}`}.` }; },
-    after: "A compensation takes away what it is made for. Friction needs one of its own (docs/compensation.md), and too much of that dents the contour just so.",
+    after: "A compensation takes away what it is made for. Friction needs one of its own (docs/tuning.md), and too much of that dents the contour just so.",
   },
   {
     title: "Overshoot and ringing: a stop that is too eager",

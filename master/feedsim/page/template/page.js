@@ -347,7 +347,8 @@ addEventListener("hashchange", () => go_to(from_address()));
 
 const offered = LESSONS.filter(lesson => lesson.fits(HELD));
 
-function lesson_begin(lesson) {
+// seen: the lesson was asked for here; one that the address names takes no focus.
+function lesson_begin(lesson, seen = true) {
   const values = lesson.start(HELD, key => START[KNOBS.findIndex(knob => knob.key === key)]);
   view.lesson = { ...lesson, done: false };
   view.kept = view.kept_loop = null;
@@ -358,7 +359,9 @@ function lesson_begin(lesson) {
   by("lesson-state").textContent = "";
   for (const { row } of inputs) row.classList.remove("pointed");
   for (const key of lesson.turn(HELD)) { const k = KNOBS.findIndex(knob => knob.key === key); if (k >= 0) inputs[k].row.classList.add("pointed"); }
-  by("lesson").focus();
+  by("lesson-more").open = innerWidth >= 992 && innerHeight >= 740; // else its knobs would lie below the first screen
+  by("page").classList.add("in-lesson");
+  if (seen) by("lesson").focus();
 }
 
 function lesson_look() {
@@ -369,10 +372,12 @@ function lesson_look() {
   by("lesson").classList.toggle("done", done);
 }
 
-on("lesson-end", () => { view.lesson = null; by("lesson").hidden = true; for (const { row } of inputs) row.classList.remove("pointed"); go_to(START); });
+on("lesson-end", () => { view.lesson = null; by("lesson").hidden = true; by("page").classList.remove("in-lesson"); for (const { row } of inputs) row.classList.remove("pointed"); go_to(START); });
 for (const lesson of offered) element("button", { type: "button" }, by("lessons"), lesson.title).addEventListener("click", () => lesson_begin(lesson));
 by("lessons-part").hidden = !offered.length;
+const first = offered[Number(new URLSearchParams(location.hash.slice(1)).get("lesson")) - 1];
 
 view.state = from_address();
 sync();
+if (first) lesson_begin(first, false);
 begin_worker().catch(error => tell(`This browser cannot compute the machine: ${error.message}`, true));

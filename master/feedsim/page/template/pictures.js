@@ -55,7 +55,9 @@ function contour_chart(task, result, kept, peaks) {
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
   // The height is that of the figures, the larger of the two directions; its place is in the first turn, unless that of the other is higher.
   const glitches = new Map([turn, ...back ? [back] : []].map(entry => [entry.sense, contour(result.trace, entry).glitches]));
-  const marks = seen.glitches.map(({ name, angle, deviation }) => {
+  const marks = seen.glitches.map(({ name, angle, deviation }, quarter) => {
+    // The largest deviation at the border of its quadrant is the shape's, no peak behind a reversal.
+    if (Math.abs(modulo(angle - quarter * Math.PI / 2 + Math.PI, 2 * Math.PI) - Math.PI) > 40 / 180 * Math.PI) return null;
     if (!peaks) return mark(angle, deviation * 1e6, "");
     const own = peaks.filter(entry => entry.name === name), highest = less => own.reduce((best, entry) => Math.abs(entry.height) - less(entry) > Math.abs(best.height) - less(best) ? entry : best);
     const { height } = highest(() => 0), place = glitches.get(highest(entry => entry.sense === turn.sense ? 0 : HIGHER).sense).find(entry => entry.name === name);

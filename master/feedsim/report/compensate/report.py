@@ -201,7 +201,7 @@ def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
         provenance=provenance(compensation.after),
         footer=figures_footer(
             "Values in full precision: summary.json; time series: result.csv, uncompensated.csv, feedforward.csv.",
-            "docs/figures.md, docs/compensation.md",
+            "docs/figures.md, docs/tuning.md",
         ),
     )
 

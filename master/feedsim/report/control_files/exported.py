@@ -122,7 +122,7 @@ def report_of(
         provenance=provenance_section(
             [("Machine", machine.name), ("Control", archives[0].control)], hashed([("file", path) for path in inputs])
         ),
-        footer="The same as a table: sheet.csv. Names and their sources: docs/control_names.md.",
+        footer="The same as a table: sheet.csv. Names and their sources: docs/controls.md.",
     )
 
 

@@ -145,7 +145,7 @@ def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inp
         provenance=provenance_section(
             [("Control", reading.control)], hashed([("file", path) for path in inputs])
         ),
-        footer="Every value with its place: sheet.csv and the remarks in machine.yaml. Names: docs/control_names.md.",
+        footer="Every value with its place: sheet.csv and the remarks in machine.yaml. Names: docs/controls.md.",
     )  # fmt: skip
 
 

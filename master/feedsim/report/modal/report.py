@@ -143,7 +143,7 @@ def report_of(report: ModesReport) -> Report:
         provenance=provenance_section([("Response", report.file.name), ("Estimate", axis_modes.measured.method)],
                                       hashed(_files(report))),
         footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES_FILE}.",
-                              "docs/identification.md"),
+                              "docs/replay.md"),
     )  # fmt: skip
 
 

@@ -50,10 +50,14 @@ MAX_REPEATED = 2_000_000  # blocks that loops, jumps back and subprograms execut
 MAX_CALLS = 16  # levels of subprograms and repeated sections
 MAX_ELEMENTS = 100_000  # of an array
 
-# L and O call and name subprograms; an exponent is no word E.
-_PLAIN = r"[ \t]*([A-KMNP-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))"
-_PLAIN_BLOCK = re.compile(rf"(?:{_PLAIN}(?![.\d]|E[-+\d]))*[ \t]*")
-_PLAIN_WORD = re.compile(_PLAIN)
+# What most blocks have alone: letters and named values with a number. L and O call and name subprograms.
+_WORD = r"([A-KMNP-Z]|(?:CR|AR|TURN|RP|AP|ANG|RND|CHF|CHR)(?=[ \t]*=))[ \t]*=?[ \t]*([-+]?[\d.]+)"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?![.\d]|E[-+\d])"
+_PLAIN_BLOCK = {
+    True: re.compile(rf"(?:[ \t]*[A-KMNP-Z][ \t]*{_NUMBER})*[ \t]*"),
+    False: re.compile(rf"(?:[ \t]*(?:[A-KMNP-Z]|(?:CR|AR|TURN|RP|AP|ANG|RND|CHF|CHR)[ \t]*=)[ \t]*{_NUMBER})*[ \t]*"),
+}
+_PLAIN_WORD = re.compile(_WORD)
 _ADDRESS = re.compile(r"([A-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)")
 _ASSIGNED = re.compile(r"([A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z]\d*)[ \t]*=(?!=)")
 _INDEXED = re.compile(r"([A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z])[ \t]*(?=\[)")
@@ -135,7 +139,7 @@ class Interpreter:
         if not self.iso:
             _ = program.structure  # what is open or closed too often is a fault, whether it is reached or not
         self.program, self.recorder.file = program, program.index
-        code, recorder, begin = program.code, self.recorder, at
+        code, recorder, begin, is_plain = program.code, self.recorder, at, _PLAIN_BLOCK[self.iso].fullmatch
         result = "done"
         while at < stop:
             end = code.find("\n", at)
@@ -143,7 +147,7 @@ class Interpreter:
                 end = len(code)
             recorder.line = line
             text = code[at:end]
-            if _PLAIN_BLOCK.fullmatch(text):
+            if is_plain(text):
                 self.execute([(name, float(number)) for name, number in _PLAIN_WORD.findall(text)])
             else:
                 self.here = (at, line)
@@ -1213,7 +1217,7 @@ class Interpreter:
         if size == 0:
             return None
         plane, scale = self.recorder.plane(self.modal.plane)
-        return Corner(name, size * scale, feed or self.modal.corner_feed or None, plane, modal)
+        return Corner(name, size * scale, feed or self.modal.corner_feed or None, plane, modal, leg=name == "CHR")
 
     def _angled_line(
         self, target: list[float], axes: dict[int, Any], values: dict[str, Any], corner: Corner | None

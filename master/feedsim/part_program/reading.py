@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from feedsim.errors import InputError
+from feedsim.part_program.conversational import Conversational
 from feedsim.part_program.interpreter import Interpreter
 from feedsim.part_program.moves import Moves
 from feedsim.part_program.recorder import Fault, Recorder
@@ -79,9 +80,12 @@ def interpret(
         return called[wanted]
 
     try:
+        reader: Interpreter | Conversational
         if dialect == "heidenhain":
-            raise Fault("BEGIN", "not yet")
-        reader = Interpreter(recorder, program, iso=dialect == "iso", skip=skip, tolerance=tolerance, offsets=offsets)
+            reader = Conversational(recorder, program)
+        else:
+            iso = dialect == "iso"
+            reader = Interpreter(recorder, program, iso=iso, skip=skip, tolerance=tolerance, offsets=offsets)
         reader.run(programs[0], 0, 1, len(programs[0].code))
         reader.finish()
         if not recorder.rows and not recorder.count:

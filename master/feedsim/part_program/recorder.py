@@ -53,9 +53,9 @@ class Fault(Exception):
 
 @dataclass(frozen=True)
 class Corner:
-    """Between the last movement and the next one: RND (rounding), CHR (leg) or CHF (length of a chamfer), size in mm.
+    """Between the last movement and the next one. word: RND, RNDM, CHR, CHF. size [mm]: radius, or of a chamfer.
 
-    modal: RNDM, which asks for nothing where there is no corner. feed [mm/s]: FRC, or None. plane: its axes, as unit
+    leg: whether the size of a chamfer is that of its legs, not its own length. modal: RNDM, which asks for nothing where there is no corner. feed [mm/s]: FRC, or None. plane: its axes, as unit
     vectors of the machine's frame.
     """
 
@@ -64,6 +64,7 @@ class Corner:
     feed: float | None
     plane: tuple[Vector, Vector]
     modal: bool = False
+    leg: bool = False
 
 
 class Recorder:
@@ -83,6 +84,7 @@ class Recorder:
         self.position: Sequence[float] = tuple(given.get(name, 0.0) for name in self.names)
         self.frame = Frame(IDENTITY, (0.0,) * len(self.names))
         self.identity = True
+        self._axes_of_arcs: dict[tuple[int, int, int], Vector] = {}
         self.corner: Corner | None = None
         self.file, self.line = 0, 0
         self.rows: list[tuple[Any, ...]] = []
@@ -103,6 +105,7 @@ class Recorder:
             raise ValueError("the frame scales by more than 10,000, or shifts by more than 10 km")
         self.frame = frame
         self.identity = frame.plain and not any(frame.offset)
+        self._axes_of_arcs = {}
 
     def straight(self, point: Sequence[float], rapid: bool, feed: float, options: Options) -> None:
         """A line, or a rapid, to a point of the program. feed [mm/s]."""
@@ -130,26 +133,32 @@ class Recorder:
 
     def arc_in_space(self, plane: tuple[int, int, int], start: Sequence[float], arc: Arc, turns: int) -> ArcInSpace:
         """An arc of the program's plane (axes: first, second, normal) in the machine's frame, with additional turns."""
-        first, second, normal = plane
-        centre = list(start[:3])
+        first, second, _ = plane
+        about = self._axis_of(plane)
+        centre = list(start)
         centre[first], centre[second] = arc.centre
-        u, v = (self.frame.linear([float(i == axis) for i in range(3)]) for axis in (first, second))
-        size = math.hypot(*u)
-        if abs(size - math.hypot(*v)) > 1e-9 * size or abs(dot(u, v)) > 1e-9 * size**2:
-            raise ValueError("the frame scales the axes of the arc's plane differently, which makes it an ellipse")
-        about = unit(cross(u, v))
-        along = self.frame.linear([float(i == normal) for i in range(3)])
-        if math.hypot(*cross(about, along)) > 1e-9 * math.hypot(*along):
-            raise ValueError("the frame inclines the axis of the arc")
-        about = (about[0] * arc.sense, about[1] * arc.sense, about[2] * arc.sense)
-        return self.frame.machine([*centre, *start[3:]])[:3], about, arc.angle + 2 * math.pi * turns
+        if arc.sense < 0:
+            about = (-about[0], -about[1], -about[2])
+        moved = centre if self.identity else self.frame.machine(centre)
+        return moved[:3], about, arc.angle + 2 * math.pi * turns
+
+    def _axis_of(self, plane: tuple[int, int, int]) -> Vector:
+        """Axis of counter-clockwise arcs of the program's plane, in the machine's frame."""
+        if plane not in self._axes_of_arcs:
+            (u, v), _ = self.plane(plane)
+            along = self.frame.linear([float(i == plane[2]) for i in range(3)])
+            about = cross(u, v)
+            if abs(dot(u, v)) > 1e-9 or math.hypot(*cross(about, along)) > 1e-9 * math.hypot(*along):
+                raise ValueError("the frame inclines the axes of the plane, which makes an arc an ellipse")
+            self._axes_of_arcs[plane] = about
+        return self._axes_of_arcs[plane]
 
     def plane(self, plane: tuple[int, int, int]) -> tuple[tuple[Vector, Vector], float]:
         """First and second axis of the program's plane, as unit vectors of the machine's frame; their scale."""
         u, v = (self.frame.linear([float(i == axis) for i in range(3)]) for axis in plane[:2])
         size = math.hypot(*u)
         if abs(size - math.hypot(*v)) > 1e-9 * size:
-            raise ValueError("the frame scales the axes of the plane differently")
+            raise ValueError("the frame scales the axes of the plane differently, which makes an arc an ellipse")
         return (unit(u), unit(v)), size
 
     def tangent(self) -> Vector | None:
@@ -210,7 +219,7 @@ class Recorder:
 
         inserted: ArcInSpace = NO_ARC
         if corner.word in ("CHF", "CHR"):
-            a, b = chamfer(first, second, *((corner.size, 0.0) if corner.word == "CHR" else (0.0, corner.size)))
+            a, b = chamfer(first, second, *((corner.size, 0.0) if corner.leg else (0.0, corner.size)))
         else:
             a, b, round_ = rounding(first, second, corner.size)
             normal = cross(u, v)

@@ -1402,9 +1402,9 @@ class Interpreter:
     def _iso_index(scan: Scanner) -> int:
         """Number of a parameter, after #."""
         found = scan.take(re.compile(r"\d+"))
-        index = (
-            _parameter(found[0]) if found else whole(scan.number("#") if scan.rest().startswith("[") else math.nan, "#")
-        )
+        if not found and not scan.rest().startswith("["):
+            raise Fault("#", "the number of a parameter is expected; names and parameters of parameters are not supported")
+        index = _parameter(found[0]) if found else whole(scan.number("#"), "#")
         if not 0 < index < 5000:
             raise Fault(f"#{index}", "parameters #1 to #4999 are known; those beyond are the control's")
         return index

@@ -200,11 +200,13 @@ class Recorder:
         """Cuts the last movement, adds the rounding or chamfer. Returns what is left of the next movement's arc."""
         corner = self.corner
         assert corner is not None
-        here, row = self.position, self.rows[-1]
-        first = self._element(row[0], self._before, here, row[2:5])
+        here, row = self.position, self._last
+        first = None
+        if row is not None and self.rows and self.rows[-1] is row:
+            first = self._element(row[0], self._before, here, row[2:5])
         second = self._element(motion, here, end, arc)
         self.corner = None
-        if first is None or second is None:
+        if row is None or first is None or second is None:
             if corner.modal:
                 return arc
             raise Fault(corner.word, "a movement at the corner has no way in the plane")

@@ -140,7 +140,7 @@ def arc_about(start: Point, end: Point, centre: Point, sense: int) -> Arc:
             f"differ by {allowed_difference(at_start):.3g} mm"
         )
     if moved:
-        centre = (centre[0] - moved * (start[0] - end[0]) / chord, centre[1] - moved * (start[1] - end[1]) / chord)
+        centre = (centre[0] + moved * (start[0] - end[0]) / chord, centre[1] + moved * (start[1] - end[1]) / chord)
     return Arc(centre, sense, swept(start, end, centre, sense))
 
 

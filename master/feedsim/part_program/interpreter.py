@@ -490,7 +490,7 @@ class Interpreter:
 
     def _for(self, scan: Scanner, word: str) -> None:
         found = scan.take(_ASSIGNED)
-        if not found or found[1] in self.places or not (found[1] in self.variables or found[1][0] == "R"):
+        if not found or not (found[1] in self.variables or re.fullmatch(r"R\d+", found[1])):
             raise Fault(word, f"a variable is expected before {scan.rest() or 'the end of the block'}: FOR I = 1 TO 10")
         first = scan.number(word)
         if not scan.accept("TO"):
@@ -1141,8 +1141,9 @@ class Interpreter:
                 if not self._angled_line(target, axes, values, corner):
                     return
             elif not axes and not is_polar:
-                if values:
-                    return
+                if corner is not None and not corner.modal:
+                    raise Fault(corner.word, "a corner stands in a block with a movement")
+                return
             self._straight(motion, target, options)
         elif self.open_line is not None:
             raise Fault("ANG", "the end of the line before is missing: this block must have ANG and both coordinates")

@@ -257,7 +257,9 @@ def test_blending() -> None:
     moves = read(program)
     none = math.nan
     assert moves.blending.tolist() == [0, 1, 2, 2, 0, 3, 3, 3, 0, 3, 1]
-    assert moves.tolerance * 1e3 == pytest.approx([none, none, 1, 0.5, none, 0.1, 0.02, 0.02, none, 0.1, none], nan_ok=True)
+    assert moves.tolerance * 1e3 == pytest.approx(
+        [none, none, 1, 0.5, none, 0.1, 0.02, 0.02, none, 0.1, none], nan_ok=True
+    )
     assert Blending(moves.blending[-1]) is Blending.CONTINUOUS
 
 

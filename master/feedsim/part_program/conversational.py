@@ -41,7 +41,9 @@ _REFUSED = {
 }
 _M_REFUSED = {
     **dict.fromkeys((89, 99), "cycles are not supported: write out their movements"),
-    **dict.fromkeys((92, 118, 128, 130, 136, 140, 144), "the function moves axes, or changes the feed, in ways not supported"),
+    **dict.fromkeys(
+        (92, 118, 128, 130, 136, 140, 144), "the function moves axes, or changes the feed, in ways not supported"
+    ),
 }
 MAX_REPETITIONS = 65534
 
@@ -75,6 +77,9 @@ class Conversational:
         self.tolerance = 0.0
         self.depth, self.repeated = 0, 0
         self.program: Program | None = None
+        self.here: Place = (0, 1)  # of the block, where a jump leads, and what follows the block
+        self.jump: Place | None = None
+        self.behind = 0
 
     # --- Blocks ------------------------------------------------------------------------------------------------------
 
@@ -122,7 +127,8 @@ class Conversational:
             else:
                 at, line = self.behind, line + program.code.count("\n", at, self.behind)
         self.depth -= 1
-        self.program, self.recorder.file, self.recorder.line = before
+        if self.depth:  # what is said of the whole program is said of its last line
+            self.program, self.recorder.file, self.recorder.line = before
         return going
 
     def _spend(self, blocks: int) -> None:
@@ -219,7 +225,7 @@ class Conversational:
                 raise Fault(word, "IF is missing")
             a = self._number(scan, word)
             if not scan.accept({9: "EQU", 10: "NE", 11: "GT", 12: "LT"}[number]):
-                raise Fault(word, f"{ {9: 'EQU', 10: 'NE', 11: 'GT', 12: 'LT'}[number]} is missing")
+                raise Fault(word, f"{ {9: 'EQU', 10: 'NE', 11: 'GT', 12: 'LT'}[number] } is missing")
             b = self._number(scan, word)
             if not (scan.accept("GOTO") and scan.accept("LBL")):
                 raise Fault(word, "GOTO LBL is missing")
@@ -394,7 +400,9 @@ class Conversational:
     def _need_plane(self, word: str) -> None:
         for place in self.plane[:2]:
             if self.recorder.names[place] in self.missing:
-                raise Fault(word, f"the plane needs the axis {self.recorder.names[place]}, which the machine does not have")
+                raise Fault(
+                    word, f"the plane needs the axis {self.recorder.names[place]}, which the machine does not have"
+                )
 
     def _centre(self, scan: Scanner) -> None:
         words = self._words(scan, "CC")
@@ -421,7 +429,9 @@ class Conversational:
         if size is None or size <= 0 or words.axes or words.polar:
             raise Fault(word, "RND has a radius R above 0, CHF a length above 0")
         plane, _ = self.recorder.plane(self.plane)
-        self.recorder.corner = Corner(word, size, words.feed, plane, leg=word == "CHF")
+        self.recorder.corner = Corner(
+            word, size, words.feed, plane, self.recorder.line, self.recorder.file, leg=word == "CHF"
+        )
 
     def _polar(self, words: Words, word: str) -> tuple[float, float]:
         """Polar radius and angle [degrees] of the end, about the pole CC."""

@@ -341,11 +341,11 @@ class Scanner:
             return not operand if name == "NOT" else float(~whole(float(operand), name))
         if name in FUNCTIONS:
             return self._called(name, *FUNCTIONS[name])
-        value = self.read(self, name)
-        if value is None:
+        variable = self.read(self, name)
+        if variable is None:
             self.at = begun
             raise Fault(name, "the variable is not defined")
-        return value
+        return variable
 
     def _called(self, name: str, count: int, function: Callable[..., float]) -> float:
         self.expect("(", name)
@@ -356,7 +356,13 @@ class Scanner:
         if len(arguments) != count:
             raise Fault(name, f"{name} has {count} arguments, not {len(arguments)}")
         self._comparison = False
-        return self.finite(function(*arguments), name)
+        return self._result(name, function, *arguments)
+
+    def _result(self, name: str, function: Callable[..., float], *arguments: float) -> float:
+        try:
+            return self.finite(function(*arguments), name)
+        except OverflowError:
+            raise Fault(name, "a value is too large") from None
 
     def _iso_primary(self, word: str) -> Value | None:
         """As LinuxCNC: [ ] for parentheses, #5 for parameters, FUNCTION[ ]."""
@@ -382,7 +388,7 @@ class Scanner:
         if name in ISO_FUNCTIONS:
             self.at += len(name)
             self.expect("[", name)
-            value = self.finite(ISO_FUNCTIONS[name](self.number(name)), name)
+            value = self._result(name, ISO_FUNCTIONS[name], self.number(name))
             self.expect("]", name)
             return value
         return None

@@ -1,4 +1,4 @@
-"""Frames, arcs and rounded corners of NC programs. Lengths in mm, angles in rad. What is impossible raises ValueError."""
+"""Frames, arcs and rounded corners of NC programs. Lengths in mm, angles in rad; what is impossible is a ValueError."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def turn(vector: Vector, normal: Vector, angle: float) -> Vector:
 
 @dataclass(frozen=True)
 class Frame:
-    """machine = matrix point + offset. matrix: of X, Y, Z, rows. offset: of all axes [mm]; axes beyond are shifted only."""
+    """machine = matrix point + offset. matrix: of X, Y, Z, rows. offset [mm]: of all axes; others are shifted only."""
 
     matrix: tuple[Vector, Vector, Vector]
     offset: tuple[float, ...]
@@ -136,8 +136,8 @@ def arc_about(start: Point, end: Point, centre: Point, sense: int) -> Arc:
     moved = (at_start**2 - at_end**2) / (2 * chord) if chord >= MIN_DISTANCE else 0.0
     if max(abs(at_start - at_end), abs(moved)) > allowed_difference(at_start):
         raise ValueError(
-            f"the centre of the arc is off: radius {at_start:.6g} mm at the start and {at_end:.6g} mm at the end; they may "
-            f"differ by {allowed_difference(at_start):.3g} mm"
+            f"the centre of the arc is off: radius {at_start:.6g} mm at the start and {at_end:.6g} mm at the end; "
+            f"they may differ by {allowed_difference(at_start):.3g} mm"
         )
     if moved:
         centre = (centre[0] + moved * (start[0] - end[0]) / chord, centre[1] + moved * (start[1] - end[1]) / chord)
@@ -327,7 +327,7 @@ def rounding(first: Element, second: Element, radius: float) -> tuple[Point, Poi
 
 
 def chamfer(first: Element, second: Element, leg: float, length: float) -> tuple[Point, Point]:
-    """Ends of a straight chamfer, equally far from the corner: its leg (CHR), or its own length (CHF) is given, else 0."""
+    """Ends of a straight chamfer, equally far from the corner. leg (CHR) or length of itself (CHF); the other is 0."""
 
     def ends(size: float) -> tuple[Point, Point]:
         at = []

@@ -1,7 +1,7 @@
 """Executes programs of SINUMERIK and of ISO: blocks, branches, loops, subprograms; movements go to a Recorder.
 
-Sources of the rules: Siemens, SINUMERIK 840D sl / 828D, programming manuals "Fundamentals" and "Job planning"; of the ISO
-dialect: ISO 6983-1, and what LinuxCNC documents of its interpreter RS274/NGC.
+Sources of the rules: Siemens, SINUMERIK 840D sl / 828D, programming manuals "Fundamentals" and "Job planning"; of the
+ISO dialect: ISO 6983-1, and what LinuxCNC documents of its interpreter RS274/NGC.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from feedsim.part_program.words import (
     NAMED_CODES,
     NOTED,
     NOTED_VALUES,
+    NOTED_WITH_ARGUMENTS,
     SINUMERIK_CODES,
     SINUMERIK_REFUSED,
     VALUES,
@@ -89,7 +90,7 @@ class Interpreter:
     """State of a program that is being read.
 
     recorder: takes the movements. find: a program by its name, or None. offsets [mm]: G54 ... -> axis -> value.
-    tolerance [mm]: of G642, G645 and compressors where CTOL is not programmed. skip: whether blocks with / are left out.
+    tolerance [mm]: of G642, G645 and compressors without CTOL. skip: whether blocks with / are left out.
     """
 
     def __init__(
@@ -167,7 +168,8 @@ class Interpreter:
                 at, line = flow
                 continue
             at, line = end + 1, line + 1
-        self.program, recorder.file, recorder.line = before
+        if len(self.calls) > 1:  # what is said of the whole program is said of its last line
+            self.program, recorder.file, recorder.line = before
         return result
 
     def _spend(self, blocks: int) -> None:
@@ -243,7 +245,7 @@ class Interpreter:
         return True
 
     def _word(self, scan: Scanner, words: list[tuple[str, Any]], alone: bool) -> bool:
-        """Reads the next word of a block into words, or executes the statement that it begins. False: the block is done."""
+        """Reads the next word into words, or executes the statement that it begins. False: the block is done."""
         scan.skip_space()
         if scan.text[scan.at] == "(":
             # A comment: values in parentheses belong to names, which have taken them.
@@ -334,9 +336,7 @@ class Interpreter:
             return True
         if name in NOTED:
             self.recorder.note(name)
-            if name in ("MSG", "SETAL", "FGROUP", "INIT", "START", "WAITM", "WORKPIECE", "LIMS") or name.startswith(
-                "GROUP"
-            ):
+            if name in NOTED_WITH_ARGUMENTS:
                 if scan.rest()[:1] in ("(", "["):
                     _skip_parentheses(scan, name)
                 if scan.accept("="):
@@ -575,9 +575,12 @@ class Interpreter:
         if not scan.rest():
             return
         assert self.program
-        program, names = self.program, []
+        program = self.program
+        names: list[str] = []
         while len(names) < 2 and scan.rest() and not _REPEATS.match(scan.text, scan.at):
             names.append(self._target(scan, word))
+        if not names:
+            raise Fault(word, "a label or block number is missing")
         times = self._repeats(scan, word)
         places = [program.find_target(name, self.here[0], "BF") for name in names]
         for name, place in zip(names, places, strict=True):
@@ -1040,10 +1043,10 @@ class Interpreter:
             raise Fault("G4", f"the time {seconds:g} s must be 0 to 1,000,000 s")
         self.recorder.dwell(seconds, self.options[0])
 
-    def _wanted(self, place: int, value: Any, base: Sequence[float]) -> float:
+    def _wanted(self, place: int, value: float | WayValue, base: Sequence[float]) -> float:
         """Coordinate that a word of an axis asks for, absolute or from a base."""
         incremental = self.modal.incremental
-        if type(value) is tuple:
+        if isinstance(value, tuple):
             incremental, value = value[0] == "IC", value[1]
         value *= self.modal.length
         return base[place] + self.pending.get(place, 0.0) + value if incremental else value
@@ -1218,7 +1221,16 @@ class Interpreter:
         if size == 0:
             return None
         plane, scale = self.recorder.plane(self.modal.plane)
-        return Corner(name, size * scale, feed or self.modal.corner_feed or None, plane, modal, leg=name == "CHR")
+        return Corner(
+            name,
+            size * scale,
+            feed or self.modal.corner_feed or None,
+            plane,
+            self.recorder.line,
+            self.recorder.file,
+            modal,
+            name == "CHR",
+        )
 
     def _angled_line(
         self, target: list[float], axes: dict[int, Any], values: dict[str, Any], corner: Corner | None
@@ -1404,7 +1416,9 @@ class Interpreter:
         """Number of a parameter, after #."""
         found = scan.take(re.compile(r"\d+"))
         if not found and not scan.rest().startswith("["):
-            raise Fault("#", "the number of a parameter is expected; names and parameters of parameters are not supported")
+            raise Fault(
+                "#", "the number of a parameter is expected; names and parameters of parameters are not supported"
+            )
         index = _parameter(found[0]) if found else whole(scan.number("#"), "#")
         if not 0 < index < 5000:
             raise Fault(f"#{index}", "parameters #1 to #4999 are known; those beyond are the control's")

@@ -1,4 +1,4 @@
-"""What an NC program commands, as columns: one row for each movement or dwell, in the order of the program. SI units."""
+"""What an NC program commands, as columns: one row for each movement or dwell, in the program's order. SI units."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ class Moves:
 
     axes: names, of which X, Y and Z come first as far as they occur. start (A,): position before the first row.
     motion (N,): Motion. end (N, A): position at the end of each row, in the frame of the machine. centre (N, 3): of
-    arcs, in the space of X, Y, Z; its component along the normal is that of the arc's start. normal (N, 3): unit vector,
-    about which the arc turns by the right-hand rule. angle (N,): swept by the arc, positive; a full circle has 2 pi.
-    centre, normal and angle are NaN where a row is no arc. feed (N,): programmed speed along the path [m/s], NaN of
-    rapids and dwells. dwell (N,): [s], else 0. blending (N,): Blending at the end of the row. tolerance (N,): [m], of
-    Blending.DISTANCE and TOLERANCE, else NaN. jerk_limited (N,): SOFT. feedforward (N,): FFWON. compressed (N,): COMPCAD
-    and its like. file (N,): index into files. line (N,): from 1. files: names of the program and its subprograms.
-    texts: what these files hold. notes: what was passed over.
+    arcs, in the space of X, Y, Z; its component along the normal is that of the arc's start. normal (N, 3): unit
+    vector, about which the arc turns by the right-hand rule. angle (N,): swept by the arc, positive; a full circle has
+    2 pi. centre, normal and angle are NaN where a row is no arc. feed (N,): programmed speed along the path [m/s], NaN
+    of rapids and dwells. dwell (N,): [s], else 0. blending (N,): Blending at the end of the row. tolerance (N,): [m],
+    of Blending.DISTANCE and TOLERANCE, and of compressed rows; else NaN. jerk_limited (N,): SOFT. feedforward (N,):
+    FFWON. compressed (N,): COMPCAD and its like. file (N,): index into files. line (N,): from 1. files: names of the
+    program and its subprograms. texts: what these files hold. notes: what was passed over.
     """
 
     axes: tuple[str, ...]

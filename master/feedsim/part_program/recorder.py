@@ -44,7 +44,7 @@ ArcInSpace = tuple[Sequence[float], Sequence[float], float]  # centre, normal, a
 
 
 class Fault(Exception):
-    """What a program has that cannot be taken: the word and the reason; file (index) and line where not the present ones."""
+    """What cannot be taken of a program: word and reason; file (index) and line where not the present ones."""
 
     def __init__(self, word: str, reason: str, line: int | None = None, file: int | None = None) -> None:
         super().__init__(word, reason)
@@ -55,14 +55,16 @@ class Fault(Exception):
 class Corner:
     """Between the last movement and the next one. word: RND, RNDM, CHR, CHF. size [mm]: radius, or of a chamfer.
 
-    leg: whether the size of a chamfer is that of its legs, not its own length. modal: RNDM, which asks for nothing where there is no corner. feed [mm/s]: FRC, or None. plane: its axes, as unit
-    vectors of the machine's frame.
+    feed [mm/s]: FRC, or None. plane: its axes, as unit vectors of the machine's frame. line, file: where it stands.
+    modal: RNDM, which asks for nothing where there is no corner. leg: whether a chamfer's size is that of its legs.
     """
 
     word: str
     size: float
     feed: float | None
     plane: tuple[Vector, Vector]
+    line: int
+    file: int
     modal: bool = False
     leg: bool = False
 
@@ -115,7 +117,11 @@ class Recorder:
     def move(self, motion: int, end: Sequence[float], arc: ArcInSpace, feed: float, options: Options) -> None:
         """A movement to a position of the machine."""
         if self.corner is not None:
-            arc = self._insert_corner(motion, end, arc, feed, options)
+            corner = self.corner
+            try:
+                arc = self._insert_corner(motion, end, arc, feed, options)
+            except ValueError as error:
+                raise Fault(corner.word, str(error), corner.line, corner.file) from None
         row = (motion, end, *arc, feed, 0.0, *options, self.file, self.line)
         self.rows.append(row)
         if end != self.position or motion == ARC:
@@ -126,7 +132,7 @@ class Recorder:
 
     def dwell(self, seconds: float, options: Options) -> None:
         if self.corner is not None and not self.corner.modal:
-            raise Fault(self.corner.word, "a dwell follows, so there is no corner")
+            raise Fault(self.corner.word, "a dwell follows, so there is no corner", self.corner.line, self.corner.file)
         self.corner = None
         row = (DWELL, tuple(self.position), *NO_ARC, math.nan, seconds, *options, self.file, self.line)
         self.rows.append(row)
@@ -175,22 +181,22 @@ class Recorder:
     def _element(self, motion: int, start: Sequence[float], end: Sequence[float], arc: ArcInSpace) -> Element | None:
         """A movement in the plane of the corner; None: it has no way there."""
         assert self.corner is not None
-        (u, v), word = self.corner.plane, self.corner.word
+        u, v = self.corner.plane
         normal = cross(u, v)
         a, b = (dot(start[:3], u), dot(start[:3], v)), (dot(end[:3], u), dot(end[:3], v))
         rises = abs(dot(normal, end[:3]) - dot(normal, start[:3])) > MIN_DISTANCE or end[3:] != start[3:]
         if motion != ARC and math.dist(a, b) < MIN_DISTANCE:
             return None
         if motion == RAPID:
-            raise Fault(word, "corners of rapid movements are not rounded here")
+            raise ValueError("corners of rapid movements are not rounded here")
         if rises:
-            raise Fault(word, "a movement at the corner leaves the plane, which is not rounded here")
+            raise ValueError("a movement at the corner leaves the plane, which is not rounded here")
         if motion != ARC:
             return Element(a, b)
         centre, about, angle = arc
         sense = dot(about, normal)
         if abs(sense) < 1 - 1e-9:
-            raise Fault(word, "an arc at the corner lies in another plane")
+            raise ValueError("an arc at the corner lies in another plane")
         flat = (dot(centre, u), dot(centre, v))
         return Element(a, b, Arc(flat, 1 if sense > 0 else -1, math.remainder(angle - math.pi, 2 * math.pi) + math.pi))
 
@@ -209,7 +215,7 @@ class Recorder:
         if row is None or first is None or second is None:
             if corner.modal:
                 return arc
-            raise Fault(corner.word, "a movement at the corner has no way in the plane")
+            raise ValueError("a movement at the corner has no way in the plane")
         if abs(corner_angle(first, second)) < TANGENT_ANGLE:
             return arc
         u, v = corner.plane
@@ -260,7 +266,9 @@ class Recorder:
     def finish(self, files: Sequence[str], texts: Sequence[str]) -> Moves:
         """All rows, in SI."""
         if self.corner is not None and not self.corner.modal:
-            raise Fault(self.corner.word, "no movement follows, so there is no corner")
+            raise Fault(
+                self.corner.word, "no movement follows, so there is no corner", self.corner.line, self.corner.file
+            )
         self._store(0)
         columns: dict[str, Any] = {
             name: np.concatenate([chunk[name] for chunk in self._chunks]) for name in self._type.names or ()

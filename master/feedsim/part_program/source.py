@@ -18,6 +18,18 @@ DIALECTS = ("sinumerik", "iso", "heidenhain")
 # Bytes that no text has; the end mark of old systems is left out ahead.
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 
+# Words that SINUMERIK alone has, and those that it does not have.
+_OWN_WORDS = re.compile(
+    r"\b(?:CR|AR|ADIS|ADISPOS|CTOL|RND|RNDM|CHR|CHF|RP|AP|ANG|RPL|R\d+)[ \t]*=|\bG(?:64[125]|70|71|700|710|11[012])\b"
+    r"|\b(?:TRANS|ROT|MSG|DEF|PROC|IF|WHILE|FOR|GOTO[FB]?|CIP|CT|BRISK|SOFT|COMPCAD)\b|^%_N_",
+    re.MULTILINE,
+)
+_ISO_WORDS = re.compile(
+    r"^[ \t]*%[ \t]*$|^[ \t]*O\d+|#[\d<\[]|\bM9[89]\b|\bG0?[23](?![\d.])[^\n]*R[ \t]*[-+]?[\d.]"
+    r"|\bG(?:20|21|28|43|49|61|61\.1|64[ \t]*P.*|80|9[0-1]\.1|98|99)(?![\d.])",
+    re.MULTILINE,
+)
+
 Place = tuple[int, int]  # position in the text, line from 1
 
 
@@ -25,7 +37,6 @@ def decode(path: Path | str, data: bytes) -> str:
     """Text with \\n as the only line end. UTF-8 or UTF-16 with their marks, else UTF-8, else Latin-1."""
     marks = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
     encoding = next((name for mark, name in marks.items() if data.startswith(mark)), "")
-    data = data.rstrip(b"\x00\x1a") if encoding != "utf-16" else data
     if not encoding and data.count(b"\x00") and len(data) >= 4:
         # Without a mark, Latin letters in UTF-16 have every other byte 0.
         pairs = len(data) // 2
@@ -33,6 +44,7 @@ def decode(path: Path | str, data: bytes) -> str:
             if zeros.count(b"\x00") > 0.9 * pairs and data.count(b"\x00") == zeros.count(b"\x00"):
                 encoding = name
     if not encoding:
+        data = data.rstrip(b"\x1a")
         found = _BINARY.search(data)
         if found:
             line = data.count(b"\n", 0, found.start()) + 1
@@ -60,21 +72,10 @@ def detect_dialect(path: Path, text: str) -> str:
         return "sinumerik"
     if ending == ".ngc":
         return "iso"
-    code = re.sub(r";.*|\"[^\"\n]*\"", "", head)
-    own = r"\b(?:CR|AR|ADIS|ADISPOS|CTOL|RND|RNDM|CHR|CHF|RP|AP|ANG|RPL)[ \t]*=|\bR\d+[ \t]*=|\bG(?:64[125]|70|71|700|710|11[012])\b"
-    if re.search(
-        own + r"|\b(?:TRANS|ROT|MSG|DEF|PROC|IF|WHILE|FOR|GOTO[FB]?|CIP|CT|BRISK|SOFT|COMPCAD)\b|^%_N_",
-        code,
-        re.MULTILINE,
-    ):
+    code = re.sub(r";.*|\"[^\"\n]*\"|\([^()\n]*\)", "", head)
+    if _OWN_WORDS.search(code):
         return "sinumerik"
-    iso = r"^[ \t]*%[ \t]*$|^[ \t]*O\d+|#[\d<\[]|\bG(?:20|21|28|43|49|61|61\.1|64[ \t]*P.*|80|9[0-1]\.1|98|99)(?![\d.])|\bM9[89]\b"
-    arcs = r"\bG0?[23](?![\d.])[^\n]*R[ \t]*[-+]?[\d.]"
-    return (
-        "iso"
-        if re.search(f"{iso}|{arcs}", re.sub(r"N\d+", " ", code).replace("G", " G"), re.MULTILINE)
-        else "sinumerik"
-    )
+    return "iso" if _ISO_WORDS.search(re.sub(r"N\d+", " ", code).replace("G", " G")) else "sinumerik"
 
 
 _HEAD = r"^[ \t]*(?:/\d?[ \t]*)?(?:N\d+[ \t]*)?"

@@ -1,4 +1,4 @@
-"""Words that programs of SINUMERIK and ISO have: what each sets, what is passed over, and what is refused for what reason."""
+"""Words of SINUMERIK and ISO programs: what each sets, what is passed over, what is refused and why."""
 
 from __future__ import annotations
 
@@ -123,18 +123,12 @@ SINUMERIK_REFUSED: Mapping[float, str] = {
 }
 ISO_REFUSED: Mapping[float, str] = {
     **_REFUSED,
-    **dict.fromkeys(
-        (28, 30, 28.1, 30.1), "the reference position of the machine is not known: program the position (G53)"
-    ),
+    **dict.fromkeys((28, 30, 28.1, 30.1), "the reference position is not known: program the position (G53)"),
     **dict.fromkeys((73, 74, 76, *range(81, 90)), _CYCLE),
-    **dict.fromkeys(
-        (10, 52, 92, 92.1, 92.2, 92.3), "offsets that a program sets are not supported: give them with the program"
-    ),
+    **dict.fromkeys((10, 52, 92, 92.1, 92.2, 92.3), "offsets that a program sets are not supported"),
     **dict.fromkeys((43.1, 43.2, 44), "offsets of the tool are not supported"),
     **dict.fromkeys((5, 5.1, 5.2, 5.3), "splines are not supported"),
-    **dict.fromkeys(
-        (15, 16, 50, 51, 68, 69), "polar coordinates, scaling and rotation are not supported in the ISO dialect"
-    ),
+    **dict.fromkeys((15, 16, 50, 51, 68, 69), "polar coordinates, scaling and rotation are not supported here"),
     **dict.fromkeys((65, 66, 67), "macro calls are not supported"),
     **dict.fromkeys((38.2, 38.3, 38.4, 38.5, 31), "probing is not supported"),
 }
@@ -156,14 +150,20 @@ FRAMES = frozenset({"TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR
 LENGTHS = frozenset({"I", "J", "K", "I1", "J1", "K1", "CR", "RP", "RND", "RNDM", "CHF", "CHR"})
 VALUES = LENGTHS | {"AR", "TURN", "AP", "ANG", "FRC", "FRCM", "ADIS", "ADISPOS", "CTOL", "RPL", "FB"}
 
-# What does not move the path: passed over and listed. Those of the second line have arguments in parentheses.
-NOTED = frozenset(
-    ["STOPRE", "STARTFIFO", "STOPFIFO", "FIFOCTRL", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "NORM", "KONT", "KONTC", "KONTT", "CUT2D", "CUT2DF", "CFC", "CFTCP", "CFIN", "WALIMON", "WALIMOF", "SBLON", "SBLOF", "DISPLON", "DISPLOF", "WAITS", "FENDNORM", "FENDP", "UPATH", "SPATH", "TRAFOOF", "ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "TCOABS", "TOROTOF", "PAROTOF", "SPCON", "SPCOF", "FNORM", "RTLION", "RTLIOF", "MSG", "SETAL", "WAITM", "INIT", "START", "WRTPR", "FGROUP", "LIMS", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND", "WORKPIECE"]
-)  # fmt: skip
-# Their values say nothing of the path: spindles, tools, auxiliary functions, shares of speeds that a machine file has.
-NOTED_VALUES = frozenset(
-    ["S", "T", "D", "H", "M", "SPOS", "SPOSA", "DL", "LIMS", "OTOL", "ATOL", "STOLF", "CTOLG0", "OTOLG0"]
-)
+# What does not move the path: passed over and listed. Some have arguments in parentheses, or a value.
+NOTED_WITH_ARGUMENTS = frozenset({
+    "MSG", "SETAL", "WAITM", "INIT", "START", "WRTPR", "FGROUP", "LIMS", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND",
+    "WORKPIECE",
+})  # fmt: skip
+NOTED = NOTED_WITH_ARGUMENTS | {
+    "STOPRE", "STARTFIFO", "STOPFIFO", "FIFOCTRL", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH",
+    "DYNPREC", "NORM", "KONT", "KONTC", "KONTT", "CUT2D", "CUT2DF", "CFC", "CFTCP", "CFIN", "WALIMON", "WALIMOF",
+    "SBLON", "SBLOF", "DISPLON", "DISPLOF", "WAITS", "FENDNORM", "FENDP", "UPATH", "SPATH", "TRAFOOF", "ORIWKS",
+    "ORIMKS", "ORIAXES", "ORIVECT", "TCOABS", "TOROTOF", "PAROTOF", "SPCON", "SPCOF", "FNORM", "RTLION", "RTLIOF",
+}  # fmt: skip
+NOTED_VALUES = frozenset({
+    "S", "T", "D", "H", "M", "SPOS", "SPOSA", "DL", "LIMS", "OTOL", "ATOL", "STOLF", "CTOLG0", "OTOLG0",
+})  # fmt: skip
 NAMES_REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("TRAORI", "TRANSMIT", "TRACYL", "TRAANG", "TRACON", "TRAFOON", "TOROT", "PAROT"),
                     "transformations are not supported"),
@@ -176,9 +176,10 @@ NAMES_REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("ROTS", "AROTS", "CROTS", "MEAFRAME"), "rotation by solid angles is not supported: use ROT"),
     **dict.fromkeys(("WHEN", "WHENEVER", "EVERY", "ID", "IDS", "DO"), "synchronised actions are not supported"),
     **dict.fromkeys(("MEAS", "MEAW", "MEAC"), "measuring is not supported"),
-    **dict.fromkeys(("HOLES1", "HOLES2", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE"), _CYCLE),
+    **dict.fromkeys(("HOLES1", "HOLES2", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE"),
+                    _CYCLE),
     **dict.fromkeys(("OVR", "OVRRAP", "OVRA", "ACC", "VELOLIM", "ACCLIM", "JERKLIM"),
-                    "shares of speed, acceleration and jerk are not supported: program F, and limits in the machine file"),
+                    "shares of speed, acceleration and jerk are not supported"),
     "DRIVE": "this kind of acceleration is not supported: use BRISK or SOFT",
     "REDEF": "the statement is not supported",
     "CTRANS": "frames as values are not supported: use TRANS, ROT, SCALE, MIRROR",

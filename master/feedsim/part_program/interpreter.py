@@ -733,13 +733,13 @@ class Interpreter:
         here = self.here
         for _ in range(times):
             self._enter(Called({}, {}, list(arguments)), name)
-            kept = copy.copy(self.modal)
+            kept = copy.copy(self.modal), self.programmed
             self.changes += 1
             ended = self.run(program, 0, 1, len(program.code))
             call = self.calls.pop()
             returned = call.returned or {}
             if "SAVE" in returned:
-                self.modal = kept
+                self.modal, self.programmed = kept
                 self._update_options()
                 self._update_speed()
                 self._update_frame()

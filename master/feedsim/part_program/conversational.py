@@ -19,9 +19,9 @@ from feedsim.part_program.recorder import ARC, MAX_COORDINATE, Corner, Fault, Op
 from feedsim.part_program.source import Place, Program
 from feedsim.part_program.words import INCH, XY, YZ, ZX
 
-_NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
+_DECIMAL = re.compile(r"\d+\.?\d*|\.\d+")
 _Q = re.compile(r"Q(\d{1,4})(?![A-Z0-9])")
-_BLOCK = re.compile(r"[ \t]*(\d+)?(?:[ \t]+|$)")
+_BLOCK_NUMBER = re.compile(r"[ \t]*(\d+)?(?:[ \t]+|$)")
 _LABEL = re.compile(r'^[ \t]*(?:\d+[ \t]+)?LBL[ \t]+(?:"([^"\n]+)"|(\d+))[ \t]*(?:;.*)?$', re.MULTILINE)
 _LABEL_NAME = re.compile(r'"([^"]+)"|(\d+)')
 _STATEMENT = re.compile(r"[A-Z]+")
@@ -89,16 +89,16 @@ class Conversational:
 
     def _places_of_labels(self, program: Program) -> dict[str, Place]:
         if program.index not in self._labels:
-            found: dict[str, Place] = {}
+            labels: dict[str, Place] = {}
             line, counted = 1, 0
             for match in _LABEL.finditer(program.code):
                 line += program.code.count("\n", counted, match.start())
                 counted = match.start()
                 name = match[1] or match[2].lstrip("0") or "0"
-                if name != "0" and name in found:
-                    raise Fault(f"LBL {name}", f"the label stands in line {found[name][1]} too", line, program.index)
-                found[name] = (match.start(), line)
-            self._labels[program.index] = found
+                if name != "0" and name in labels:
+                    raise Fault(f"LBL {name}", f"the label stands in line {labels[name][1]} too", line, program.index)
+                labels[name] = (match.start(), line)
+            self._labels[program.index] = labels
         return self._labels[program.index]
 
     def run(self, program: Program, at: int, line: int, stop: int, *, subprogram: bool = False) -> bool:
@@ -141,7 +141,7 @@ class Conversational:
 
     def _block(self, text: str) -> str:
         text = text.split(";")[0].rstrip(" \t~")
-        numbered = _BLOCK.match(text)
+        numbered = _BLOCK_NUMBER.match(text)
         at = numbered.end() if numbered else 0
         scan = Scanner(text, self._read, iso=False)
         scan.at = at
@@ -157,8 +157,8 @@ class Conversational:
         if re.match(r"M[ \t]*\d", scan.rest()):
             words = self._words(scan, "M")
             return "end" if words.ends else ""
-        found = scan.take(_STATEMENT)
-        word = found[0] if found else scan.rest().split()[0]
+        match = scan.take(_STATEMENT)
+        word = match[0] if match else scan.rest().split()[0]
         if word in _MOVES:
             return self._move(word, scan)
         if word == "CC":
@@ -207,12 +207,12 @@ class Conversational:
         q = scan.take(_Q)
         if q:
             return sign * self.parameters.get(int(q[1]), 0.0)
-        found = scan.take(_NUMBER)
-        if not found:
+        match = scan.take(_DECIMAL)
+        if not match:
             raise Fault(word, f"a value is missing before {scan.rest() or 'the end of the block'}")
         if scan.text[scan.at : scan.at + 1] in (".", ","):
-            raise Fault(f"{word}{found[0]}", "the number is badly written")
-        value = sign * scan.finite(float(found[0]), word)
+            raise Fault(f"{word}{match[0]}", "the number is badly written")
+        value = sign * scan.finite(float(match[0]), word)
         if abs(value) > MAX_COORDINATE:
             raise Fault(word, f"{value:g} is too large")
         return value
@@ -259,8 +259,8 @@ class Conversational:
 
     def _place(self, scan: Scanner) -> Place:
         assert self.program
-        found = scan.take(_LABEL_NAME)
-        name = (found[1] or found[2].lstrip("0")) if found else ""
+        match = scan.take(_LABEL_NAME)
+        name = (match[1] or match[2].lstrip("0")) if match else ""
         place = self._places_of_labels(self.program).get(name)
         if not name or place is None:
             raise Fault(f"LBL {name}".strip(), "no such label")
@@ -311,9 +311,9 @@ class Conversational:
         words = Words({}, {})
         feed_given = False
         while scan.rest():
-            found = scan.take(_COORDINATE)
-            if found:
-                name, incremental = found[2], bool(found[1])
+            match = scan.take(_COORDINATE)
+            if match:
+                name, incremental = match[2], bool(match[1])
                 value = self._number(scan, name)
                 if name in ("PR", "PA"):
                     if name in words.polar:
@@ -383,11 +383,11 @@ class Conversational:
 
     def _cycle(self, scan: Scanner) -> None:
         """CYCL DEF 32, the tolerance of the path; all others are refused."""
-        found = re.match(r"DEF[ \t]+32\.(\d)(.*)", scan.text[scan.at :].lstrip())
-        if not found:
+        match = re.match(r"DEF[ \t]+32\.(\d)(.*)", scan.text[scan.at :].lstrip())
+        if not match:
             raise Fault("CYCL", "cycles are not supported (but CYCL DEF 32, tolerance): write out their movements")
-        if found[1] == "1":
-            size = re.match(r"[ \t]*T[ \t]*\+?(\d+\.?\d*|\.\d+)", found[2])
+        if match[1] == "1":
+            size = re.match(r"[ \t]*T[ \t]*\+?(\d+\.?\d*|\.\d+)", match[2])
             self.tolerance = float(size[1]) * self.length if size else 0.0
 
     def _options(self) -> Options:

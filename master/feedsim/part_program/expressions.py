@@ -26,7 +26,8 @@ ISO_OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE")
 MAX_DEPTH = 40  # of parentheses and functions
 MAX_TEXT = 1000  # characters of a text that a program makes
 MAX_NUMBER = 1e15  # of a whole number that operators on bits take
-ROUNDING = 1e-12  # relative; numbers that differ by less are equal, as on a SINUMERIK (and less than with TRUNC)
+# Relative: numbers that differ by less are equal, as on a SINUMERIK.
+EQUALITY_TOLERANCE = 1e-12
 
 PRECEDENCE = {
     "OR": 1, "XOR": 2, "AND": 3,
@@ -38,12 +39,12 @@ ISO_PRECEDENCE = {
     "AND": 1, "OR": 1, "XOR": 1, "EQ": 2, "NE": 2, "GT": 2, "GE": 2, "LT": 2, "LE": 2, "+": 3, "-": 3,
     "*": 4, "/": 4, "MOD": 4, "**": 5,
 }  # fmt: skip
-SAME = {"EQ": "==", "NE": "<>", "GT": ">", "GE": ">=", "LT": "<", "LE": "<="}
+ISO_SPELLINGS = {"EQ": "==", "NE": "<>", "GT": ">", "GE": ">=", "LT": "<", "LE": "<="}
 COMPARISONS = frozenset({"==", "<>", ">", "<", ">=", "<="})
 
 
 def equal(a: float, b: float) -> bool:
-    return abs(a - b) <= ROUNDING * max(abs(a), abs(b))
+    return abs(a - b) <= EQUALITY_TOLERANCE * max(abs(a), abs(b))
 
 
 def compare(operator: str, a: Value, b: Value) -> bool:
@@ -191,10 +192,10 @@ class Scanner:
     def take(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
         """What matches next, after spaces."""
         self.skip_space()
-        found = pattern.match(self.text, self.at)
-        if found:
-            self.at = found.end()
-        return found
+        match = pattern.match(self.text, self.at)
+        if match:
+            self.at = match.end()
+        return match
 
     def accept(self, text: str) -> bool:
         self.skip_space()
@@ -241,12 +242,12 @@ class Scanner:
         left = self._primary(word)
         while True:
             self.skip_space()
-            found = self._operator.match(self.text, self.at)
-            if not found or self._precedence[found[0]] < least:
+            match = self._operator.match(self.text, self.at)
+            if not match or self._precedence[match[0]] < least:
                 break
-            operator = SAME.get(found[0], found[0])
-            precedence, was_comparison = self._precedence[found[0]], self._comparison
-            self.at = found.end()
+            operator = ISO_SPELLINGS.get(match[0], match[0])
+            precedence, was_comparison = self._precedence[match[0]], self._comparison
+            self.at = match.end()
             self._comparison = False
             right = self.value(word, precedence + 1)
             if precedence <= 3 and not self.iso:
@@ -292,17 +293,17 @@ class Scanner:
             elif not self.accept("+"):
                 break
         self.skip_space()
-        found = NUMBER.match(self.text, self.at)
-        if found:
-            self.at = found.end()
+        match = NUMBER.match(self.text, self.at)
+        if match:
+            self.at = match.end()
             following = self.text[self.at : self.at + 2]
             if following[:1] == "." or (
                 following[:1] == "E" and following[1:] in tuple("0123456789+-") and following[1:]
             ):
                 raise Fault(
-                    f"{word}{self.text[found.start() : self.at]}{self.rest()}".split()[0], _badly_written(following)
+                    f"{word}{self.text[match.start() : self.at]}{self.rest()}".split()[0], _badly_written(following)
                 )
-            return sign * self.finite(float(found[0].replace("EX", "E")), word)
+            return sign * self.finite(float(match[0].replace("EX", "E")), word)
         value = self._iso_primary(word) if self.iso else self._sinumerik_primary(word)
         if value is None:
             rest = self.rest()
@@ -326,10 +327,10 @@ class Scanner:
         if coded:
             return float(int(coded[1], 16) if coded[1] else int(coded[2], 2))
         begun = self.at
-        found = self.take(NAME)
-        if not found:
+        match = self.take(NAME)
+        if not match:
             return None
-        name = found[0]
+        name = match[0]
         if name in ("TRUE", "FALSE"):
             return name == "TRUE"
         if name == "$PI":
@@ -373,8 +374,8 @@ class Scanner:
         if self.accept("#"):
             return self.read(self, "#")
         self.skip_space()
-        found = re.compile(r"[A-Z]{2,5}").match(self.text, self.at)
-        name = found[0] if found else ""
+        match = re.compile(r"[A-Z]{2,5}").match(self.text, self.at)
+        name = match[0] if match else ""
         if name == "ATAN":
             self.at += 4
             self.expect("[", name)

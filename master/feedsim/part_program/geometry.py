@@ -253,16 +253,16 @@ class Element:
         return -y / size, x / size
 
 
-def _intersections(first: Element, second: Element, left: float) -> list[Point]:
+def _intersections(first: Element, second: Element, offset: float) -> list[Point]:
     """Points that have both elements, each prolonged, at a distance to their right (left < 0: to their left)."""
     lines, circles = [], []
     for element in (first, second):
         if element.arc is None:
             u, v = element.direction(element.start)
-            lines.append(((element.start[0] - left * v, element.start[1] + left * u), (u, v)))
+            lines.append(((element.start[0] - offset * v, element.start[1] + offset * u), (u, v)))
         else:
             circles.append(
-                (element.arc.centre, math.dist(element.start, element.arc.centre) - element.arc.sense * left)
+                (element.arc.centre, math.dist(element.start, element.arc.centre) - element.arc.sense * offset)
             )
     if any(radius <= 0 for _, radius in circles):
         return []
@@ -302,7 +302,7 @@ def corner_angle(first: Element, second: Element) -> float:
 
 def rounding(first: Element, second: Element, radius: float) -> tuple[Point, Point, Arc]:
     """Arc of a radius tangent to both elements: its ends, on the first and the second one, and itself."""
-    found = []
+    arcs = []
     for sense in (1, -1):
         for centre in _intersections(first, second, sense * radius):
             ends = []
@@ -320,10 +320,10 @@ def rounding(first: Element, second: Element, radius: float) -> tuple[Point, Poi
             if all(inside for _, inside in ends):
                 a, b = ends[0][0], ends[1][0]
                 arc = Arc(centre, sense, swept(a, b, centre, sense))
-                found.append((math.dist(a, first.end) + math.dist(b, second.start), a, b, arc))
-    if not found:
+                arcs.append((math.dist(a, first.end) + math.dist(b, second.start), a, b, arc))
+    if not arcs:
         raise ValueError(f"a rounding of {radius:.6g} mm does not fit between the two movements")
-    return min(found, key=lambda each: each[0])[1:]
+    return min(arcs, key=lambda arc: arc[0])[1:]
 
 
 def chamfer(first: Element, second: Element, leg: float, length: float) -> tuple[Point, Point]:

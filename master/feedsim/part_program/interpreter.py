@@ -34,7 +34,6 @@ from feedsim.part_program.words import (
     FRAMES,
     ISO_CODES,
     ISO_REFUSED,
-    LENGTHS,
     NAMED_CODES,
     NOTED,
     NOTED_VALUES,
@@ -42,6 +41,7 @@ from feedsim.part_program.words import (
     SINUMERIK_CODES,
     SINUMERIK_REFUSED,
     VALUES,
+    WORKPIECE_LENGTHS,
     Modal,
     refusal_of,
     spelled,
@@ -53,10 +53,10 @@ MAX_ELEMENTS = 100_000  # of an array
 
 # What most blocks have alone: letters and named values with a number. L and O call and name subprograms.
 _WORD = r"([A-KMNP-Z]|(?:CR|AR|TURN|RP|AP|ANG|RND|CHF|CHR)(?=[ \t]*=))[ \t]*=?[ \t]*([-+]?[\d.]+)"
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?![.\d]|E[-+\d])"
+_DECIMAL = r"[-+]?(?:\d+\.?\d*|\.\d+)(?![.\d]|E[-+\d])"
 _PLAIN_BLOCK = {
-    True: re.compile(rf"(?:[ \t]*[A-KMNP-Z][ \t]*{_NUMBER})*[ \t]*"),
-    False: re.compile(rf"(?:[ \t]*(?:[A-KMNP-Z]|(?:CR|AR|TURN|RP|AP|ANG|RND|CHF|CHR)[ \t]*=)[ \t]*{_NUMBER})*[ \t]*"),
+    True: re.compile(rf"(?:[ \t]*[A-KMNP-Z][ \t]*{_DECIMAL})*[ \t]*"),
+    False: re.compile(rf"(?:[ \t]*(?:[A-KMNP-Z]|(?:CR|AR|TURN|RP|AP|ANG|RND|CHF|CHR)[ \t]*=)[ \t]*{_DECIMAL})*[ \t]*"),
 }
 _PLAIN_WORD = re.compile(_WORD)
 _ADDRESS = re.compile(r"([A-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)")
@@ -254,33 +254,33 @@ class Interpreter:
                 raise Fault("(", "a comment in parentheses is not closed")
             scan.at = end + 1
             return True
-        found = scan.take(_ASSIGNED)
-        if found:
-            self._assigned(scan, found[1], words)
+        match = scan.take(_ASSIGNED)
+        if match:
+            self._assigned(scan, match[1], words)
             return True
-        found = scan.take(_ADDRESS)
-        if found and found[1] == "L":
+        match = scan.take(_ADDRESS)
+        if match and match[1] == "L":
             if words:
-                raise Fault(found[0], "a subprogram is called in a block of its own")
-            self._call(found[0].replace(" ", ""), scan)
+                raise Fault(match[0], "a subprogram is called in a block of its own")
+            self._call(match[0].replace(" ", ""), scan)
             return False
-        if found:
-            self._address(scan, found, words)
+        if match:
+            self._address(scan, match, words)
             return True
-        found = scan.take(_INDEXED)
-        if found and found[1] not in NOTED:
-            self._assign_indexed(scan, found[1])
+        match = scan.take(_INDEXED)
+        if match and match[1] not in NOTED:
+            self._assign_indexed(scan, match[1])
             return True
-        found = found or scan.take(NAME)
-        if not found:
+        match = match or scan.take(NAME)
+        if not match:
             raise Fault(scan.rest().split()[0][:20], "the word is not understood")
-        return self._named(scan, found[0].strip(), words, alone)
+        return self._named(scan, match[0].strip(), words, alone)
 
-    def _address(self, scan: Scanner, found: re.Match[str], words: list[tuple[str, Any]]) -> None:
-        name, number = found[1], found[2]
+    def _address(self, scan: Scanner, match: re.Match[str], words: list[tuple[str, Any]]) -> None:
+        name, number = match[1], match[2]
         following = scan.text[scan.at : scan.at + 2]
         if following[:1] == "." or re.match(r"E[-+\d]", following):
-            whole_word = re.match(r"[-+.\w]*", scan.text[found.start() :])
+            whole_word = re.match(r"[-+.\w]*", scan.text[match.start() :])
             reason = "a number has two points" if following[:1] == "." else "an exponent is written EX, as in 1EX5"
             raise Fault(whole_word[0] if whole_word else name, f"the number is badly written: {reason}")
         if following[:1] == ",":
@@ -386,10 +386,10 @@ class Interpreter:
         if name[0] == "R" and (name[1:].isdigit() or (name == "R" and "R" not in self.variables)):
             index = _parameter(name[1:]) if len(name) > 1 else None
             if index is None:
-                found = scan.indices(name)
-                if len(found) != 1:
+                match = scan.indices(name)
+                if len(match) != 1:
                     return None
-                index = found[0]
+                index = match[0]
             return self.parameters.get(index, 0.0)
         variable = self.variables.get(name)
         if variable is None:
@@ -489,16 +489,16 @@ class Interpreter:
             self.flow = self._partner()
 
     def _for(self, scan: Scanner, word: str) -> None:
-        found = scan.take(_ASSIGNED)
-        if not found or not (found[1] in self.variables or re.fullmatch(r"R\d+", found[1])):
+        match = scan.take(_ASSIGNED)
+        if not match or not (match[1] in self.variables or re.fullmatch(r"R\d+", match[1])):
             raise Fault(word, f"a variable is expected before {scan.rest() or 'the end of the block'}: FOR I = 1 TO 10")
         first = scan.number(word)
         if not scan.accept("TO"):
             raise Fault(word, f"TO is missing before {scan.rest() or 'the end of the block'}")
         last = scan.number(word)
-        self._set(found[1], first)
-        self.calls[-1].counting[self.here[1]] = (found[1], last)
-        if self._number_of(found[1]) > last:
+        self._set(match[1], first)
+        self.calls[-1].counting[self.here[1]] = (match[1], last)
+        if self._number_of(match[1]) > last:
             self.flow = self._partner()
 
     def _number_of(self, name: str) -> float:
@@ -532,13 +532,13 @@ class Interpreter:
             scan.take(_TARGET)
 
     def _target(self, scan: Scanner, word: str) -> str:
-        found = scan.take(_TARGET)
-        if not found:
+        match = scan.take(_TARGET)
+        if not match:
             value = scan.value(word) if scan.rest() else ""
             if not isinstance(value, str) or not value:
                 raise Fault(word, "a label or block number is missing")
             return value
-        name = found[0]
+        name = match[0]
         variable = self.variables.get(name)
         if variable is not None and isinstance(variable.value, str):
             name = variable.value
@@ -616,20 +616,20 @@ class Interpreter:
     # --- Variables and subprograms -----------------------------------------------------------------------------------
 
     def _kind(self, scan: Scanner, word: str) -> str:
-        found = scan.take(_DEF_KIND)
-        if not found or found[1] in ("AXIS", "FRAME"):
+        match = scan.take(_DEF_KIND)
+        if not match or match[1] in ("AXIS", "FRAME"):
             raise Fault(
                 word, f"a type is expected before {scan.rest() or 'the end'}: REAL, INT, BOOL, CHAR or STRING[n]"
             )
-        if found[1] == "STRING":
+        if match[1] == "STRING":
             scan.indices(word)
-        return found[1]
+        return match[1]
 
     def _new_variable(self, scan: Scanner, word: str, kind: str) -> str:
-        found = scan.take(NAME)
-        if not found:
+        match = scan.take(NAME)
+        if not match:
             raise Fault(word, f"a name is expected before {scan.rest() or 'the end of the block'}")
-        name = found[0]
+        name = match[0]
         if name in self.places or name in VALUES or re.fullmatch(r"R\d*|[GFNMSTDH]\d*", name) or name in self.control:
             raise Fault(name, "the name has another meaning")
         if name in self.variables:
@@ -681,10 +681,10 @@ class Interpreter:
         if arguments:
             raise Fault(word, f"the call has {len(arguments)} arguments more than the program")
         while scan.rest():
-            found = scan.take(NAME)
-            if not found or found[0] not in ("SAVE", "DISPLOF", "DISPLON", "SBLOF", "ICYCOF", "ACTBLOCNO", "PREPRO"):
-                raise Fault(scan.rest() or (found[0] if found else word), "the word is not understood after PROC")
-            if found[0] == "SAVE":
+            match = scan.take(NAME)
+            if not match or match[0] not in ("SAVE", "DISPLOF", "DISPLON", "SBLOF", "ICYCOF", "ACTBLOCNO", "PREPRO"):
+                raise Fault(scan.rest() or (match[0] if match else word), "the word is not understood after PROC")
+            if match[0] == "SAVE":
                 call.returned["SAVE"] = ""
 
     def _arguments(self, scan: Scanner, name: str) -> list[tuple[Value | None, str]]:
@@ -810,11 +810,11 @@ class Interpreter:
         if name == "code":
             spelling, code = value, NAMED_CODES[value]
         else:
-            found = self.codes.get(value) if isinstance(value, float) else None
+            match = self.codes.get(value) if isinstance(value, float) else None
             spelling = spelled(value) if isinstance(value, float) else "G"
-            if found is None:
+            if match is None:
                 raise Fault(spelling, self.refused.get(value, "the G code is not known"))
-            code = found
+            code = match
         if code[0] in codes:
             raise Fault(
                 spelling, f"two G codes of one group ({code[0]}) in a block: {codes[code[0]][0]} and {spelling}"
@@ -1058,7 +1058,7 @@ class Interpreter:
             return None
         if isinstance(value, tuple):
             raise Fault(name, f"{value[0]} has no meaning here")
-        return float(value) * (self.modal.length if name in LENGTHS else 1.0)
+        return float(value) * (self.modal.length if name in WORKPIECE_LENGTHS else 1.0)
 
     def _polar_end(self, values: dict[str, Any], axes: dict[int, Any]) -> tuple[float, float] | None:
         """End in the plane that AP and RP give."""
@@ -1206,16 +1206,16 @@ class Interpreter:
 
     def _corner(self, values: dict[str, Any]) -> Corner | None:
         """What stands at the end of the block: RND, CHF, CHR, or RNDM of before."""
-        found = [(name, size) for name in ("RND", "CHF", "CHR") if (size := self._plain(values, name)) is not None]
+        match = [(name, size) for name in ("RND", "CHF", "CHR") if (size := self._plain(values, name)) is not None]
         feed = self._plain(values, "FRC")
         if feed is not None:
             if not 0 < feed <= 1e9:
                 raise Fault("FRC", f"the feed {feed:g} must be above 0")
             feed *= self.modal.feed_length / 60
-        if len(found) > 1:
-            raise Fault(found[1][0], f"a corner has {found[0][0]} or {found[1][0]}")
-        modal = not found
-        name, size = found[0] if found else ("RNDM", self.modal.rounding)
+        if len(match) > 1:
+            raise Fault(match[1][0], f"a corner has {match[0][0]} or {match[1][0]}")
+        modal = not match
+        name, size = match[0] if match else ("RNDM", self.modal.rounding)
         if not 0 <= size <= MAX_COORDINATE:
             raise Fault(name, f"{size:g} mm must not be negative")
         if size == 0:
@@ -1338,7 +1338,7 @@ class Interpreter:
         angle = self._plain(values, "AR")
         if angle is not None and not 0 < angle < 360:
             raise Fault("AR", f"the angle {angle:g} must be above 0 and below 360 degrees")
-        if sum(each is not None for each in (centre, radius)) > 1:
+        if centre is not None and radius is not None:
             raise Fault("R" if self.iso else "CR", "an arc has a centre or a radius")
         has_end = is_polar or first in axes or second in axes
         if angle is not None:
@@ -1414,12 +1414,12 @@ class Interpreter:
     @staticmethod
     def _iso_index(scan: Scanner) -> int:
         """Number of a parameter, after #."""
-        found = scan.take(re.compile(r"\d+"))
-        if not found and not scan.rest().startswith("["):
+        match = scan.take(re.compile(r"\d+"))
+        if not match and not scan.rest().startswith("["):
             raise Fault(
                 "#", "the number of a parameter is expected; names and parameters of parameters are not supported"
             )
-        index = _parameter(found[0]) if found else whole(scan.number("#"), "#")
+        index = _parameter(match[0]) if match else whole(scan.number("#"), "#")
         if not 0 < index < 5000:
             raise Fault(f"#{index}", "parameters #1 to #4999 are known; those beyond are the control's")
         return index
@@ -1435,9 +1435,9 @@ class Interpreter:
                     raise Fault(f"#{index}", "= is missing")
                 assigned[index] = scan.number(f"#{index}")
                 continue
-            found = scan.take(_ADDRESS)
-            if found:
-                self._address(scan, found, words)
+            match = scan.take(_ADDRESS)
+            if match:
+                self._address(scan, match, words)
                 continue
             name = scan.take(
                 re.compile(r"[A-Z](?![A-Z])|[A-Z](?=(?:SIN|COS|TAN|ASIN|ACOS|ATAN|SQRT|ABS|ROUND|FIX|FUP|EXP|LN)\[)")

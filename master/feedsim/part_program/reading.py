@@ -71,10 +71,10 @@ def interpret(
 
     def program(wanted: str) -> Program | None:
         if wanted not in called:
-            found = find(wanted)
-            same = next((each for each in programs if found and each.name == found[0]), None)
-            if found and same is None:
-                same = Program(*found, len(programs))
+            match = find(wanted)
+            same = next((other for other in programs if match and other.name == match[0]), None)
+            if match and same is None:
+                same = Program(*match, len(programs))
                 programs.append(same)
             called[wanted] = same
         return called[wanted]
@@ -90,7 +90,7 @@ def interpret(
         reader.finish()
         if not recorder.rows and not recorder.count:
             raise Fault("program", "no movement is commanded" if text.strip() else "the file is empty")
-        return recorder.finish([each.name for each in programs], [each.text for each in programs])
+        return recorder.finish([file.name for file in programs], [file.text for file in programs])
     except Fault as fault:
         file = programs[recorder.file if fault.file is None else fault.file].name
         line = fault.line or max(recorder.line, 1)

@@ -45,10 +45,10 @@ def decode(path: Path | str, data: bytes) -> str:
                 encoding = name
     if not encoding:
         data = data.rstrip(b"\x1a")
-        found = _BINARY.search(data)
-        if found:
-            line = data.count(b"\n", 0, found.start()) + 1
-            raise InputError(f"{path}:{line}: byte 0x{found[0][0]:02x}: the file is binary, not a program as text")
+        match = _BINARY.search(data)
+        if match:
+            line = data.count(b"\n", 0, match.start()) + 1
+            raise InputError(f"{path}:{line}: byte 0x{match[0][0]:02x}: the file is binary, not a program as text")
         encoding = "utf-8"
     try:
         text = data.decode(encoding)
@@ -98,7 +98,7 @@ class Program:
         self.name, self.text, self.index = name, text, index
         upper = text.upper()
         if len(upper) != len(text):  # letters that become two
-            upper = "".join(each if len(each.upper()) != 1 else each.upper() for each in text)
+            upper = "".join(letter if len(letter.upper()) != 1 else letter.upper() for letter in text)
         self.code = text if upper == text else upper
 
     def end_of_line(self, at: int) -> int:
@@ -114,17 +114,17 @@ class Program:
         result: dict[int, Place] = {}
         opened: list[tuple[str, int, int]] = []  # word, line, position
         line, counted = 1, 0
-        for found in _STRUCTURE.finditer(self.code):
-            line += self.code.count("\n", counted, found.start())
-            counted = found.start()
-            word, rest = found[1], found[2].strip()
+        for match in _STRUCTURE.finditer(self.code):
+            line += self.code.count("\n", counted, match.start())
+            counted = match.start()
+            word, rest = match[1], match[2].strip()
             if (word == "IF" and re.search(r"\bGOTO[BFCS]?\b", rest)) or (
                 word == "REPEAT" and rest and not rest.startswith("(")
             ):
                 continue
-            behind = (self.end_of_line(found.start()) + 1, line + 1)
+            behind = (self.end_of_line(match.start()) + 1, line + 1)
             if word in _CLOSES:
-                opened.append((word, line, found.start()))
+                opened.append((word, line, match.start()))
                 continue
             if not opened or opened[-1][0] not in (_OPENS[word], "ELSE" if word == "ENDIF" else ""):
                 what = f"; {opened[-1][0]} of line {opened[-1][1]} is open" if opened else ""
@@ -136,7 +136,7 @@ class Program:
                 result[begun[1]] = behind
                 result[line] = (begun[2], begun[1])
             if word == "ELSE":
-                opened.append((word, line, found.start()))
+                opened.append((word, line, match.start()))
         if opened:
             word, line, _ = opened[-1]
             closing = _CLOSES.get(word, "ENDIF")
@@ -158,10 +158,10 @@ class Program:
         """Labels and block numbers (N10 as `N10`) -> where they stand, in order."""
 
         def target(at: int, stop: int) -> list[str]:
-            found = _TARGET.match(self.code, at, stop)
-            assert found
-            number = [f"N{found[1].lstrip('0') or '0'}"] if found[1] else []
-            return number + (_LABEL_NAME.findall(found[2]) if found[2] else [])
+            match = _TARGET.match(self.code, at, stop)
+            assert match
+            number = [f"N{match[1].lstrip('0') or '0'}"] if match[1] else []
+            return number + (_LABEL_NAME.findall(match[2]) if match[2] else [])
 
         return self._places(target)
 
@@ -170,8 +170,8 @@ class Program:
         """Programs within a file of ISO (O100 as `100`) -> where they stand."""
 
         def target(at: int, stop: int) -> list[str]:
-            found = _ISO_TARGET.match(self.code, at, stop)
-            return [found[1].lstrip("0") or "0"] if found else []
+            match = _ISO_TARGET.match(self.code, at, stop)
+            return [match[1].lstrip("0") or "0"] if match else []
 
         return self._places(target)
 
@@ -201,16 +201,16 @@ class Folder:
     def files(self) -> Mapping[str, Path]:
         """Name in lower case -> file. Of names that differ in case alone the first in order counts."""
         try:
-            found = sorted(self.folder.iterdir(), reverse=True)
+            match = sorted(self.folder.iterdir(), reverse=True)
         except OSError:
             return {}
-        return {path.name.lower(): path for path in found}
+        return {path.name.lower(): path for path in match}
 
     def find(self, name: str) -> Path | None:
         stem = name.lower()
         names = [stem + ending for ending in ENDINGS]
         names += [f"_n_{stem}_spf", f"_n_{stem}_spf.spf", f"_n_{stem}_mpf", f"_n_{stem}_mpf.mpf"]
-        return next((self.files[each] for each in names if each in self.files and self.files[each].is_file()), None)
+        return next((self.files[file] for file in names if file in self.files and self.files[file].is_file()), None)
 
 
 def read_text(path: Path) -> str:

@@ -89,6 +89,7 @@ FAULTS = {
     "F1\nSCALE X0": (2, "SCALE", "scale of 0"),
     "F1\nG1 RP=-1 AP=0": (2, "RP", "negative"),
     "F1\nG1 RP=1 X1": (2, "X", "polar"),
+    "F1\nG2 X10 Y0 R6": (2, "R", "CR="),
     # corners
     "F1\nG1 X1 RND=5\nY1": (2, "RND", "does not fit"),
     "F1\nG1 X1 CHR=5\nY1": (2, "CHR", "does not fit"),
@@ -148,6 +149,8 @@ FAULTS = {
     "REPEATB A1 P=-2\nA1:": (1, "P", "0 to 9999"),
     "A1: GOTOF A2\nREPEAT A1\nA2: G0 X1\nGOTOB A1": (4, "loop", "without end"),
     # refused
+    "G21": (1, "G21", "ISO dialect"),
+    "CYCLE832(0.01)": (1, "CYCLE832", "CTOL"),
     "G41": (1, "G41", "radius compensation"),
     "G33 Z1 K1": (1, "G33", "spindle"),
     "G96 S100": (1, "G96", "cutting speed"),
@@ -278,7 +281,8 @@ def test_subprograms_lie_beside_the_program_in_any_case(tmp_path: Path) -> None:
     ("name", "text", "dialect"),
     [
         ("a.mpf", "G20 G2 X1 R5", "sinumerik"), ("a.ngc", "G1 X1", "iso"), ("a.h", "L X+1", "heidenhain"),
-        ("a.nc", "0 BEGIN PGM A MM\n", "heidenhain"), ("a.nc", "G2 X1 Y1 R5", "iso"), ("a.nc", "G2 X1 Y1 CR=5", "sinumerik"),
+        ("a.nc", "0 BEGIN PGM A MM\n", "heidenhain"), ("a.nc", "G2 X1 Y1 R5", "iso"),
+        ("a.nc", "G2 X1 Y1 CR=5", "sinumerik"),
         ("a.nc", "%\nO100\nG0 X1", "iso"), ("a.nc", "%_N_A_MPF\nG0 X1", "sinumerik"), ("a.nc", "G21\nG0 X1", "iso"),
         ("a.nc", "G0 X1", "sinumerik"), ("a.nc", "R1=5\nG0 X=R1", "sinumerik"), ("a.nc", "#1=5", "iso"),
         ("a.nc", "N20 G0 X1 (G21)\nN21 X2", "sinumerik"), ("a.nc", "N10G90G21\nG0X1", "iso"),

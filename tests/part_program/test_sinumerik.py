@@ -78,10 +78,10 @@ POINTS = {
     "gotoc without a target": ("GOTOC NOWHERE\nG1 X1", [(1, 0, 0)]),
     "case": ("R1=4\nCASE(R1) OF 3 GOTOF A3 4 GOTOF A4 DEFAULT GOTOF A5\nA3: G1 X3\nA4: G1 X4\nA5: G1 Y5",
              [(4, 0, 0), (4, 5, 0)]),
-    "repeat of a section": ("AA: G91 G1 X1\nY1\nREPEAT AA P=2\nX5", [(1, 0, 0), (1, 1, 0), (2, 1, 0), (2, 2, 0), (3, 2, 0),
-                                                                   (3, 3, 0), (8, 3, 0)]),
-    "repeat between labels": ("G91\nBEG: G1 X1\nFIN: Y1\nX1\nREPEAT BEG FIN", [(1, 0, 0), (1, 1, 0), (2, 1, 0), (3, 1, 0),
-                                                                            (3, 2, 0)]),
+    "repeat of a section": ("AA: G91 G1 X1\nY1\nREPEAT AA P=2\nX5",
+                            [(1, 0, 0), (1, 1, 0), (2, 1, 0), (2, 2, 0), (3, 2, 0), (3, 3, 0), (8, 3, 0)]),
+    "repeat between labels": ("G91\nBEG: G1 X1\nFIN: Y1\nX1\nREPEAT BEG FIN",
+                              [(1, 0, 0), (1, 1, 0), (2, 1, 0), (3, 1, 0), (3, 2, 0)]),
     "repeat to ENDLABEL": ("G91\nBEG: G1 X1\nENDLABEL: Y1\nX1\nREPEAT BEG", [(1, 0, 0), (1, 1, 0), (2, 1, 0), (3, 1, 0),
                                                                            (3, 2, 0)]),
     "repeat of a block": ("G91\nBB: G1 X1\nY1\nREPEATB BB P=2", [(1, 0, 0), (1, 1, 0), (2, 1, 0), (3, 1, 0)]),
@@ -99,9 +99,11 @@ def test_positions(name: str) -> None:
 
 # Expression -> value.
 VALUES = {
-    "1+2*3": 7, "(1+2)*3": 9, "-2+1": -1, "2*-3": -6, "7/2": 3.5, "7 DIV 2": 3, "-7 DIV 2": -3, "7 MOD 3": 1, "3 MOD 4": 3,
+    "1+2*3": 7, "(1+2)*3": 9, "-2+1": -1, "2*-3": -6, "7/2": 3.5, "7 DIV 2": 3, "-7 DIV 2": -3, "7 MOD 3": 1,
+    "3 MOD 4": 3,
     "10-4-3": 3, "8/4/2": 1, "SIN(30)": 0.5, "COS(60)": 0.5, "TAN(45)": 1, "ASIN(0.5)": 30, "ACOS(0.5)": 60,
-    "ATAN2(30.5,80.1)": 20.8455, "ATAN2(1,-1)": 135, "SQRT(2)": ROOT2, "POT(-3)": 9, "ABS(-2.5)": 2.5, "TRUNC(-2.7)": -2,
+    "ATAN2(30.5,80.1)": 20.8455, "ATAN2(1,-1)": 135, "SQRT(2)": ROOT2, "POT(-3)": 9, "ABS(-2.5)": 2.5,
+    "TRUNC(-2.7)": -2,
     "ROUND(2.5)": 3, "ROUND(-2.5)": -3, "ROUNDUP(2.1)": 3, "EXP(1)": math.e, "LN(EXP(2))": 2, "MINVAL(3,2)": 2,
     "MAXVAL(3,2)": 3, "BOUND(0,5,9)": 5, "'H1F'": 31, "'B101'": 5, "12 B_AND 10": 8, "12 B_OR 10": 14, "12 B_XOR 10": 6,
     "(1==1)*3": 3, "(1<>1)*3": 0, "(2>1)*1": 1, "(2<=1)*1": 0, "((1<2) AND (2<3))*1": 1, "(1<2 AND 3<2)*1": 0,
@@ -251,8 +253,8 @@ def test_dwells() -> None:
 
 def test_blending() -> None:
     program = (
-        "G0 X1\nG64 X2\nG641 ADIS=0.5 ADISPOS=1 X3\nG1 X4 F60\nG9 X5\nG642 X6\nCTOL=0.02 X7\nG645 X8\nG60 X9\nCTOL=-1 G642 X10\n"
-        "G641 ADIS=0 X11\n"
+        "G0 X1\nG64 X2\nG641 ADIS=0.5 ADISPOS=1 X3\nG1 X4 F60\nG9 X5\nG642 X6\nCTOL=0.02 X7\nG645 X8\nG60 X9\n"
+        "CTOL=-1 G642 X10\nG641 ADIS=0 X11\n"
     )
     moves = read(program)
     none = math.nan

@@ -235,6 +235,8 @@ class Interpreter:
         """% at the beginning and end of a tape, O1000, %_N_NAME_MPF."""
         if not text.startswith("%"):
             return False
+        if text == "%" and not self.iso:
+            return True
         assert self.program
         before = self.program.code[: self.here[0]].strip()
         if not self.iso:
@@ -813,7 +815,10 @@ class Interpreter:
             match = self.codes.get(value) if isinstance(value, float) else None
             spelling = spelled(value) if isinstance(value, float) else "G"
             if match is None:
-                raise Fault(spelling, self.refused.get(value, "the G code is not known"))
+                reason = self.refused.get(value, "the G code is not known")
+                if not self.iso and value not in self.refused and (value in ISO_CODES or value in ISO_REFUSED):
+                    reason = "a code of the ISO dialect: read the program with it"
+                raise Fault(spelling, reason)
             code = match
         if code[0] in codes:
             raise Fault(
@@ -1362,6 +1367,8 @@ class Interpreter:
         elif is_polar:
             arc = arc_about(start, end, (self.pole[first], self.pole[second]), sense)
         else:
+            if "R" in values:
+                raise Fault("R", "a radius is written CR= in this dialect, and R in the ISO dialect")
             raise Fault(motion, "an arc without centre or radius")
         self._emit_arc(target, arc, turns, options)
 

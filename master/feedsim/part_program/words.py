@@ -153,7 +153,7 @@ VALUES = WORKPIECE_LENGTHS | {"AR", "TURN", "AP", "ANG", "FRC", "FRCM", "ADIS", 
 # What does not move the path: passed over and listed. Some have arguments in parentheses, or a value.
 NOTED_WITH_ARGUMENTS = frozenset({
     "MSG", "SETAL", "WAITM", "INIT", "START", "WRTPR", "FGROUP", "LIMS", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND",
-    "WORKPIECE",
+    "WORKPIECE", "SETMS",
 })  # fmt: skip
 NOTED = NOTED_WITH_ARGUMENTS | {
     "STOPRE", "STARTFIFO", "STOPFIFO", "FIFOCTRL", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH",
@@ -180,6 +180,7 @@ NAMES_REFUSED: Mapping[str, str] = {
                     _CYCLE),
     **dict.fromkeys(("OVR", "OVRRAP", "OVRA", "ACC", "VELOLIM", "ACCLIM", "JERKLIM"),
                     "shares of speed, acceleration and jerk are not supported"),
+    "CYCLE832": "the cycle is not supported: write what it sets, as CTOL=0.01 COMPCAD G645 SOFT FFWON",
     "DRIVE": "this kind of acceleration is not supported: use BRISK or SOFT",
     "REDEF": "the statement is not supported",
     "CTRANS": "frames as values are not supported: use TRANS, ROT, SCALE, MIRROR",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parent))
 from program_helpers import ends, read
@@ -116,6 +117,33 @@ VALUES = {
 def test_expressions(expression: str) -> None:
     found = ends(f"R1={expression}\nG0 X=R1\n")[0][0]
     assert found == pytest.approx(VALUES[expression], abs=5e-5 if "80.1" in expression else 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_chains_of_frames_are_products_of_matrices(seed: int) -> None:
+    """Homogeneous matrices, with rotations by scipy: intrinsic, about Z, then Y, then X."""
+    dice = np.random.default_rng(seed)
+    matrix, blocks = np.eye(4), ["F600"]
+    expected = []
+    for _ in range(8):
+        kind, a = dice.choice(["TRANS", "ROT", "SCALE", "MIRROR"]), np.round(dice.uniform(-50, 50, 3), 2)
+        added = np.eye(4)
+        if kind == "TRANS":
+            added[:3, 3] = a
+        elif kind == "ROT":
+            added[:3, :3] = Rotation.from_euler("ZYX", a[::-1], degrees=True).as_matrix()
+        elif kind == "SCALE":
+            a = np.abs(a) / 40 + 0.5
+            added[:3, :3] = np.diag(a)
+        else:
+            added[0, 0], a = -1, a[:1]
+        additive = bool(dice.random() < 0.8)
+        matrix = matrix @ added if additive else added
+        words = " ".join(f"{axis}={float(value)!r}" for axis, value in zip("XYZ", a, strict=False))
+        point = np.round(dice.uniform(-20, 20, 3), 3)
+        blocks += [f"{'A' * additive}{kind} {words}", f"G1 X{point[0]} Y{point[1]} Z{point[2]}"]
+        expected.append((matrix @ [*point, 1])[:3])
+    assert read("\n".join(blocks)).end * 1e3 == pytest.approx(np.array(expected), rel=1e-12, abs=1e-9)
 
 
 @pytest.mark.parametrize(

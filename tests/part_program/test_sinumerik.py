@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import sys
 from pathlib import Path
 
@@ -13,7 +14,9 @@ from scipy.spatial.transform import Rotation
 sys.path.insert(0, str(Path(__file__).parent))
 from program_helpers import ends, read
 
+from feedsim.errors import InputError
 from feedsim.part_program import Blending, Motion
+from feedsim.part_program.interpreter import Interpreter
 
 HALF = 0.5
 ROOT3 = math.sqrt(3) / 2
@@ -270,6 +273,38 @@ def test_feeds() -> None:
     )
     expected = [600, 254, 60, 20, 5 * math.pi * 4, 30, 60, math.nan]
     assert read(program).feed * 6e4 == pytest.approx(expected, rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("dialect", ["sinumerik", "iso"])
+def test_the_fast_way_of_lines_is_that_of_all_blocks(dialect: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Random blocks of G0 and G1, faults among them: the same rows, or the same refusal, without the fast way."""
+    dice = random.Random(3)
+
+    def block() -> str:
+        words = [f"{axis}{dice.uniform(-9, 9):.3f}" for axis in dice.sample("XYZ", dice.randrange(4))]
+        words += dice.choice(
+            ([], ["G0"], ["G1"], ["G1"], ["X1"], ["G91"], ["G90"], ["G95"], ["G94 F5"], ["S0"], ["S9"])
+        )
+        words += dice.choice(([], [], ["F100"], ["F50.5"], ["F0"] if dice.random() < 0.05 else []))
+        return f"N{dice.randrange(99)} {' '.join(dice.sample(words, len(words)))}"
+
+    programs = ["F60 G1 X0\n" + "\n".join(block() for _ in range(dice.randrange(1, 12))) for _ in range(400)]
+
+    def results() -> list[object]:
+        found: list[object] = []
+        for program in programs:
+            try:
+                moves = read(program, dialect=dialect)
+            except InputError as refusal:
+                found.append(str(refusal))
+            else:
+                found.append([getattr(moves, name).tobytes() for name in ("motion", "end", "feed", "line", "blending")])
+        return found
+
+    fast = results()
+    monkeypatch.setattr(Interpreter, "_execute_line", lambda self, words: False)
+    assert results() == fast
+    assert 50 < sum(isinstance(result, list) for result in fast) < 400
 
 
 def test_dwells() -> None:

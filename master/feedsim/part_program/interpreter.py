@@ -50,6 +50,7 @@ from feedsim.part_program.words import (
 MAX_REPEATED = 2_000_000  # blocks that loops, jumps back and subprograms execute in all
 MAX_CALLS = 16  # levels of subprograms and repeated sections
 MAX_ELEMENTS = 100_000  # of an array
+MAX_FEED = 1e9  # as programmed
 
 # What most blocks have alone: letters and named values with a number. L and O call and name subprograms.
 _WORD = r"([A-KMNP-Z]|(?:CR|AR|TURN|RP|AP|ANG|RND|CHF|CHR)(?=[ \t]*=))[ \t]*=?[ \t]*([-+]?[\d.]+)"
@@ -149,7 +150,9 @@ class Interpreter:
             recorder.line = line
             text = code[at:end]
             if is_plain(text):
-                self.execute([(name, float(number)) for name, number in _PLAIN_WORD.findall(text)])
+                words = [(name, float(number)) for name, number in _PLAIN_WORD.findall(text)]
+                if not self._execute_line(words):
+                    self.execute(words)
             else:
                 self.here = (at, line)
                 self.block(text)
@@ -808,6 +811,41 @@ class Interpreter:
         if ended:
             self.flow = ended
 
+    def _execute_line(self, words: Sequence[tuple[str, float]]) -> bool:
+        """G0 or G1 with absolute coordinates and F, as most blocks are; as execute() does it. False: another block."""
+        modal, recorder, places = self.modal, self.recorder, self.places
+        if modal.incremental or modal.rounding or self.pending or self.open_line or modal.feed_mode == "G93":
+            return False
+        point, length, motion, feed = self.point.copy(), modal.length, modal.motion, 0.0
+        numbered = coded = False
+        programmed = 0  # a bit for each axis
+        for name, value in words:
+            place = places.get(name)
+            if place is not None:
+                if programmed >> place & 1 or not -MAX_COORDINATE <= value <= MAX_COORDINATE:
+                    return False
+                programmed |= 1 << place
+                point[place] = value * length
+            elif name == "G" and not coded and (value == 1.0 or value == 0.0):
+                motion, coded = "G1" if value else "G0", True
+            elif name == "F" and not feed and 0 < value <= MAX_FEED:
+                feed = value
+            elif name == "N" and not numbered:
+                numbered = True
+            else:
+                return False
+        if not programmed or (motion != "G0" and (motion != "G1" or (not feed and self.speed <= 0))):
+            return False
+        if feed:
+            if modal.feed_mode == "G95" and self.spindle <= 0:
+                return False
+            modal.feed = feed * modal.feed_length
+            self._update_speed()
+        modal.motion, self.point = motion, point
+        rapid = motion == "G0"
+        recorder.straight(point, rapid, math.nan if rapid else self.speed, self.options[rapid])
+        return True
+
     def _code(self, name: str, value: Any, codes: dict[str, tuple[str, str, Any]]) -> None:
         if name == "code":
             spelling, code = value, NAMED_CODES[value]
@@ -871,7 +909,7 @@ class Interpreter:
             del values[name]
         if "F" in values and "dwell" not in done:
             feed = values.pop("F")
-            if not 0 < feed <= 1e9:
+            if not 0 < feed <= MAX_FEED:
                 raise Fault("F", f"the feed {feed:g} must be above 0")
             modal.feed = feed * (1.0 if modal.feed_mode == "G93" else modal.feed_length)
             self._update_speed()
@@ -948,10 +986,11 @@ class Interpreter:
             # An incremental word traverses the shift too (SD42440, standard), whatever the rotation.
             before = [x - shift for x, shift in zip(self.recorder.position, old.offset, strict=True)]
             based = [*frame.unlinear(before[:3]), *before[3:]]
-            self.pending = {
+            shifts = {
                 place: self.pending.get(place, 0.0) + base - now
                 for place, (base, now) in enumerate(zip(based, self.point, strict=True))
             }  # fmt: skip
+            self.pending = {place: shift for place, shift in shifts.items() if shift}
 
     def _frame(self, scan: Scanner, name: str) -> None:
         """TRANS, ROT, SCALE, MIRROR replace all programmable frames; ATRANS, ... add to them."""
@@ -1128,7 +1167,7 @@ class Interpreter:
             return
         corner, once = self._corner(values), self._plain(values, "FB")
         if once is not None:
-            if not 0 < once <= 1e9:
+            if not 0 < once <= MAX_FEED:
                 raise Fault("FB", f"the feed {once:g} must be above 0")
             kept, kept_given = (modal.feed, self.speed), self._feed_given
             modal.feed, self._feed_given = once * modal.feed_length, True
@@ -1214,7 +1253,7 @@ class Interpreter:
         match = [(name, size) for name in ("RND", "CHF", "CHR") if (size := self._plain(values, name)) is not None]
         feed = self._plain(values, "FRC")
         if feed is not None:
-            if not 0 < feed <= 1e9:
+            if not 0 < feed <= MAX_FEED:
                 raise Fault("FRC", f"the feed {feed:g} must be above 0")
             feed *= self.modal.feed_length / 60
         if len(match) > 1:

@@ -108,6 +108,7 @@ FAULTS = {
     "G642 CTOL=0": (1, "CTOL", "tolerance is 0"),
     "CTOL=0\nG642 X1": (2, "CTOL", "tolerance is 0"),
     "G641 ADIS=-1": (1, "ADIS", "negative"),
+    "CTOL=IC(1)": (1, "CTOL", "no meaning"),
     "G643": (1, "G643", "not supported"),
     # values
     "R1=1/0": (1, "/", "division by zero"),

@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from feedsim.part_program.geometry import sine
 from feedsim.part_program.recorder import Fault
@@ -301,7 +300,7 @@ class Scanner:
                 following[:1] == "E" and following[1:] in tuple("0123456789+-") and following[1:]
             ):
                 raise Fault(
-                    f"{word}{self.text[match.start() : self.at]}{self.rest()}".split()[0], _badly_written(following)
+                    f"{word}{self.text[match.start() : self.at]}{self.rest()}".split()[0], badly_written(following)
                 )
             return sign * self.finite(float(match[0].replace("EX", "E")), word)
         value = self._iso_primary(word) if self.iso else self._sinumerik_primary(word)
@@ -408,9 +407,5 @@ class Scanner:
         return tuple(result)
 
 
-def _badly_written(following: str) -> str:
+def badly_written(following: str) -> str:
     return "a number has two points" if following[:1] == "." else "an exponent is written EX, as in 1EX5"
-
-
-def describe(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else repr(value)

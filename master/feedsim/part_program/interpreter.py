@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feedsim.part_program.expressions import NAME, Scanner, Value, Variable, rounded, whole, zero
+from feedsim.part_program.expressions import NAME, Scanner, Value, Variable, badly_written, rounded, whole, zero
 from feedsim.part_program.geometry import (
     IDENTITY,
     MIN_DISTANCE,
@@ -41,6 +41,7 @@ from feedsim.part_program.words import (
     SINUMERIK_CODES,
     SINUMERIK_REFUSED,
     VALUES,
+    WITH_WAY,
     WORKPIECE_LENGTHS,
     Modal,
     refusal_of,
@@ -121,7 +122,7 @@ class Interpreter:
         self.repeated = 0
         self.changes = 0  # of variables: a loop in which nothing changes does not end
         self.passed: dict[tuple[int, int], int] = {}  # jump back -> changes when it was last made
-        self.open_line: tuple[float, int, float, Corner | None] | None = None  # ANG without an end: angle, line, speed
+        self.open_line: tuple[float, int, Corner | None] | None = None  # ANG without an end: angle, line
         self.options: list[Options] = []
         self._update_options()
         self.control = {
@@ -226,11 +227,9 @@ class Interpreter:
         while scan.take(_LABEL):
             pass
         words: list[tuple[str, Any]] = []
-        alone = True
         while scan.rest():
-            if not self._word(scan, words, alone):
+            if not self._word(scan, words):
                 return
-            alone = False
         if words:
             self.execute(words)
 
@@ -249,7 +248,7 @@ class Interpreter:
             self.flow = "end"
         return True
 
-    def _word(self, scan: Scanner, words: list[tuple[str, Any]], alone: bool) -> bool:
+    def _word(self, scan: Scanner, words: list[tuple[str, Any]]) -> bool:
         """Reads the next word into words, or executes the statement that it begins. False: the block is done."""
         scan.skip_space()
         if scan.text[scan.at] == "(":
@@ -279,15 +278,14 @@ class Interpreter:
         match = match or scan.take(NAME)
         if not match:
             raise Fault(scan.rest().split()[0][:20], "the word is not understood")
-        return self._named(scan, match[0].strip(), words, alone)
+        return self._named(scan, match[0].strip(), words)
 
     def _address(self, scan: Scanner, match: re.Match[str], words: list[tuple[str, Any]]) -> None:
         name, number = match[1], match[2]
         following = scan.text[scan.at : scan.at + 2]
         if following[:1] == "." or re.match(r"E[-+\d]", following):
             whole_word = re.match(r"[-+.\w]*", scan.text[match.start() :])
-            reason = "a number has two points" if following[:1] == "." else "an exponent is written EX, as in 1EX5"
-            raise Fault(whole_word[0] if whole_word else name, f"the number is badly written: {reason}")
+            raise Fault(whole_word[0] if whole_word else name, badly_written(following))
         if following[:1] == ",":
             raise Fault(f"{name}{number},", "a decimal point is expected, not a comma")
         words.append((name, scan.finite(float(number.replace("EX", "E")), name)))
@@ -301,8 +299,10 @@ class Interpreter:
             scan.skip_space()
             way = scan.take(_WAY)
             if way:
-                if way[0] not in ("AC", "IC") or not (name in self.places or name in VALUES):
+                if way[0] not in ("AC", "IC"):
                     raise Fault(name, f"{way[0]} is for rotary axes and tables, which are not supported")
+                if name not in self.places and name not in WITH_WAY:
+                    raise Fault(name, f"{way[0]} has no meaning here")
                 scan.expect("(", name)
             elif not scan.rest():
                 raise Fault(name, "the value after = is missing")
@@ -314,15 +314,15 @@ class Interpreter:
         if name in NOTED_VALUES or (name[0] in "MSTDH" and name[1:].isdigit()):
             if not scan.rest():
                 raise Fault(name, "the value after = is missing")
-            value2 = scan.value(name)
-            if name in ("S", "M") and not isinstance(value2, str):
-                words.append((name, float(value2)))
+            given = scan.value(name)
+            if name in ("S", "M") and not isinstance(given, str):
+                words.append((name, float(given)))
             else:
                 self.recorder.note(name)
             return
         raise self._unknown(name)
 
-    def _named(self, scan: Scanner, name: str, words: list[tuple[str, Any]], alone: bool) -> bool:
+    def _named(self, scan: Scanner, name: str, words: list[tuple[str, Any]]) -> bool:
         """A word of letters without a value."""
         if name in self.control:
             if words:
@@ -356,7 +356,7 @@ class Interpreter:
         reason = refusal_of(name)
         if reason:
             raise Fault(name, reason)
-        if not alone and words:
+        if words:
             raise Fault(
                 name,
                 "the word is not understood"
@@ -996,7 +996,7 @@ class Interpreter:
         """TRANS, ROT, SCALE, MIRROR replace all programmable frames; ATRANS, ... add to them."""
         words: list[tuple[str, Any]] = []
         while scan.rest():
-            if not self._word(scan, words, True):
+            if not self._word(scan, words):
                 raise Fault(name, f"{name} stands in a block of its own")
         given: dict[str, float] = {}
         for word, value in words:
@@ -1292,7 +1292,7 @@ class Interpreter:
         if self.open_line is not None:
             if len(given) < 2:
                 raise Fault("ANG", "the second of two lines needs both coordinates of its end")
-            before, line, _, first_corner = self.open_line
+            before, line, first_corner = self.open_line
             p, q = sine(before + 90.0), sine(before)
             x, y = target[first] - self.point[first], target[second] - self.point[second]
             determinant = p * v - q * u
@@ -1311,7 +1311,7 @@ class Interpreter:
         if not given:
             if axes:
                 raise Fault("ANG", "a line whose end comes with the next block has no other axis")
-            self.open_line = (angle, self.recorder.line, 0.0, corner)
+            self.open_line = (angle, self.recorder.line, corner)
             return False
         if len(given) == 2:
             raise Fault("ANG", "a line has ANG and one coordinate of the plane, or both coordinates")

@@ -149,6 +149,7 @@ FRAMES = frozenset({"TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR
 # Named values of a block. Lengths of the workpiece follow G70 and G71; those of smoothing G700 and G710.
 WORKPIECE_LENGTHS = frozenset({"I", "J", "K", "I1", "J1", "K1", "CR", "RP", "RND", "RNDM", "CHF", "CHR"})
 VALUES = WORKPIECE_LENGTHS | {"AR", "TURN", "AP", "ANG", "FRC", "FRCM", "ADIS", "ADISPOS", "CTOL", "RPL", "FB"}
+WITH_WAY = frozenset({"I", "J", "K", "I1", "J1", "K1", "AP", "RP"})  # which AC and IC may stand at
 
 # What does not move the path: passed over and listed. Some have arguments in parentheses, or a value.
 NOTED_WITH_ARGUMENTS = frozenset({

@@ -36,6 +36,7 @@ ORDER = [
     "motions",
     "estimation",
     "trace",
+    "part_program",
     "files",
     "fields",
     "control",

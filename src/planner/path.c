@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "spline.h"
+
 #define HALF_PI 1.57079632679489661923
 #define LEAST_LENGTH 1e-10    /* what is shorter does not move [m] */
 #define LEAST_LEG 1e-9        /* [m] */
@@ -71,6 +73,7 @@ void builder_free(Builder *builder) {
     free(builder->element.piece);
     free(builder->next.piece);
     free(builder->scratch);
+    free(builder->side);
     memset(builder, 0, sizeof *builder);
 }
 
@@ -221,29 +224,174 @@ static bool arc_element(const Program *p, int64_t row, Element *e, double *progr
     return true;
 }
 
+#define MOST_SIDES 4096
+#define UNEVEN 3      /* a side is divided where it is longer than this times one beside it.. */
+#define MOST_PARTS 64 /* ..into at most as many parts */
+#define FIT 0.95      /* share of the tolerance for the spline at the points that are looked at */
+
+/* Whether a row may be part of a spline. */
+static bool is_short(const Program *p, int64_t row) {
+    if (!p->compressed[row] || p->motion[row] != LINE) {
+        return false;
+    }
+    double all, fed;
+    measure(p, start_of(p, row), p->end + row * p->axes, &all, &fed);
+    return all <= p->short_block;
+}
+
+static double tolerance_of_spline(const Program *p, int64_t row) {
+    return p->blending[row] == TOLERANCE && p->tolerance[row] > 0 ? p->tolerance[row] : p->spline_tolerance;
+}
+
+/* Angle between two lines, as the length of the difference of their directions. */
+static double turn_between(const Program *p, const Side *side, const Side *next) {
+    const double *a = start_of(p, side->row), *b = p->end + side->row * p->axes;
+    const double *c = start_of(p, next->row), *d = p->end + next->row * p->axes;
+    double sum = 0;
+    for (int64_t i = 0; i < p->axes; i++) {
+        const double difference = (d[i] - c[i]) / next->length - (b[i] - a[i]) / side->length;
+        sum += difference * difference;
+    }
+    return sqrt(sum);
+}
+
+/* Rows from `row` on that one spline may follow: short lines without a stop or a sharp corner between them. Sharp is
+ * also what sides of that length and angle cannot do within the tolerance. Returns their number, 0 without memory. */
+static size_t find_sides(Builder *builder, int64_t row, double *tolerance) {
+    const Program *p = builder->program;
+    size_t count = 0;
+    *tolerance = HUGE_VAL;
+    while (count < MOST_SIDES) {
+        if (!make_room((void **)&builder->side, &builder->side_room, count + 1, sizeof *builder->side)) {
+            return 0;
+        }
+        Side *side = &builder->side[count];
+        *side = (Side){.row = row, .parts = 1};
+        measure(p, start_of(p, row), p->end + row * p->axes, &side->length, &side->programmed);
+        const double own = fmin(*tolerance, tolerance_of_spline(p, row));
+        if (count > 0) {
+            side->turn = turn_between(p, side - 1, side);
+            if (side->turn > p->split_angle || side->turn * fmin(side->length, side[-1].length) > 8 * own) {
+                break;
+            }
+        }
+        *tolerance = own;
+        count++;
+        const int64_t next = next_row(p, row + 1);
+        if (stops_between(p, row, next) || !is_short(p, next)) {
+            break;
+        }
+        row = next;
+    }
+    return count;
+}
+
+/* A spline within the tolerance of the rows from the element's on; fewer of them where it needs a corner. */
+static bool spline_element(Builder *builder, Element *e, double *programmed) {
+    const Program *p = builder->program;
+    const size_t axes = (size_t)p->axes;
+    double tolerance;
+    size_t sides = find_sides(builder, e->row, &tolerance), points = 1;
+    Side *side = builder->side;
+    Spline spline;
+    for (;; points = 1) {
+        for (size_t k = 0; k < sides; k++) {
+            double beside = HUGE_VAL, turn = 0;
+            if (k > 0) {
+                beside = side[k - 1].length;
+                turn = side[k].turn;
+            }
+            if (k + 1 < sides) {
+                beside = fmin(beside, side[k + 1].length);
+                turn = fmax(turn, side[k + 1].turn);
+            }
+            const bool divided = side[k].length > UNEVEN * beside && turn * side[k].length > 2 * tolerance;
+            side[k].parts = divided ? (size_t)fmin(MOST_PARTS, ceil(side[k].length / (UNEVEN * beside))) : 1;
+            points += side[k].parts;
+        }
+        if (sides < 2) {
+            return sides == 1 && line_element(p, e->row, e, programmed);
+        }
+        if (!make_room((void **)&builder->scratch, &builder->scratch_room, spline_memory(points, axes),
+                       sizeof(double))) {
+            return false;
+        }
+        spline_lay_out(&spline, points, axes, builder->scratch);
+        double *corner = spline.corner;
+        memcpy(corner, start_of(p, e->row), axes * sizeof *corner);
+        for (size_t k = 0; k < sides; k++) {
+            const double *from = start_of(p, side[k].row), *to = p->end + side[k].row * p->axes;
+            for (size_t part = 1; part <= side[k].parts; part++) {
+                corner += axes;
+                for (size_t i = 0; i < axes; i++) {
+                    corner[i] = part == side[k].parts
+                                    ? to[i]
+                                    : from[i] + (to[i] - from[i]) * (double)part / (double)side[k].parts;
+                }
+            }
+        }
+        size_t worst = 0;
+        if (fit_spline(&spline, FIT * tolerance, &worst) <= FIT * tolerance) {
+            break;
+        }
+        /* A corner where it strays first, at the sharper end of that side. */
+        size_t at = 0;
+        while (worst >= side[at].parts) {
+            worst -= side[at++].parts;
+        }
+        const size_t behind = at + 1 < sides && (at == 0 || side[at + 1].turn > side[at].turn) ? at + 1 : at;
+        sides = behind > 0 && behind < sides ? behind : sides - 1;
+    }
+    size_t k = 0;
+    for (size_t each = 0; each < sides; each++) {
+        const double per = side[each].programmed / (double)side[each].parts;
+        for (size_t part = 0; part < side[each].parts; part++, k++) {
+            Zone *z = new_piece(e);
+            if (z == NULL) {
+                return false;
+            }
+            const double h = spline.h[k], square = h * h;
+            z->curve = (Curve){.degree = 3, .c = h};
+            for (size_t i = 0; i < axes; i++) {
+                const double *g = spline.value + k * axes + i, *second = spline.second + k * axes + i;
+                z->curve.p[0][i] = g[0];
+                z->curve.p[1][i] = g[axes] - g[0] - square / 6 * (2 * second[0] + second[axes]);
+                z->curve.p[2][i] = square / 2 * second[0];
+                z->curve.p[3][i] = square / 6 * (second[axes] - second[0]);
+            }
+            z->row = z->row_end = side[each].row;
+            z->s0 = *programmed;
+            z->s1 = *programmed += per;
+            z->strays = spline.distance[k];
+        }
+    }
+    e->last = side[sides - 1].row;
+    return true;
+}
+
 /* Read the row, and as many as belong to its spline; *s: place of the begin, then of the end on the programmed path. */
 static bool read_element(Builder *builder, int64_t row, double *s, Element *e) {
     const Program *p = builder->program;
+    double programmed = 0;
     e->count = 0;
     e->length = 0;
     e->row = e->last = row;
     e->s = *s;
     e->trim = 0;
-    double programmed = 0;
-    if (p->motion[row] == ARC) {
-        if (!arc_element(p, row, e, &programmed)) {
-            return false;
-        }
-    } else {
-        if (!line_element(p, row, e, &programmed)) {
-            return false;
-        }
+    if (p->motion[row] == ARC ? !arc_element(p, row, e, &programmed)
+        : is_short(p, row)    ? !spline_element(builder, e, &programmed)
+                              : !line_element(p, row, e, &programmed)) {
+        return false;
     }
     for (size_t k = 0; k < e->count; k++) {
         Zone *z = &e->piece[k];
-        z->row = z->row_end = row;
-        z->s0 = *s + programmed * z->u0;
-        z->s1 = *s + programmed * z->u1;
+        if (e->last == row && e->piece->curve.degree == 1) {
+            z->row = z->row_end = row;
+            z->s0 = programmed * z->u0;
+            z->s1 = programmed * z->u1;
+        }
+        z->s0 += *s;
+        z->s1 += *s;
         z->length = z->curve.c * (z->u1 - z->u0);
         e->length += z->length;
     }
@@ -254,8 +402,16 @@ static bool read_element(Builder *builder, int64_t row, double *s, Element *e) {
 /* Position and derivatives by q at q from the element's begin, and the place on the programmed path. */
 static double element_at(const Element *e, size_t axes, double q, int order, double x[][PLANNER_AXES]) {
     size_t k = 0;
-    while (k + 1 < e->count && q > e->piece[k].length) {
-        q -= e->piece[k++].length;
+    if (q < 0.5 * e->length) {
+        while (k + 1 < e->count && q > e->piece[k].length) {
+            q -= e->piece[k++].length;
+        }
+    } else {
+        double behind = e->length - q;
+        for (k = e->count - 1; k > 0 && behind > e->piece[k].length; k--) {
+            behind -= e->piece[k].length;
+        }
+        q = e->piece[k].length - behind;
     }
     const Zone *z = &e->piece[k];
     curve_at(&z->curve, axes, z->u0 + q / z->curve.c, order, x);
@@ -283,10 +439,10 @@ static double distance(size_t axes, const double *a, const double *b) {
     return sqrt(sum);
 }
 
-/* Legs of the quintic: first derivative c t at both ends. c = 2 L makes a straight line run evenly, 1.75 L serves
- * corners of 90 degrees and more. */
+/* First derivative by u at both ends. 2 L makes a straight line run evenly and is the fastest up to 120 degrees or so;
+ * where the path turns back, less is. */
 static double first_derivative(double L, double cosine) {
-    return L * (1.75 + (cosine > 0 ? 0.25 * cosine : 0));
+    return L * (2 + 0.7 * fmin(cosine, 0));
 }
 
 /* The quintic that goes on from the elements with position and two derivatives by q. */
@@ -352,12 +508,33 @@ static double deviation(const Element *e1, const Element *e2, size_t axes, doubl
     return largest;
 }
 
+/* Largest distance of the stretch q0..q1 of an element from the programmed path. */
+static double strays(const Element *e, double q0, double q1) {
+    double largest = 0, q = 0;
+    for (size_t k = 0; k < e->count; q += e->piece[k++].length) {
+        if (q < q1 && q + e->piece[k].length > q0) {
+            largest = fmax(largest, e->piece[k].strays);
+        }
+    }
+    return largest;
+}
+
 /* The longest leg with which the corner stays within `tolerance`. */
 static double leg_within(const Element *e1, const Element *e2, size_t axes, double longest, double tolerance,
                          double jump, double cosine) {
     if (is_straight(e1) && is_straight(e2)) {
         const double c = first_derivative(1, cosine);
         return fmin(longest, tolerance / (jump * (0.5 - 5 * c / 32)));
+    }
+    if (e1->count > 1 || e2->count > 1) {
+        /* Splines stray from the programmed path already. */
+        const double half = tolerance / 2;
+        if (strays(e1, e1->length - longest, e1->length) > 0 || strays(e2, 0, longest) > 0) {
+            tolerance = half;
+            while (fmax(strays(e1, e1->length - longest, e1->length), strays(e2, 0, longest)) > half) {
+                longest /= 2;
+            }
+        }
     }
     double L = longest, d = deviation(e1, e2, axes, L, cosine);
     double power = jump > 0.01 ? 1 : 2;
@@ -429,7 +606,7 @@ static bool set_limits(const Program *p, Zones *zones, Zone *z, double feed, boo
             double (*x)[PLANNER_AXES] = point[k & 1], (*y)[PLANNER_AXES] = point[!(k & 1)];
             double *X = zones->derivatives + z->derivatives + 3 * axes * k;
             curve_at(&z->curve, axes, z->u0 + h * (double)(k + 1), 4, y);
-            double square[2] = {0, 0}, square_fed[2] = {0, 0}, bend = 0, first = 0, second = 0, third = 0;
+            double square[2] = {0, 0}, square_fed[2] = {0, 0}, bend = 0, first = 0, third = 0;
             for (size_t i = 0; i < axes; i++) {
                 double X1 = fmax(fabs(x[1][i]), fabs(y[1][i])), X2 = fmax(fabs(x[2][i]), fabs(y[2][i]));
                 double X3 = fmax(fabs(x[3][i]), fabs(y[3][i]));
@@ -453,14 +630,14 @@ static bool set_limits(const Program *p, Zones *zones, Zone *z, double feed, boo
                 square_fed[0] += is_fed ? x[1][i] * x[1][i] : 0;
                 square_fed[1] += is_fed ? y[1][i] * y[1][i] : 0;
                 first += X1 * X1;
-                second += X2 * X2;
                 third += X3 * X3;
                 lower(z, BOUND_SPEED, p->max_speed[i] / X[3 * i], (int64_t)i);
                 lower(z, BOUND_ACCELERATION, sqrt(p->max_acceleration[i] / X[3 * i + 1]), (int64_t)i);
                 lower(z, BOUND_JERK, cbrt(p->max_jerk[i] / X[3 * i + 2]), (int64_t)i);
             }
-            /* |x'|^2 has the second derivative 2 (|x''|^2 + x' . x'''); that of an arc is constant but for rounding. */
-            bend = arc ? 0 : factor * 2 * (second + sqrt(first * third));
+            /* |x'|^2 has the second derivative 2 (|x''|^2 + x' . x'''); where that is positive, the largest value is at
+             * an end. Of an arc it is constant but for rounding. */
+            bend = arc ? 0 : factor * 2 * sqrt(first * third);
             norm = fmax(norm, fmax(square[0], square[1]) + bend);
             fed = fmax(fed, fmax(square_fed[0], square_fed[1]) + bend);
         }
@@ -477,7 +654,6 @@ static bool set_limits(const Program *p, Zones *zones, Zone *z, double feed, boo
 
 bool builder_begin(Builder *builder, int64_t row, double s) {
     builder->s = s;
-    builder->begun = true;
     if (!read_element(builder, row, &builder->s, &builder->element)) {
         return false;
     }
@@ -580,7 +756,7 @@ static bool append_corner(const Program *p, Zones *zones, const Element *e1, con
     z->restarts = true;
     z->row = e1->last;
     z->row_end = e2->row;
-    z->s0 = z->s1 = s;
+    z->s0 = z->s1 = z->s_vertex = s;
     z->u1 = 1;
     z->kind = blending == CONTINUOUS ? ZONE_VERTEX : ZONE_CORNER;
     const double feed = fmin(feed_of(p, e1->last), feed_of(p, e2->row));
@@ -658,4 +834,38 @@ bool builder_next(Builder *builder, Zones *zones, bool *stops) {
         builder->row = next_row(p, builder->element.last + 1);
     }
     return true;
+}
+
+bool builder_alone(Builder *builder, Zones *zones) {
+    Element *e = &builder->element;
+    const double trim = e->trim;
+    e->trim = 0;
+    const bool held = append_element(builder->program, zones, e, 0);
+    e->trim = trim;
+    return held;
+}
+
+int64_t row_in_corner(const Program *p, const Zone *z, double s, double *end) {
+    double all, programmed;
+    int64_t row = s < z->s_vertex ? z->row : z->row_end;
+    *end = s < z->s_vertex ? z->s_vertex : HUGE_VAL;
+    if (!is_short(p, row)) {
+        return row;
+    }
+    measure(p, start_of(p, row), p->end + row * p->axes, &all, &programmed);
+    if (s < z->s_vertex) {
+        while (s < *end - programmed && row > 0 && is_short(p, row - 1)) {
+            *end -= programmed;
+            row--;
+            measure(p, start_of(p, row), p->end + row * p->axes, &all, &programmed);
+        }
+    } else {
+        *end = z->s_vertex + programmed;
+        while (s >= *end && row + 1 < p->rows && is_short(p, row + 1)) {
+            row++;
+            measure(p, start_of(p, row), p->end + row * p->axes, &all, &programmed);
+            *end += programmed;
+        }
+    }
+    return row;
 }

@@ -33,6 +33,7 @@ typedef struct Zone {
     double q;             /* where it begins, in the window */
     double length;        /* c (u1 - u0) */
     double s0, s1;        /* place on the programmed path at u0 and u1 */
+    double s_vertex;      /* of the corner that is rounded, which is passed in the middle */
     int64_t row, row_end; /* before and behind the middle of a corner; else the same */
     ZoneKind kind;
     int64_t element;  /* row that a builder begins with to make this zone again.. */
@@ -41,6 +42,7 @@ typedef struct Zone {
     bool restarts;    /* it is then the same, though the corner ahead of the element is not made again */
     double V[BOUND_COUNT];
     int8_t V_axis[BOUND_COUNT];
+    double strays;         /* largest distance of a piece of a spline from the programmed path */
     double a_path, j_path; /* limits on the second and third derivative of q by time that are for the path */
     size_t intervals;      /* 0: straight, a_line and j_line say all */
     size_t derivatives;    /* where its [intervals][3][axes] largest derivatives by q stand */
@@ -66,18 +68,23 @@ typedef struct Element {
     double trim;       /* how much the corner at its begin takes */
 } Element;
 
-typedef enum Ending { ENDING_NONE, ENDING_STOP, ENDING_PROGRAM } Ending;
+/* A row that a spline follows. */
+typedef struct Side {
+    int64_t row;
+    double length, programmed; /* over all axes, and as the place on the programmed path counts */
+    double turn;               /* from the side before */
+    size_t parts;
+} Side;
 
 /* Makes zones, one element with the corner behind it at a time. */
 typedef struct Builder {
     const Program *program;
     Element element, next;
-    bool begun;
-    double s;        /* behind `element`, or `next` where there is one */
+    double s;        /* behind `element` */
     int64_t row;     /* the next one to be read */
-    bool to_stop;    /* the motion stops behind `element` */
-    double *scratch; /* of the spline */
-    size_t scratch_room;
+    double *scratch; /* of splines */
+    Side *side;
+    size_t scratch_room, side_room;
 } Builder;
 
 void builder_free(Builder *builder);
@@ -89,6 +96,12 @@ bool builder_begin(Builder *builder, int64_t row, double s);
 /* Append the zones of the next element and of the corner behind it. *stops: the motion rests there, builder->row is
  * the next row. False without memory. */
 bool builder_next(Builder *builder, Zones *zones, bool *stops);
+
+/* Append the zones of the element that is the next one to be appended, as if there were stops at both of its ends. */
+bool builder_alone(Builder *builder, Zones *zones);
+
+/* The row at the place s of a corner, and where it ends; a corner may take in several rows of a spline. */
+int64_t row_in_corner(const Program *program, const Zone *corner, double s, double *end);
 
 /* The first row from `row` on that moves or dwells; program->rows without one. */
 int64_t next_row(const Program *program, int64_t row);

@@ -17,7 +17,7 @@ const char *planner_interface(void) {
 
 #define WINDOW 2000      /* zones that are looked at together */
 #define LEAST_SHARE 0.35 /* share of acceleration and jerk for the curvature, at least.. */
-#define LARGEST_SHARE 0.95
+#define LARGEST_SHARE 0.998
 #define LIMIT_KINDS 6
 
 /* What is kept of a section: what it is planned from, and what makes its zones again. */
@@ -46,8 +46,10 @@ struct Planner {
     double T, share;  /* of the window before */
     Section *section;
     size_t sections, room;
-    double with_roundings, with_stops, stretch_begin, stretch_stops; /* [s] */
-    int64_t corners, stretch_corners;
+    double begin, stops; /* of the motion that is being planned: when it began, how long it takes with stops [s] */
+    int64_t rounded;     /* its rounded corners */
+    double with_roundings, with_stops; /* of motions that would be shorter with stops [s] */
+    int64_t corners;
     int64_t held_row;                           /* row whose limits are being counted */
     double held[LIMIT_KINDS][PLANNER_AXES + 1]; /* time by limit and axis */
     /* for sampling */
@@ -91,6 +93,11 @@ void planner_destroy(Planner *planner) {
         free(planner->section);
         free(planner);
     }
+}
+
+/* The next instant at which a motion may begin. */
+static double on_grid(const Program *p, double t) {
+    return p->grid > 0 ? fmax(ceil(t / p->grid - 1e-9), 0) * p->grid : t;
 }
 
 /* --- the best filter time and share */
@@ -289,6 +296,33 @@ static void meet(Planner *planner, int64_t row, int64_t next, double t) {
     p->start_time[next] = t;
 }
 
+/* Place on the programmed path at a share of the zone. */
+static double place_on_program(const Zone *z, double share) {
+    if (z->kind == ZONE_ELEMENT) {
+        return z->s0 + (z->s1 - z->s0) * share;
+    }
+    return share < 0.5 ? z->s0 + (z->s_vertex - z->s0) * 2 * share
+                       : z->s_vertex + (z->s1 - z->s_vertex) * (2 * share - 1);
+}
+
+/* Rows that meet within a corner, as far as the stretch goes: at its vertex, and, of splines, on either side. */
+static void meet_in_corner(Planner *planner, const Stretch *stretch, const Zone *z) {
+    size_t hint[2] = {0, 0};
+    double end = z->s_vertex;
+    int64_t row = z->kind == ZONE_VERTEX ? z->row : row_in_corner(&planner->program, z, z->s0, &end);
+    while (end < z->s1 || end == z->s_vertex) {
+        const double before = z->s_vertex - z->s0, behind = z->s1 - z->s_vertex;
+        const double share = end < z->s_vertex ? 0.5 * (end - z->s0) / before
+                                               : (end > z->s_vertex ? 0.5 + 0.5 * (end - z->s_vertex) / behind : 0.5);
+        const double q = z->q + z->length * share;
+        const int64_t next = row_in_corner(&planner->program, z, end, &end);
+        if (q >= stretch->q0 && (q < stretch->q1 || stretch->v1 == 0)) {
+            meet(planner, row, next, planner->t + time_at(&planner->speed, q - stretch->q0, hint));
+        }
+        row = next;
+    }
+}
+
 static bool add_section(Planner *planner, const Stretch *stretch, double T, double share) {
     if (planner->sections == planner->room) {
         const size_t room = planner->room ? 2 * planner->room : 64;
@@ -321,12 +355,9 @@ static bool add_section(Planner *planner, const Stretch *stretch, double T, doub
     for (size_t k = 0; k < stretch->count; k++) {
         const Zone *z = &stretch->zone[k];
         if (z->kind != ZONE_ELEMENT) {
-            if (k + 1 < stretch->count || stretch->v1 == 0) {
-                meet(planner, z->row, z->row_end, planner->t + time_at(speed, middle_of(z) - stretch->q0, hint));
-            }
-        }
-        if (k + 1 < stretch->count && z[1].row != z->row_end) {
-            meet(planner, z->row_end, z[1].row, planner->t + time_at(speed, z[1].q - stretch->q0, hint));
+            meet_in_corner(planner, stretch, z);
+        } else if (k + 1 < stretch->count && z[1].kind == ZONE_ELEMENT && z[1].row != z->row) {
+            meet(planner, z->row, z[1].row, planner->t + time_at(speed, z[1].q - stretch->q0, hint));
         }
     }
     count_limits(planner, stretch);
@@ -422,17 +453,35 @@ static void drop_zones(Zones *zones, size_t from) {
     }
 }
 
+/* Add how long the next element takes from rest to rest. False without memory. */
+static bool add_stops(Planner *planner) {
+    Zones *zones = &planner->zones_again;
+    zones->count = zones->used = 0;
+    planner->sampled = SIZE_MAX;
+    if (!builder_alone(&planner->builder, zones)) {
+        return false;
+    }
+    count_from(zones->zone, zones->count);
+    Stretch stretch = stretch_of(&planner->program, zones, 0, zones->count - 1, 0, 0);
+    double T = planner->longest_T, share = 0.65, duration;
+    if (!find_best(&stretch, &planner->speed_again, planner->longest_T, false, &T, &share, &duration)) {
+        return false;
+    }
+    planner->stops += on_grid(&planner->program, duration);
+    return true;
+}
+
 /* Fill the window up; false without memory. */
 static bool fill_window(Planner *planner) {
     Zones *zones = &planner->zones;
     while (!planner->ends && zones->count < planner->window) {
         size_t from = zones->count;
-        if (!builder_next(&planner->builder, zones, &planner->ends)) {
+        if (!add_stops(planner) || !builder_next(&planner->builder, zones, &planner->ends)) {
             return false;
         }
         double q = from > 0 ? zones->zone[from - 1].q + zones->zone[from - 1].length : 0;
         for (; from < zones->count; from++) {
-            planner->stretch_corners += zones->zone[from].kind == ZONE_CORNER;
+            planner->rounded += zones->zone[from].kind == ZONE_CORNER;
             zones->zone[from].q = q;
             q += zones->zone[from].length;
         }
@@ -452,7 +501,7 @@ static bool begin_motion(Planner *planner) {
             planner->begun = false;
             return true;
         }
-        planner->t = p->grid > 0 ? ceil(planner->t / p->grid - 1e-9) * p->grid : planner->t;
+        planner->t = on_grid(p, planner->t);
         if (p->motion[next] != 3) {
             break;
         }
@@ -464,6 +513,9 @@ static bool begin_motion(Planner *planner) {
     planner->begun = true;
     planner->ends = false;
     planner->v0 = 0;
+    planner->begin = planner->t;
+    planner->stops = 0;
+    planner->rounded = 0;
     planner->T = planner->longest_T;
     planner->share = 0.65;
     planner->zones.count = planner->zones.used = 0;
@@ -520,6 +572,12 @@ int planner_advance(Planner *planner, int64_t *rows) {
             planner->s = planner->builder.s;
             planner->begun = false;
             close_row(planner);
+            const double taken = on_grid(p, planner->t) - planner->begin;
+            if (held && planner->rounded > 0 && planner->stops < taken * (1 - 1e-9)) {
+                planner->with_roundings += taken;
+                planner->with_stops += planner->stops;
+                planner->corners += planner->rounded;
+            }
         } else if (cuts > 0) {
             planner->row = zones->zone[from].row_end;
             planner->v0 = v;
@@ -582,7 +640,7 @@ static bool plan_again(Planner *planner, size_t k) {
 }
 
 int planner_sample(Planner *planner, int64_t n, const double t[], double x[], int64_t row[], double s[], double v[],
-                   double a[], double j[], double to_end[]) {
+                   double a[], double j[], double parameter[]) {
     const size_t axes = (size_t)planner->program.axes;
     size_t k = 0, hint[2] = {0, 0}, zone = 0;
     if (planner->sections == 0) {
@@ -639,13 +697,14 @@ int planner_sample(Planner *planner, int64_t n, const double t[], double x[], in
         curve_at(&z->curve, axes, u, derivatives ? 3 : 0, d);
         memcpy(x + (size_t)at * axes, d[0], axes * sizeof *x);
         if (row != NULL) {
-            row[at] = z->kind != ZONE_ELEMENT && place >= middle_of(z) ? z->row_end : z->row;
+            double end;
+            const double share = z->length > 0 ? inside / z->length : 0.5;
+            s[at] = place_on_program(z, share);
+            row[at] = z->kind == ZONE_ELEMENT ? z->row : row_in_corner(&planner->program, z, s[at], &end);
         }
-        if (s != NULL) {
-            s[at] = z->length > 0 ? z->s0 + (z->s1 - z->s0) * (inside / z->length) : z->s0;
-        }
-        if (to_end != NULL) {
-            to_end[at] = fmin(inside, z->length - inside);
+        if (parameter != NULL) {
+            memcpy(parameter + 5 * at, q, sizeof q);
+            parameter[5 * at + 4] = fmin(inside, z->length - inside);
         }
         if (derivatives && z->length > 0) {
             const double r = q[1] / z->curve.c, r2 = q[2] / z->curve.c, r3 = q[3] / z->curve.c; /* of u by time */

@@ -98,8 +98,8 @@ PLANNER_API void planner_destroy(Planner *planner);
  * PLANNER_OUT_OF_MEMORY. *rows: those that are planned. */
 PLANNER_API int planner_advance(Planner *planner, int64_t *rows);
 
-/* Duration [s] of what is planned; time of the roundings' stretches that would be shorter with stops at all corners:
- * saved[0] with roundings, saved[1] with stops [s], and their number of corners. */
+/* Duration [s] of what is planned. Of all motions from rest to rest that exact stops at their corners would make
+ * shorter: saved[0] [s] as they are, saved[1] [s] with stops, and their number of corners. */
 PLANNER_API double planner_duration(const Planner *planner, double saved[2], int64_t *corners);
 
 /* Number of sections; of section k rows that it begins and ends in, begin and duration [s], filter time [s], share of
@@ -107,10 +107,11 @@ PLANNER_API double planner_duration(const Planner *planner, double saved[2], int
 PLANNER_API int64_t planner_sections(const Planner *planner);
 PLANNER_API void planner_section(const Planner *planner, int64_t k, int64_t rows[2], double values[4]);
 
-/* At n instants t [s], ascending: positions x[n][axes] [m]; where not NULL: row, place s on the programmed path [m]
- * from its beginning, derivatives by time v, a, j of x [n][axes] and the distance [m], along the path's parameter, to
- * the nearer end of the zone that x lies in. Returns PLANNER_DONE or PLANNER_OUT_OF_MEMORY. */
+/* At n instants t [s], ascending: positions x[n][axes] [m]; where not NULL: row and place s on the programmed path [m]
+ * from its beginning; derivatives v, a, j of x by time [n][axes]; of the path's parameter q in its section value, three
+ * derivatives by time and the distance to the nearer end of the zone that it lies in [n][5]. Returns PLANNER_DONE or
+ * PLANNER_OUT_OF_MEMORY. */
 PLANNER_API int planner_sample(Planner *planner, int64_t n, const double t[], double x[], int64_t row[], double s[],
-                               double v[], double a[], double j[], double to_end[]);
+                               double v[], double a[], double j[], double q[]);
 
 #endif

@@ -71,7 +71,8 @@ class Limits:
             bad = ~(values > 0) | (np.isinf(values) & (what != "max_jerk"))
             if bad.any():
                 axis = int(np.flatnonzero(bad)[0])
-                raise InputError(f"{what} of {self.axes[axis]} is {values[axis]:.9g}; it must be above 0")
+                finite = "" if what == "max_jerk" else " and finite"
+                raise InputError(f"{what} of {self.axes[axis]} is {values[axis]:.9g}; it must be above 0{finite}")
             found.append(values[at])
         return found[0], found[1], found[2]
 
@@ -88,12 +89,15 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """At T instants, exactly: velocity, acceleration, jerk (T, A) [m/s, m/s^2, m/s^3]; to_end (T,): distance to the
-    nearer end of the line, arc or corner along the path [m], where jerk (and in G64 and G641 more) steps."""
+    """At T instants, exactly: velocity, acceleration, jerk (T, A) [m/s, m/s^2, m/s^3]; parameter (T, 4): the path's
+    parameter q in its section, which is its length but for corners, and its three derivatives by time; to_end (T,):
+    distance to the nearer end of the line, arc or corner along the path [m], where the jerk steps, and in G64 and G641
+    the acceleration."""
 
     velocity: Floats
     acceleration: Floats
     jerk: Floats
+    parameter: Floats
     to_end: Floats
 
 
@@ -146,9 +150,10 @@ class PlannedPath:
     def derivatives(self, t: ArrayLike) -> Derivatives:
         """Velocity, acceleration and jerk at ascending instants ``t`` (T,) [s], in closed form."""
         at, position = self._at(t)
-        v, a, j, to_end = np.zeros_like(position), np.zeros_like(position), np.zeros_like(position), np.empty(len(at))
-        self._call(at, position, None, None, v, a, j, to_end)
-        return Derivatives(v, a, j, to_end)
+        v, a, j = (np.zeros_like(position) for _ in range(3))
+        q = np.empty((len(at), 5))
+        self._call(at, position, None, None, v, a, j, q)
+        return Derivatives(v, a, j, q[:, :4], q[:, 4])
 
     @property
     def sections(self) -> Sections:

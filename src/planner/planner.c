@@ -305,21 +305,41 @@ static double place_on_program(const Zone *z, double share) {
                        : z->s_vertex + (z->s1 - z->s_vertex) * (2 * share - 1);
 }
 
-/* Rows that meet within a corner, as far as the stretch goes: at its vertex, and, of splines, on either side. */
-static void meet_in_corner(Planner *planner, const Stretch *stretch, const Zone *z) {
+/* The share of the zone that lies ahead of a place on the programmed path. */
+static double share_of_zone(const Zone *z, double s) {
+    if (z->kind == ZONE_ELEMENT) {
+        return s > z->s0 ? (s - z->s0) / (z->s1 - z->s0) : 0;
+    }
+    if (s == z->s_vertex) {
+        return 0.5;
+    }
+    return s < z->s_vertex ? 0.5 * (s - z->s0) / (z->s_vertex - z->s0)
+                           : 0.5 + 0.5 * (s - z->s_vertex) / (z->s1 - z->s_vertex);
+}
+
+/* Let rows meet in the zones of a stretch: where an element of another row begins, at the vertex of a corner, and
+ * within corners of splines on either side of it. */
+static void meet_rows(Planner *planner, const Stretch *stretch) {
     size_t hint[2] = {0, 0};
-    double end = z->s_vertex;
-    int64_t row = z->kind == ZONE_VERTEX ? z->row : row_in_corner(&planner->program, z, z->s0, &end);
-    while (end < z->s1 || end == z->s_vertex) {
-        const double before = z->s_vertex - z->s0, behind = z->s1 - z->s_vertex;
-        const double share = end < z->s_vertex ? 0.5 * (end - z->s0) / before
-                                               : (end > z->s_vertex ? 0.5 + 0.5 * (end - z->s_vertex) / behind : 0.5);
-        const double q = z->q + z->length * share;
-        const int64_t next = row_in_corner(&planner->program, z, end, &end);
-        if (q >= stretch->q0 && (q < stretch->q1 || stretch->v1 == 0)) {
-            meet(planner, row, next, planner->t + time_at(&planner->speed, q - stretch->q0, hint));
+    int64_t row = -1;
+    for (size_t k = 0; k < stretch->count; k++) {
+        const Zone *z = &stretch->zone[k];
+        double from = z->s0, end = z->s1;
+        int64_t next = z->kind == ZONE_CORNER ? row_in_corner(&planner->program, z, from, &end) : z->row;
+        for (;;) {
+            if (next > row) {
+                const double share = share_of_zone(z, from), q = z->q + z->length * share;
+                if (row >= 0 && q >= stretch->q0 && (q < stretch->q1 || stretch->v1 == 0)) {
+                    meet(planner, row, next, planner->t + time_at(&planner->speed, q - stretch->q0, hint));
+                }
+                row = next;
+            }
+            if (z->kind == ZONE_ELEMENT || (end >= z->s1 && (z->kind == ZONE_CORNER || row == z->row_end))) {
+                break;
+            }
+            from = end;
+            next = row_in_corner(&planner->program, z, from, &end);
         }
-        row = next;
     }
 }
 
@@ -348,22 +368,18 @@ static bool add_section(Planner *planner, const Stretch *stretch, double T, doub
         .zones = (int64_t)stretch->count,
         .rows = {stretch->v0 > 0 ? first->row_end : first->row, last->row},
     };
-    size_t hint[2] = {0, 0};
     if (stretch->v0 == 0) {
         planner->program.start_time[first->row] = planner->t;
     }
-    for (size_t k = 0; k < stretch->count; k++) {
-        const Zone *z = &stretch->zone[k];
-        if (z->kind != ZONE_ELEMENT) {
-            meet_in_corner(planner, stretch, z);
-        } else if (k + 1 < stretch->count && z[1].kind == ZONE_ELEMENT && z[1].row != z->row) {
-            meet(planner, z->row, z[1].row, planner->t + time_at(speed, z[1].q - stretch->q0, hint));
-        }
-    }
+    meet_rows(planner, stretch);
     count_limits(planner, stretch);
     planner->t += speed->duration;
     if (stretch->v1 == 0) {
-        planner->program.end_time[last->row_end] = planner->t;
+        const Program *p = &planner->program;
+        p->end_time[last->row_end] = planner->t;
+        for (int64_t i = last->row_end + 1; i < next_row(p, i); i++) {
+            p->start_time[i] = p->end_time[i] = planner->t;
+        }
     }
     return true;
 }
@@ -444,7 +460,9 @@ static void drop_zones(Zones *zones, size_t from) {
         }
     }
     memmove(zones->zone, zones->zone + from, (zones->count - from) * sizeof *zones->zone);
-    memmove(zones->derivatives, zones->derivatives + kept, (zones->used - kept) * sizeof *zones->derivatives);
+    if (zones->used > kept) {
+        memmove(zones->derivatives, zones->derivatives + kept, (zones->used - kept) * sizeof *zones->derivatives);
+    }
     zones->count -= from;
     zones->used -= kept;
     count_from(zones->zone, zones->count);

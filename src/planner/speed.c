@@ -438,7 +438,9 @@ int plan_speed(const Stretch *stretch, Speed *speed) {
 
 /* --- the mean over T */
 
-/* Phase at t: -1 ahead of the first one, `phases` behind the last one. */
+#define FEW_PHASES 16
+
+/* Phase at t; `phases` behind the last one. */
 static size_t find_phase(const Speed *speed, double t, size_t hint) {
     const Phase *phase = speed->phase;
     size_t k = hint < speed->phases ? hint : speed->phases;
@@ -477,8 +479,29 @@ void motion_at(const Speed *speed, double t, size_t hint[2], double q[4]) {
         q[3] = 0;
         return;
     }
-    const Point begin = unfiltered_at(speed, middle - T / 2, &hint[0]);
-    q[0] = ((end.S - begin.S) + (end.S_rest - begin.S_rest)) / T;
+    const double t0 = middle - T / 2, t1 = middle + T / 2;
+    const Point begin = unfiltered_at(speed, t0, &hint[0]);
+    const size_t first = t0 < 0 ? 0 : hint[0];
+    if (hint[1] - first > FEW_PHASES) {
+        q[0] = ((end.S - begin.S) + (end.S_rest - begin.S_rest)) / T;
+    } else { /* long phases: what they add to the place of the begin is exact to more digits than their integrals are */
+        double sum = 0, at = t0, s = begin.s, v = begin.v, a = begin.a;
+        size_t k = t0 < 0 ? SIZE_MAX : first;
+        for (;;) {
+            const bool last = k == hint[1];
+            const double d = (last ? t1 : speed->phase[k + 1].t) - at;
+            sum += d * ((s - begin.s) + d * (v / 2 + d * a / 6));
+            if (last) {
+                break;
+            }
+            const Phase *p = &speed->phase[++k];
+            at = p->t;
+            s = p->s;
+            v = p->v;
+            a = p->a;
+        }
+        q[0] = begin.s + sum / T;
+    }
     q[1] = (end.s - begin.s) / T;
     q[2] = (end.v - begin.v) / T;
     q[3] = (end.a - begin.a) / T;

@@ -16,10 +16,10 @@ from feedsim.errors import InputError
 
 Floats = NDArray[np.float64]
 
-_LEAST_ROWS = 12  # of a move
-_RESTING_ROWS = 3
-_FITS = 1e-4  # residual (rms) of a move that follows the profile, over its length
-_ALIKE = 0.1  # moves whose values differ by less, relatively, tell the same limit
+_MIN_MOVING_ROWS = 12  # of a move
+_MIN_RESTING_ROWS = 3
+_MAX_RESIDUAL = 1e-4  # residual (rms) of a move that follows the profile, over its length
+_MAX_DIFFERENCE = 0.1  # moves whose values differ by less, relatively, have the same limit
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,9 @@ def profile_of_rest_to_rest(t: Floats, length: float, v: float, a: float, j: flo
     jerks = j * np.array([1, 0, -1, 0, -1, 0, 1])
     begins = np.concatenate([[0], np.cumsum(durations)])
     state = np.zeros((8, 3))  # position, speed, acceleration at the begin of each phase
-    for phase, (d, each) in enumerate(zip(durations, jerks, strict=True)):
+    for phase, (d, j_phase) in enumerate(zip(durations, jerks, strict=True)):
         x, s, r = state[phase]
-        state[phase + 1] = x + d * (s + d * (r / 2 + d * each / 6)), s + d * (r + d * each / 2), r + d * each
+        state[phase + 1] = x + d * (s + d * (r / 2 + d * j_phase / 6)), s + d * (r + d * j_phase / 2), r + d * j_phase
     k = np.clip(np.searchsorted(begins, t, side="right") - 1, 0, 6)
     within = np.clip(t, 0, begins[-1]) - begins[k]
     positions = state[k, 0] + within * (state[k, 1] + within * (state[k, 2] / 2 + within * jerks[k] / 6))
@@ -84,16 +84,19 @@ def identify_axis_limits(t: ArrayLike, position: ArrayLike) -> AxisLimits:
     at, x = np.asarray(t, dtype=np.float64), np.asarray(position, dtype=np.float64)
     if at.ndim != 1 or at.shape != x.shape or not np.all(np.isfinite(x)) or not np.all(np.diff(at) > 0):
         raise InputError("limits of an axis need ascending instants and a finite position at each of them")
-    found = [move for begin, end in _moves(x) if (move := _fit(at[begin:end], x[begin:end])) is not None]
-    if not found:
+    fitted_moves = [move for begin, end in _moves(x) if (move := _fit(at[begin:end], x[begin:end])) is not None]
+    if not fitted_moves:
         raise InputError(
             "no move from rest to rest with phases of constant jerk is in the record: acceleration and jerk of the "
             "axis stay unknown"
         )
-    jerk = _largest([move.jerk for move in found])
+    jerk = _largest([move.jerk for move in fitted_moves])
     assert jerk is not None
     return AxisLimits(
-        _largest([move.acceleration for move in found]), jerk, _largest([move.speed for move in found]), tuple(found)
+        _largest([move.acceleration for move in fitted_moves]),
+        jerk,
+        _largest([move.speed for move in fitted_moves]),
+        tuple(fitted_moves),
     )
 
 
@@ -103,15 +106,15 @@ def _moves(x: Floats) -> list[tuple[int, int]]:
     least = np.abs(steps[steps != 0]).min(initial=np.inf)
     moving = np.abs(steps) > 1.5 * least if least < 2e-9 else steps != 0  # the last digit flickers at rest
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(np.int8)))
-    found: list[list[int]] = []
+    stretches: list[list[int]] = []
     for begin, end in edges.reshape(-1, 2):
-        if found and begin - found[-1][1] < _RESTING_ROWS:
-            found[-1][1] = int(end)
+        if stretches and begin - stretches[-1][1] < _MIN_RESTING_ROWS:
+            stretches[-1][1] = int(end)
         else:
-            found.append([int(begin), int(end)])
+            stretches.append([int(begin), int(end)])
     return [
-        (begin - _RESTING_ROWS, end + _RESTING_ROWS + 1) for begin, end in found
-        if begin >= _RESTING_ROWS and end + _RESTING_ROWS < len(x) and end - begin >= _LEAST_ROWS
+        (begin - _MIN_RESTING_ROWS, end + _MIN_RESTING_ROWS + 1) for begin, end in stretches
+        if begin >= _MIN_RESTING_ROWS and end + _MIN_RESTING_ROWS < len(x) and end - begin >= _MIN_MOVING_ROWS
         and (np.all(steps[begin:end] >= -1.5 * least) or np.all(steps[begin:end] <= 1.5 * least))
     ]  # fmt: skip
 
@@ -138,7 +141,7 @@ def _fit(t: Floats, x: Floats) -> Move | None:
             best = fitted
     assert best is not None
     rms = float(np.sqrt(np.mean(best.fun**2)))
-    if rms > _FITS * length:
+    if rms > _MAX_RESIDUAL * length:
         return None
     v, a, j = np.exp(best.x[:3])
     _, (reached_v, reached_a, cruise, steady) = profile_of_rest_to_rest(t, length, v, a, j)
@@ -151,4 +154,4 @@ def _fit(t: Floats, x: Floats) -> Move | None:
 def _largest(values: list[float | None]) -> float | None:
     """Mean of the values that are alike with the largest one."""
     known = np.array([value for value in values if value is not None])
-    return float(known[known >= known.max() * (1 - _ALIKE)].mean()) if len(known) else None
+    return float(known[known >= known.max() * (1 - _MAX_DIFFERENCE)].mean()) if len(known) else None

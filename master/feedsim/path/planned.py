@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedsim.errors import InputError
 from feedsim.findings import Note
 from feedsim.part_program import Moves
-from feedsim.path.library import DONE, MORE, MOST_AXES, Program, load
+from feedsim.path.library import MAX_PLANNED_AXES, STATE_DONE, STATE_MORE, Program, load
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Limits:
         if missing := [name for name in axes if name not in self.axes]:
             raise InputError(f"the program moves {missing[0]}; the machine's axes are {', '.join(self.axes)}")
         at = [self.axes.index(name) for name in axes]
-        found = []
+        limits = []
         for what in ("max_speed", "max_acceleration", "max_jerk"):
             values = np.asarray(getattr(self, what), dtype=np.float64)
             if values.shape != (len(self.axes),):
@@ -73,8 +73,8 @@ class Limits:
                 axis = int(np.flatnonzero(bad)[0])
                 finite = "" if what == "max_jerk" else " and finite"
                 raise InputError(f"{what} of {self.axes[axis]} is {values[axis]:.9g}; it must be above 0{finite}")
-            found.append(values[at])
-        return found[0], found[1], found[2]
+            limits.append(values[at])
+        return limits[0], limits[1], limits[2]
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class PlannedPath:
     def _call(self, at: Floats, *columns: NDArray[np.generic] | None) -> None:
         pointers = [None if column is None else column.ctypes.data for column in columns]
         with self._lock:
-            if load().planner_sample(self._planner, len(at), at.ctypes.data, *pointers) != DONE:
+            if load().planner_sample(self._planner, len(at), at.ctypes.data, *pointers) != STATE_DONE:
                 raise MemoryError("no memory to sample a planned path")
 
 
@@ -190,8 +190,8 @@ def plan_moves(moves: Moves, limits: Limits, progress: Callable[[int, int], None
     library = load()
     axes = moves.axes
     speed, acceleration, jerk = limits.of(axes)
-    if len(axes) > MOST_AXES:
-        raise InputError(f"the program moves {len(axes)} axes; at most {MOST_AXES} are planned")
+    if len(axes) > MAX_PLANNED_AXES:
+        raise InputError(f"the program moves {len(axes)} axes; at most {MAX_PLANNED_AXES} are planned")
     if not limits.T_ipo > 0:
         raise InputError(f"the cycle of the interpolator is {limits.T_ipo:.9g} s; it must be above 0")
     rows = len(moves)
@@ -214,12 +214,12 @@ def plan_moves(moves: Moves, limits: Limits, progress: Callable[[int, int], None
     if not planner:
         raise MemoryError("no memory to plan a program")
     try:
-        done, state = ctypes.c_int64(0), MORE
-        while state == MORE:
+        done, state = ctypes.c_int64(0), STATE_MORE
+        while state == STATE_MORE:
             state = library.planner_advance(planner, ctypes.byref(done))
             if progress is not None:
                 progress(done.value, rows)
-        if state != DONE:
+        if state != STATE_DONE:
             raise MemoryError("no memory to plan a program")
         saved, corners = np.zeros(2), ctypes.c_int64(0)
         duration = library.planner_duration(planner, saved.ctypes.data, ctypes.byref(corners))

@@ -48,6 +48,12 @@ class AxisLimits:
     speed: float | None
     moves: tuple[Move, ...]
 
+    @property
+    def words(self) -> str:
+        """What it rests on, such as "1 move, met to 0.53 um"."""
+        count = f"{len(self.moves)} move{'s' if len(self.moves) > 1 else ''}"
+        return f"{count}, met to {1e6 * max(move.largest for move in self.moves):.2g} um"
+
 
 def profile_of_rest_to_rest(t: Floats, length: float, v: float, a: float, j: float) -> tuple[Floats, Floats]:
     """Positions (N,) [m] at instants t (N,) [s] from the begin of the fastest move over `length` [m]; then (4,) the
@@ -103,8 +109,10 @@ def identify_axis_limits(t: ArrayLike, position: ArrayLike) -> AxisLimits:
 def _moves(x: Floats) -> list[tuple[int, int]]:
     """First and last row (+1) of what runs one way from rest to rest, some rows of rest on either side."""
     steps = np.diff(x)
-    least = np.abs(steps[steps != 0]).min(initial=np.inf)
-    moving = np.abs(steps) > 1.5 * least if least < 2e-9 else steps != 0  # the last digit flickers at rest
+    rounding = 1e-7 * np.abs(steps).max(initial=0)  # of what was converted to and fro
+    least = np.abs(steps[np.abs(steps) > rounding]).min(initial=np.inf)
+    # The last digit of a record may flicker at rest.
+    moving = np.abs(steps) > (1.5 * least if least < 2e-9 else rounding)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(np.int8)))
     stretches: list[list[int]] = []
     for begin, end in edges.reshape(-1, 2):
@@ -128,7 +136,7 @@ def _fit(t: Floats, x: Floats) -> Move | None:
     speed = np.diff(along) / cycle
     acceleration = float(np.abs(np.diff(speed)).max() / cycle)
     jerk = float(np.abs(np.diff(speed, 2)).max() / cycle**2)
-    start = t[np.flatnonzero(along > 0)[0] - 1]
+    start = t[np.flatnonzero(along > 1e-7 * length)[0] - 1]
 
     def residual(p: Floats) -> Floats:
         return np.asarray(profile_of_rest_to_rest(t - start - p[3] * cycle, length, *np.exp(p[:3]))[0] - along)

@@ -38,7 +38,8 @@ def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
 class RigidAxis:
     """An axis as it goes into the folder.
 
-    limits: as start.limits gives them. setpoints: limits that its setpoints keep, where moves show them. values: of the friction, J and M_0, SI; estimates: of what was determined.
+    limits: as start.limits gives them. values: of the friction, J and M_0, SI; estimates: of what was determined.
+    setpoints: limits that its setpoints keep, where moves show them.
     """
 
     pitch: float

@@ -99,13 +99,17 @@ def distance_to_row(moves: Moves, row: int, x: Floats) -> Floats:
         return straight
 
     u = np.linspace(0, 1, 129)
-    best = u[np.linalg.norm(x[:, None] - place(u), axis=2).argmin(axis=1)]
-    step = 1 / 128
-    for _ in range(28):
-        step /= 2
-        tried = np.clip(np.stack([best - step, best, best + step]), 0, 1)
-        best = np.take_along_axis(tried, np.linalg.norm(x - place(tried), axis=2).argmin(axis=0)[None], axis=0)[0]
-    return np.asarray(np.linalg.norm(x - place(best), axis=1))
+    nearest = u[np.linalg.norm(x[:, None] - place(u), axis=2).argmin(axis=1)]
+    result = np.full(len(x), np.inf)
+    turn = 2 * np.pi / moves.angle[row] if moves.motion[row] == Motion.ARC else 1.0
+    for beside in (-turn, 0.0, turn) if turn < 1 else (0.0,):  # a helix may be nearest a turn away
+        best, step = np.clip(nearest + beside, 0, 1), 1 / 128
+        for _ in range(28):
+            step /= 2
+            tried = np.clip(np.stack([best - step, best, best + step]), 0, 1)
+            best = np.take_along_axis(tried, np.linalg.norm(x - place(tried), axis=2).argmin(axis=0)[None], axis=0)[0]
+        result = np.minimum(result, np.linalg.norm(x - place(best), axis=1))
+    return result
 
 
 def largest_use(planned: PlannedPath, t: Floats) -> tuple[float, float, float]:

@@ -77,7 +77,7 @@ ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 # --- the units -----------------------------------------------------------------------------------------------------
 
-fmus: $(FMUS) ## build the six FMUs and the native cycle loop into fmus/
+fmus: $(FMUS) ## build the six FMUs, the native cycle loop and the path planner into fmus/
 
 PACKAGER := $(wildcard src/packager/feedsim_packager/*.py src/fmi2/terminals/*)
 SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
@@ -91,13 +91,15 @@ fmus: $(VARIABLES)
 $(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h src/machine_fmu/cycle.h $(foreach unit,$(UNITS),$(wildcard src/$(unit)_fmu/*.def src/$(unit)_fmu/identity.h))
 	$(PY) -m feedsim_packager variables --out $@
 
-# The native cycle loop lies beside the archives.
-EXCHANGE := exchange$(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
-EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch]) $(addprefix src/packager/feedsim_packager/,exchange.py checkout.py compile.py toolchain.py)
+# The native cycle loop and the path planner lie beside the archives.
+LIBRARY := $(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
+LIBRARIES := exchange$(LIBRARY) planner$(LIBRARY)
 
-fmus: fmus/$(EXCHANGE)
-fmus/$(EXCHANGE): $(VENV)/.run $(COMPILER) $(EXCHANGE_SOURCES)
-	$(PY) -m feedsim_packager exchange --out $(@D)
+fmus: $(LIBRARIES:%=fmus/%)
+fmus/%$(LIBRARY): $(VENV)/.run $(COMPILER) $(addprefix src/packager/feedsim_packager/,native.py checkout.py compile.py toolchain.py)
+	$(PY) -m feedsim_packager $* --out $(@D)
+fmus/exchange$(LIBRARY): $(wildcard src/exchange/*.[ch])
+fmus/planner$(LIBRARY): $(wildcard src/planner/*.[ch])
 
 fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
 # It has the torque over speed and the functions over whole records of friction.
@@ -179,10 +181,10 @@ SANITIZED := $(BUILD)/sanitized-fmus
 $(SANITIZED)/%.fmu: fmus/%.fmu
 	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) -m feedsim_packager build $* --out $@ --build-dir $(SANITIZED)
 
-$(SANITIZED)/$(EXCHANGE): fmus/$(EXCHANGE)
-	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) -m feedsim_packager exchange --out $(@D)
+$(SANITIZED)/%$(LIBRARY): fmus/%$(LIBRARY)
+	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) -m feedsim_packager $* --out $(@D)
 
-test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(SANITIZED)/$(EXCHANGE)) ## a scenario on units with sanitisers
+test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(LIBRARIES:%=$(SANITIZED)/%)) ## a scenario on units with sanitisers
 	@if [ -z "$(ASAN_RUNTIME)" ]; then echo "the compiler has no AddressSanitizer runtime: scenario under sanitisers left out"; else \
 	    LD_PRELOAD=$(ASAN_RUNTIME) ASAN_OPTIONS=detect_leaks=0 FEEDSIM_FMUS=$(SANITIZED) \
 	    $(PY) -c 'import feedsim, sys; result = feedsim.run(feedsim.load_scenario(sys.argv[1])); print(sys.argv[1], "under sanitisers: clean,", len(result.trace), "rows")' \
@@ -284,7 +286,7 @@ identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good 
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES := $(foreach folder,src/fmi2 src/exchange src/page $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/fuzz tests/platforms \
+C_FILES := $(foreach folder,src/fmi2 src/exchange src/planner src/page $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/fuzz tests/platforms \
     tests/reference/monolithic benchmarks benchmarks/floor,$(wildcard $(folder)/*.[ch]))
 
 lint: $(VENV)/.dev ## style, types, formatting
@@ -309,4 +311,4 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
-	rm -rf $(BUILD) $(FMUS) fmus/exchange.* fmus/machine.wasm $(VARIABLES) $(RESULTS) $(DIST)
+	rm -rf $(BUILD) $(FMUS) fmus/exchange.* fmus/planner.* fmus/machine.wasm $(VARIABLES) $(RESULTS) $(DIST)

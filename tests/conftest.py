@@ -97,13 +97,14 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if _up_to_date([folder / f"{unit}.fmu" for unit in UNITS]):
         return folder
 
-    from feedsim_packager import build, exchange, toolchain
+    from feedsim_packager import build, native, toolchain
 
     folder = tmp_path_factory.mktemp("fmus")
     compiler = toolchain.find_compiler()
     for unit in UNITS:
         build.build(build.load(build.unit_directory(unit), compiler), folder / f"{unit}.fmu", compiler)
-    exchange.build(folder, compiler)
+    for name in native.LIBRARIES:
+        native.build(name, folder, compiler)
     return folder
 
 

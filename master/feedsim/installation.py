@@ -5,6 +5,7 @@ May use: nothing. Start reading at shipped().
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as version_of
@@ -33,6 +34,12 @@ def version(package: str) -> str | None:
 def shipped(name: str) -> Path:
     """The folder `name` ("fmus", "scenarios"): of the checkout, where make fills it, else inside the package."""
     return (checkout() or PACKAGE / INSIDE) / name
+
+
+def fmus_directory() -> Path:
+    """Folder of the archives: FEEDSIM_FMUS, else `fmus/` of the checkout, else those inside the installed package."""
+    named = os.environ.get("FEEDSIM_FMUS")
+    return Path(named) if named else shipped("fmus")
 
 
 def documentation() -> Path | None:

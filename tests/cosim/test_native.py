@@ -30,7 +30,7 @@ from feedsim.judge import JudgedRun, judged
 from feedsim.nc.excitation import multisine
 from feedsim.scenario.coupling import SCHEMES
 from feedsim_packager import toolchain
-from feedsim_packager.exchange import build as build_loop
+from feedsim_packager.native import build as build_library
 from scenario_helpers import default_machine
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,7 +51,7 @@ def folder(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("native")
     for archive in fmus.glob("*.fmu"):
         (folder / archive.name).symlink_to(archive.resolve())
-    build_loop(folder, toolchain.find_compiler())
+    build_library("exchange", folder, toolchain.find_compiler())
     return folder
 
 

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.cosim.exchange import LIBRARY_NAME as LOOP
+from feedsim.native import library_name
 from feedsim_distribution import backend
 
+LOOP, PLANNER = library_name("exchange"), library_name("planner")
 ROOT = Path(__file__).resolve().parents[2]
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "--no-input")
 
@@ -90,7 +91,7 @@ def test_wheel_holds_what_runs_need_and_no_path_of_this_machine(wheel: Path) -> 
         held = {Path(name).name for name in names if name.startswith("feedsim/shipped/fmus/")}
         held.discard("machine.wasm")  # where a compiler for WebAssembly is
         units = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
-        assert held == {*(f"{unit}.fmu" for unit in units), LOOP}
+        assert held == {*(f"{unit}.fmu" for unit in units), LOOP, PLANNER}
         assert "feedsim/shipped/scenarios/machines/test_centre/modes.csv" in names
         assert "feedsim/variables.json" in names
         for name in names:
@@ -193,7 +194,10 @@ def test_programs_around_it_are_checked_by_its_types(installed: Installation, tm
     assert 'has incompatible type "int"' in errors[0]
 
 
-@pytest.mark.parametrize("command", [["build", "plant"], ["exchange", "--out", "."], ["variables", "--out", "v.json"]])
+@pytest.mark.parametrize(
+    "command",
+    [["build", "plant"], ["exchange", "--out", "."], ["planner", "--out", "."], ["variables", "--out", "v.json"]],
+)
 def test_what_needs_c_sources_says_so(command: list[str], installed: Installation) -> None:
     done = subprocess.run(
         [str(installed.python), "-m", "feedsim_packager", *command],

@@ -26,6 +26,7 @@ SOURCES_test_numbers         :=
 SOURCES_test_text            := src/fmi2/text.c
 
 SOURCES_test_exchange := src/exchange/exchange.c
+SOURCES_test_planner := $(wildcard src/planner/*.c)
 
 SOURCES_test_lugre     := src/friction_fmu/lugre.c
 SOURCES_test_tem       := src/friction_fmu/tem.c
@@ -54,7 +55,7 @@ SOURCES_test_controller_pmsm    := src/controller_fmu/pmsm.c
 # --- how they are built --------------------------------------------------------------------------------------------
 
 C_TESTS   := $(patsubst $(UNIT_C)/%.c,%,$(wildcard $(UNIT_C)/test_*.c))
-C_HEADERS := $(wildcard src/fmi2/*.h src/fmi2/standard/*.h src/*_fmu/*.h src/*_fmu/*.def $(UNIT_C)/*.h $(UNIT_C)/toy_unit/*)
+C_HEADERS := $(wildcard src/planner/*.h src/fmi2/*.h src/fmi2/standard/*.h src/*_fmu/*.h src/*_fmu/*.def $(UNIT_C)/*.h $(UNIT_C)/toy_unit/*)
 C_FLAGS   := -std=c99 -pedantic -Wall -Wextra -Wconversion -Wshadow -Werror -ffp-contract=off
 
 FLAGS_plain := -O2

@@ -1,12 +1,13 @@
 """Co-simulation of the units: archives, instances, roles, wiring, what a control cycle is, run, log.
 
-May use nc, structure and what is below them; sole user of fmpy, of ctypes and of the native loop.
+May use nc, structure and what is below them; sole user of fmpy and of the native loop.
 Start with run.py: ``run``; then schedule.py, which says once what a control cycle is, and system.py, on which units.
 """
 
-from feedsim.cosim.binaries import executed, executing, fmus_directory
+from feedsim.cosim.binaries import executed, executing
 from feedsim.cosim.loop import Progress
 from feedsim.cosim.run import Crossings, Follower, Run, check, follow, logged, run
+from feedsim.installation import fmus_directory
 
 __all__ = [
     "Crossings", "Follower", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",

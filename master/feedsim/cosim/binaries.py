@@ -7,7 +7,6 @@ was exported here, holds the shipped libraries; whatever differs in one byte is 
 from __future__ import annotations
 
 import hashlib
-import os
 import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
@@ -18,18 +17,12 @@ from feedsim.cosim import exchange
 from feedsim.cosim.archive import Archive, folders
 from feedsim.cosim.roles import archive_path
 from feedsim.errors import InputError
-from feedsim.installation import shipped
+from feedsim.installation import fmus_directory
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 
 SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "friction_gms.fmu", "setpoint.fmu", "machine.fmu")
 Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files beside the library for this platform
-
-
-def fmus_directory() -> Path:
-    """Folder of the archives: FEEDSIM_FMUS, else `fmus/` of the checkout, else those inside the installed package."""
-    named = os.environ.get("FEEDSIM_FMUS")
-    return Path(named) if named else shipped("fmus")
 
 
 def is_shipped(archive: Archive) -> bool:

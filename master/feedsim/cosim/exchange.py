@@ -7,9 +7,7 @@ other sources than this package, the loop runs in Python, which takes longer, sa
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import os
-import sys
 from collections.abc import Sequence
 from dataclasses import fields
 from functools import cache
@@ -19,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim import native
 from feedsim.cosim.operations import Bond, Executor, Operation
 from feedsim.errors import InputError
 from feedsim.findings import Note
@@ -45,7 +44,7 @@ INTERFACE = (
 
 _TYPES = {"int32_t": np.int32, "int64_t": np.int64, "double": np.float64, "function": np.uintp, "address": np.uintp}
 _OPERATION = np.dtype([(name, _TYPES[kind]) for kind, name in FIELDS], align=True)
-LIBRARY_NAME = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
+LIBRARY_NAME = native.library_name("exchange")
 
 Native = ctypes.CDLL  # the loaded library
 
@@ -54,34 +53,16 @@ class _Fault(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_int64) for name in ("cycle", "operation", "looked_at", "changed_by"))
 
 
-# By SHA-256 of the file: each study lays out a copy of its own, and what is loaded stays until the process ends.
-_loaded: dict[bytes, Native] = {}
-
-
 @cache
 def library(folder: Path) -> Native | str:
     """The native loop beside the archives in `folder`, or why none there can be used, without the folder's name."""
-    path = folder.resolve() / LIBRARY_NAME
-    try:
-        digest = hashlib.sha256(path.read_bytes()).digest()
-        if (known := _loaded.get(digest)) is not None:
-            return known
-        loaded = ctypes.CDLL(str(path))
-        interface = loaded.exchange_interface
-        interface.restype = ctypes.c_char_p
-        result = (interface() or b"").decode(errors="replace")
-    except FileNotFoundError:
-        return f"{LIBRARY_NAME}: no such file beside the archives"
-    except (OSError, AttributeError) as error:
-        return f"{LIBRARY_NAME}: cannot be used: {str(error).replace(str(path), LIBRARY_NAME)}"
-    if result != INTERFACE:
-        return f"{LIBRARY_NAME}: built from other sources (its interface is {result!r}, wanted is {INTERFACE!r})"
-    for run in (loaded.exchange_run, loaded.exchange_run_marked):
-        run.restype = ctypes.c_int
-        run.argtypes = (
-            ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
-        )  # fmt: skip
-    _loaded[digest] = loaded
+    loaded = native.library("exchange", folder, INTERFACE)
+    if not isinstance(loaded, str):
+        for run in (loaded.exchange_run, loaded.exchange_run_marked):
+            run.restype = ctypes.c_int
+            run.argtypes = (
+                ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
+            )  # fmt: skip
     return loaded
 
 
@@ -109,9 +90,9 @@ def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[No
 class Exchange(Executor):
     """Has operations worked by the native loop."""
 
-    def __init__(self, native: Native, operations: Sequence[Operation], T_c: float) -> None:
+    def __init__(self, loop: Native, operations: Sequence[Operation], T_c: float) -> None:
         super().__init__(operations, T_c)
-        self._native = native
+        self._native = loop
         self._bonds: list[NDArray[np.uintp]] = []  # as the operations point to them
         self._fault = _Fault()
         self._looked_at = -1  # the last operation whose unit was found to change how the process computes

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from feedsim.cosim import wiring, worker
-from feedsim.cosim.binaries import any_foreign, fmus_directory
+from feedsim.cosim.binaries import any_foreign
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.loads import LOAD_TAKEN_UP
 from feedsim.cosim.loop import Loop, Progress, Setpoints
@@ -26,6 +26,7 @@ from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Log, Port
 from feedsim.errors import InputError
+from feedsim.installation import fmus_directory
 from feedsim.motions.kind import Peaks
 from feedsim.motions.profile import speed_change
 from feedsim.nc import Program

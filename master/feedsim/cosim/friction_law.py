@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feedsim.cosim.archive import Archive
-from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
-from feedsim.installation import mend
+from feedsim.installation import fmus_directory, mend
 from feedsim.owned import Closing
 from feedsim.scenario import FrictionParameters
 from feedsim.scenario.roles import FRICTION_ROLE

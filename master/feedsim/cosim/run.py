@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.cosim.binaries import any_foreign, fmus_directory
+from feedsim.cosim.binaries import any_foreign
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.loads import Acting, Loads, Work, acting
@@ -23,6 +23,7 @@ from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats
 from feedsim.cosim.whole import cycle_of, system_of
 from feedsim.errors import InputError, SimulationError
+from feedsim.installation import fmus_directory
 from feedsim.nc import Program, plan
 from feedsim.owned import Closing
 from feedsim.scenario import Coupling, Drive, Level, Logging, Machine, Scenario

@@ -5,6 +5,7 @@ Start with stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (out
 """
 
 from feedsim.called import called
+from feedsim.identify.axis_limits import AxisLimits, identify_axis_limits
 from feedsim.identify.friction_file import Identified
 from feedsim.identify.options import STAGES, Asked, Options
 from feedsim.identify.read import Provenance, Recorded, named_apart, read_records, read_traces
@@ -13,8 +14,8 @@ from feedsim.identify.result import Estimate, Identification
 from feedsim.identify.stages import Progress, identify
 
 __all__ = [
-    "STAGES", "Asked", "Estimate", "Identification", "Identified", "Options", "Progress", "Provenance", "Record",
-    "Recorded", "identify", "named_apart", "read_records", "read_traces",
+    "STAGES", "Asked", "AxisLimits", "Estimate", "Identification", "Identified", "Options", "Progress", "Provenance",
+    "Record", "Recorded", "identify", "identify_axis_limits", "named_apart", "read_records", "read_traces",
 ]  # fmt: skip
 
 called(__name__)

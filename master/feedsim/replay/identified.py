@@ -17,7 +17,7 @@ from feedsim.errors import InputError
 from feedsim.estimation.covariance import Covariance, correlation_length, stretched
 from feedsim.estimation.interval import half_width, shows
 from feedsim.estimation.jackknife import between_groups
-from feedsim.identify import Recorded
+from feedsim.identify import AxisLimits, Recorded, identify_axis_limits
 from feedsim.identify.clipping import tied_at_limit
 from feedsim.identify.inertia import inertia
 from feedsim.identify.parameters import EXCESS
@@ -206,6 +206,7 @@ class DrivesFound:
     drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
     machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis. outside: axis -> lines
     from outside the axis, which were taken out of what was fitted. clipped: sentences on torque that is cut off.
+    limits: axis -> acceleration, jerk and speed of its setpoints, where they have moves from rest to rest.
     undecided_cycle: whether the record speaks for no cycle of the position loop, and nobody has given one. refused:
     axis -> why it has no drive.
     """
@@ -217,6 +218,7 @@ class DrivesFound:
     clipped: Sequence[str] = ()
     undecided_cycle: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
+    limits: Mapping[str, AxisLimits] = field(default_factory=dict)
 
 
 def identify_drives(
@@ -252,6 +254,7 @@ def identify_drives(
     rigid: dict[str, RigidAxis] = {}
     fitted, outside = {}, {}
     begins: dict[str, Begin | None] = {}
+    limits_of_setpoints: dict[str, AxisLimits] = {}
     clipped: list[str] = []
     refusals = dict(refused or {})
     for axis, each in records.items():
@@ -268,6 +271,10 @@ def identify_drives(
             begins[axis] = _begin(own) if machine is None else None
             fitted[axis], outside[axis] = own, lines
             clipped += said
+            with suppress(InputError):
+                limits_of_setpoints[axis] = identify_axis_limits(
+                    each.record.interval * np.arange(len(each.setpoint)), each.setpoint
+                )
     interval = next(iter(records.values())).record.interval
 
     def drives(cycle: float) -> tuple[dict[str, DriveFound], dict[str, str]]:
@@ -317,7 +324,7 @@ def identify_drives(
             values = friction | {"J": one.estimates["J"].value, "M_0": one.machine.axes[axis].M_0}
             rigid[axis] = replace(
                 rigid_axis(each, begin.starts[0]), drive=drive, values=values, estimates=one.estimates, head=head,
-                modes=one.modes, correlation=one.correlation,
+                modes=one.modes, correlation=one.correlation, setpoints=limits_of_setpoints.get(axis),
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle, control)
@@ -334,7 +341,7 @@ def identify_drives(
             for axis, each in records.items()
             if axis in found
         ]
-    return DrivesFound(found, comparisons, files, outside, clipped, undecided, failed)
+    return DrivesFound(found, comparisons, files, outside, clipped, undecided, failed, limits_of_setpoints)
 
 
 @contextmanager

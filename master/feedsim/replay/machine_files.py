@@ -14,6 +14,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from feedsim.fields import Quantity
+from feedsim.identify import AxisLimits
 from feedsim.identify.friction_file import DIGITS, Line, friction_text, interval_text
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.elastic import ElasticMode
@@ -38,6 +39,7 @@ class RigidAxis:
     """An axis as it goes into the folder.
 
     limits: as start.limits gives them. values: of the friction, J and M_0, SI; estimates: of what was determined.
+    setpoints: limits that its setpoints keep, where moves show them.
     """
 
     pitch: float
@@ -49,6 +51,7 @@ class RigidAxis:
     head: Sequence[str] = ()
     modes: Sequence[ElasticMode] = ()
     correlation: Correlation | None = None
+    setpoints: AxisLimits | None = None
 
 
 def control_cycle(interval: float) -> float:
@@ -122,6 +125,11 @@ def _machine(
             f"    travel: [{_text(1e3 * own['low'])} mm, {_text(1e3 * own['high'])} mm]",
             f"    max_speed: {_text(own['speed'])} m/s",
             f"    max_acceleration: {_text(own['acceleration'])} m/s^2",
+            *(
+                [f"    max_jerk: {_text(value.setpoints.jerk)} m/s^3  # of the setpoints, {value.setpoints.words}"]
+                if value.setpoints is not None
+                else []
+            ),
             "    limits_from: that of the record and a reserve of a half; the axis itself may have more",
             f"    constant_load: {_text(value.values['M_0'])} N.m{_remark(value.estimates.get('M_0'))}",
             f"    drive: {drive_file(axis)}",

@@ -7,6 +7,7 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import (
     Discriminator,
     Field,
@@ -20,6 +21,7 @@ from pydantic import (
 from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity, fault, is_multiple, parameter
+from feedsim.path import Limits
 from feedsim.scenario.axis_units import (
     CONTROLLER_TABLE,
     LEAD_POWERS,
@@ -48,6 +50,9 @@ class Axis(Model):
     ] = Field(description="Lowest and highest position")
     max_speed: Annotated[float, Quantity("m/s", above=0, example="30 m/min")] = Field(description="Highest axis speed")
     max_acceleration: Annotated[float, Quantity("m/s^2", above=0)] = Field(description="Highest axis acceleration")
+    max_jerk: Annotated[float, Quantity("m/s^3", above=0)] | None = Field(
+        default=None, description="Highest axis jerk, in NC programs; without it that of the path"
+    )
     limits_from: StrictStr = Field(
         default="", description="Where travel, speed and acceleration come from; messages on these limits say it"
     )
@@ -241,6 +246,20 @@ class Machine(Model):
         """YAML files that it was read from, each with the first key that it gives; "" for the machine file. Empty where
         it was read as part of a scenario, which has them."""
         return self._files
+
+    @property
+    def program_limits(self) -> Limits:
+        """What NC programs are planned within: those of the axes and of the path, on the cycle of the interpolator."""
+        axes = self.axes.values()
+        return Limits(
+            tuple(self.axes),
+            np.array([axis.max_speed for axis in axes]),
+            np.array([axis.max_acceleration for axis in axes]),
+            np.array([axis.max_jerk or self.path.jerk for axis in axes]),
+            self.cycles.T_ipo,
+            path_acceleration=self.path.acceleration,
+            path_jerk=self.path.jerk,
+        )
 
     @property
     def errors(self) -> dict[str, Parameter]:

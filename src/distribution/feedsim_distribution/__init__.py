@@ -3,7 +3,7 @@
     backend    what pip calls
     project    pyproject.toml and the files of the project
     metadata   what a wheel says of itself
-    shipped    what a wheel holds besides Python: archives, native cycle loop, scenarios
+    shipped    what a wheel holds besides Python: archives, native libraries, scenarios
     wheel      -> the wheel
     sdist      -> the source archive
     sbom       -> the bill of materials

@@ -1,4 +1,4 @@
-"""What a wheel holds besides Python: archives, native cycle loop, scenarios and machines, documentation."""
+"""What a wheel holds besides Python: archives, native libraries, scenarios and machines, documentation."""
 
 import platform
 import sys
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim_packager import build, checkout, declared, exchange, table, targets, web
+from feedsim_packager import build, checkout, declared, native, table, targets, web
 from feedsim_packager.errors import CompilerError, InputError
 
 from .project import PROJECT, files
@@ -36,20 +36,20 @@ class Shipped:
 def for_this_machine(compiler: Sequence[str]) -> Shipped:
     """By a compiler that makes code for this machine alone, as `make fmus` does."""
     tag = sysconfig.get_platform().replace("-", "_").replace(".", "_").replace("universal2", platform.machine())
-    return Shipped(_archives(compiler, None) | _loop(compiler, None) | _page(None) | _plain(compiler), tag)
+    return Shipped(_archives(compiler, None) | _libraries(compiler, None) | _page(None) | _plain(compiler), tag)
 
 
 def for_platform(name: str, compiler: Sequence[str], archives: Path | None = None, site: Path | None = None) -> Shipped:
-    """For another machine, by zig: archives for all platforms, native loop for one, or none at all for "any".
+    """For another machine, by zig: archives for all platforms, native libraries for one, or none at all for "any".
 
     archives: folder that has them already, for all platforms. site: folder of the documentation that `make docs` built.
     """
     if name not in (*TAGS, ANY):
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
     units = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
-    loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
+    libraries = {} if name == ANY else _libraries(compiler, targets.ALL[name])
     page = _page(zig_for_pages())
-    return Shipped(units | loop | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
+    return Shipped(units | libraries | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
 
 
 def _documentation(site: Path | None) -> dict[str, bytes]:
@@ -85,10 +85,10 @@ def _archives(compiler: Sequence[str], platforms: Sequence[targets.Target] | Non
         return _placed(taken(folder))
 
 
-def _loop(compiler: Sequence[str], target: targets.Target | None) -> dict[str, bytes]:
+def _libraries(compiler: Sequence[str], target: targets.Target | None) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as scratch:
-        library = exchange.build(Path(scratch), compiler, target)
-        return _placed({library.name: library.read_bytes()})
+        built = [native.build(name, Path(scratch), compiler, target) for name in native.LIBRARIES]
+        return _placed({library.name: library.read_bytes() for library in built})
 
 
 def _page(compiler: Sequence[str] | None) -> dict[str, bytes]:

@@ -15,7 +15,7 @@
     terminals      -> terminalsAndIcons/ and model.png
     targets        the platforms, and how zig names them
     compile        flat sources folder -> shared library for a platform
-    exchange       the native cycle loop, compiled
+    native         libraries of C that the master calls, compiled: cycle loop, path planner
     universal      Mach-O libraries for several processors -> one file
     portable       whether a library runs on machines other than this one
     binary         a library's symbols, from the file (elf, pe, macho; symbols: what they have in common)

@@ -8,7 +8,6 @@ PROJECT = Path(__file__).resolve().parents[3]
 SOURCES = PROJECT / "src"
 SHELL = SOURCES / "fmi2"
 STANDARD = SHELL / "standard"  # the headers of FMI 2.0
-LOOP = SOURCES / "exchange"  # the native cycle loop
 REFERENCES = PROJECT / "tests" / "reference"
 DEFAULT_MODES = PROJECT / "scenarios" / "machines" / "test_centre" / "modes.csv"
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import archive, build, checkout, declared, exchange, kinds, repack, table, targets, web
+from . import archive, build, checkout, declared, kinds, native, repack, table, targets, web
 from .compile import EXTRA_FLAGS
 from .errors import InputError, PackagerError
 from .machine import named
@@ -55,10 +55,13 @@ def _parser() -> argparse.ArgumentParser:
     declaring = commands.add_parser("variables", help="write the tables of all units as one JSON file")
     declaring.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
     declaring.add_argument("--out", type=Path, required=True, help="file to write")
-    looping = commands.add_parser("exchange", help="compile the master's native cycle loop")
-    looping.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
-    looping.add_argument("--platform", choices=targets.ALL, help="compile for this platform (default: this machine)")
-    looping.add_argument("--out", type=Path, required=True, help="folder of the archives")
+    for name, what in (("exchange", "native cycle loop"), ("planner", "path planner")):
+        library = commands.add_parser(name, help=f"compile the master's {what}")
+        library.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
+        library.add_argument(
+            "--platform", choices=targets.ALL, help="compile for this platform (default: this machine)"
+        )
+        library.add_argument("--out", type=Path, required=True, help="folder of the archives")
     paging = commands.add_parser("web", help="compile the unit machine as a WebAssembly module for pages")
     paging.add_argument("--cc", help="compiler for WebAssembly, one or more words (default: clang, zig)")
     paging.add_argument("--out", type=Path, required=True, help="module to write")
@@ -94,8 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command != "repack":
             checkout.check_there(options.command)
         {
-            "describe": _describe, "build": _build, "variables": _variables, "exchange": _exchange, "web": _web,
-            "repack": _repack,
+            "describe": _describe, "build": _build, "variables": _variables, "exchange": _library, "planner": _library,
+            "web": _web, "repack": _repack,
         }[options.command](options)  # fmt: skip
     except PackagerError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -132,9 +135,9 @@ def _variables(options: argparse.Namespace) -> None:
     print(f"{options.out}: tables of {', '.join(entry.unit for entry in tables)}")
 
 
-def _exchange(options: argparse.Namespace) -> None:
+def _library(options: argparse.Namespace) -> None:
     target = None if options.platform is None else targets.ALL[options.platform]
-    print(exchange.build(options.out, find_compiler(options.cc), target))
+    print(native.build(options.command, options.out, find_compiler(options.cc), target))
 
 
 def _web(options: argparse.Namespace) -> None:

@@ -12,7 +12,7 @@ from feedsim.arguments import spelt
 from feedsim.control import names_of
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note, Wrong
-from feedsim.identify import Provenance
+from feedsim.identify import AxisLimits, Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.identify.result import Estimate
 from feedsim.replay.compare import Comparison
@@ -149,6 +149,10 @@ STRUCTURES = (
     f"test that errs in {100 * ERROR_RATE:.0f} % of the records. Intervals include the values with a structure that is "
     "not taken."
 )
+LIMITS_TEXT = (
+    "Least squares of the profile with seven phases of constant jerk on moves from rest to rest. A speed is a limit of "
+    "the axis only where no lower one was programmed."
+)
 MODES_TEXT = (
     "Shapes are relative to the rigid motion. A mode stays where a fit to three quarters of the motion predicts the "
     "fourth one better with it."
@@ -278,6 +282,7 @@ def report_of(report: DriveReport) -> Report:
         main=[
             *([beside_section(report.subject.machine, _beside(report))] if report.subject is not None else []),
             *(_parameters(axis, one) for axis, one in drives.items()),
+            *([_limits(report.found.limits)] if report.found.limits else []),
             *pictures,
             *(_parts(axis, one) for axis, one in drives.items() if one.parts),
             *(_structures(axis, one) for axis, one in drives.items() if one.rivals),
@@ -319,6 +324,17 @@ def _parameters(axis: str, one: DriveFound) -> Section:
         )
     heads = ("Parameter", "Meaning", "Value", "SI unit", "95 % interval", "Remark")
     return Section(f"Axis {axis}", [Table("ltrlrt", heads, rows)])
+
+
+def _limits(limits: Mapping[str, AxisLimits]) -> Section:
+    """What the control keeps, by the setpoints of moves from rest to rest."""
+    rows = [
+        (axis, *("-" if value is None else f"{value:.4g}" for value in (own.acceleration, own.jerk, own.speed)),
+         own.words)
+        for axis, own in limits.items()
+    ]  # fmt: skip
+    heads = ("Axis", "Acceleration [m/s²]", "Jerk [m/s³]", "Speed [m/s]", "From the setpoints of")
+    return Section("Limits of the axes", [Paragraph(LIMITS_TEXT), Table("lrrrl", heads, rows)])
 
 
 def _parts(axis: str, one: DriveFound) -> Section:
@@ -409,6 +425,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
                     for mode in one.modes
                 ],
                 "modes_predicted": {str(count): value for count, value in one.modes_predicted.items()},
+                "limits": _limits_part(report.found.limits.get(axis)),
                 "runs": one.runs,
             }
             for axis, one in report.found.drives.items()
@@ -420,6 +437,19 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
         "inputs": inputs_part(hashed(_files(report))),
         "files": list(files),
     }  # fmt: skip
+
+
+def _limits_part(limits: AxisLimits | None) -> dict[str, Any] | None:
+    """Limits of an axis in summary.json; None where no move shows them."""
+    if limits is None:
+        return None
+    return {
+        "acceleration": {"value": limits.acceleration, "unit": "m/s^2"},
+        "jerk": {"value": limits.jerk, "unit": "m/s^3"},
+        "speed": {"value": limits.speed, "unit": "m/s"},
+        "moves": len(limits.moves),
+        "largest_residual": {"value": max(move.largest for move in limits.moves), "unit": "m"},
+    }
 
 
 def answers(report: DriveReport) -> list[str]:
@@ -448,6 +478,10 @@ def summary_lines(report: DriveReport) -> list[str]:
         for name, estimate in one.estimates.items():
             interval = f"{interval_text(estimate)}" if estimate.status == "estimated" else estimate.status
             lines.append(f"    {name:<10} {value_text(estimate):>12} {estimate.unit:<10} {interval}")
+        if (setpoints := report.found.limits.get(comparison.axis)) is not None:
+            values = ((setpoints.acceleration, "m/s^2"), (setpoints.jerk, "m/s^3"), (setpoints.speed, "m/s"))
+            reached = ", ".join(f"{value:.4g} {unit}" for value, unit in values if value is not None)
+            lines.append(f"    limits of the setpoints: {reached} ({setpoints.words})")
         own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
         torque = f", torque {own['torque_rms']} rms" if "torque_rms" in own else ""
         lines.append(f"    left: position {own['position_rms']} rms{torque}, while it moves;")

@@ -43,6 +43,10 @@ static void plant_prepare_joints(Plant *plant, const Modal *modal, double h) {
 static double plant_without_joints(const Plant *plant, const Forecast *forecast, size_t acting, const double *state) {
     const double *q = state + plant_ports(plant);
     double sum = modal_foretold(forecast, plant->size, q, q + plant->size);
+    if (plant->mounts.on) {
+        const Modal by_force = {.size = plant->size, .shape = forecast->f};
+        sum += modal_sum(&by_force, 0, plant_mounts_held(plant, state));
+    }
     for (size_t i = 0; i < acting; i++) {
         const size_t port = plant->acting[i];
         sum += forecast->held[port] * plant->u[port] + forecast->ramp[port] * plant->du[port];

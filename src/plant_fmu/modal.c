@@ -273,6 +273,7 @@ void modal_forecast(const Modal *modal, size_t port, bool speed, Forecast *forec
         const double b = modal->shape[port * size + k];
         forecast->q[k] = b * c[0];
         forecast->v[k] = b * c[MODAL_LANES];
+        forecast->f[k] = b * c[2 * MODAL_LANES];
         for (size_t from = 0; from < modal->ports; from++) {
             const double shapes = b * modal->shape[from * size + k];
             forecast->held[from] += shapes * c[2 * MODAL_LANES];
@@ -300,6 +301,18 @@ double modal_foretold(const Forecast *forecast, size_t size, const double *UNALI
         lanes_add_product(&sum, &by_v, &v_k);
     }
     return lanes_total(&sum);
+}
+
+void modal_force(const Modal *modal, const double *u, double *f) {
+    const size_t size = modal->size;
+    for (size_t k = 0; k < size; k += MODAL_LANES) {
+        Lanes sum = {{{0}}}, b_k;
+        for (size_t i = 0; i < modal->ports; i++) {
+            lanes_read(&b_k, modal->shape + i * size + k);
+            lanes_add_scaled(&sum, &b_k, u[i]);
+        }
+        lanes_write(f + k, &sum);
+    }
 }
 
 double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {

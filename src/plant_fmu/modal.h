@@ -31,6 +31,7 @@
 #define modal_advance_at PREFIXED(modal_advance_at)
 #define modal_forecast PREFIXED(modal_forecast)
 #define modal_foretold PREFIXED(modal_foretold)
+#define modal_force PREFIXED(modal_force)
 #define modal_sum PREFIXED(modal_sum)
 #define modal_sums PREFIXED(modal_sums)
 #define modal_acceleration PREFIXED(modal_acceleration)
@@ -86,6 +87,7 @@ void modal_advance_at(const Modal *modal, size_t inputs, const double *const *sh
  *   y+ = sum over modes of (by_q q + by_v v) + sum over ports of (held u + ramp du) */
 typedef struct Forecast {
     double *q, *v;       /* by_q, by_v [size] */
+    double *f;           /* by modal forces that are held [size] */
     double *held, *ramp; /* [ports] */
 } Forecast;
 
@@ -94,6 +96,9 @@ void modal_forecast(const Modal *modal, size_t port, bool speed, Forecast *forec
 
 /* The sum over modes of it. */
 double modal_foretold(const Forecast *forecast, size_t size, const double *q, const double *v);
+
+/* Modal forces f[size] of forces u[ports] at all ports. */
+void modal_force(const Modal *modal, const double *u, double *f);
 
 /* Displacement at a port from q; with v in place of q the speed there. */
 double modal_sum(const Modal *modal, size_t port, const double *q);

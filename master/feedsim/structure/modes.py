@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import Floats
+from feedsim.structure.mounts import factored, read_mounts, with_mounts
 from feedsim.trace.files import written_whole
 from feedsim.trace.layout import named_columns, twice
 
@@ -225,9 +226,10 @@ def joined(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) 
     return Modes(modes.file, result / (2 * np.pi), damping, ports)
 
 
-def checked_modes(machine: Machine) -> Modes:
+def checked_modes(machine: Machine, amplitude: float = 0.0) -> Modes:
     """The machine's mode table, consistent with its axes: one rigid mode per axis, leads that agree with the pitches.
-    Transmissions of the machine are part of it, their contacts closed.
+    Transmissions of the machine are part of it, their contacts closed, and mounts that are not linear, as they are at
+    rest or at an amplitude [m].
 
     Raises:
         InputError: the table is broken or contradicts the machine file.
@@ -243,6 +245,15 @@ def checked_modes(machine: Machine) -> Modes:
             )
     if problems:
         raise InputError.of(f"{machine.modes}: the modes contradict the machine", problems)
+    return linear_modes(machine, modes, amplitude)
+
+
+def linear_modes(machine: Machine, modes: Modes, amplitude: float = 0.0) -> Modes:
+    """Modes of the structure with what the machine has besides: its mounts that are not linear, at rest or at an
+    amplitude [m] (:func:`feedsim.structure.mounts.with_mounts`), and transmissions. Raises InputError."""
+    if machine.mounts is not None:
+        table = read_mounts(machine.mounts.table, len(modes.frequency))
+        modes = with_mounts(modes, table, factored(table, machine.mounts.parameters()), amplitude)
     return with_transmissions(machine, modes)
 
 

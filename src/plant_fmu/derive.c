@@ -18,7 +18,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
     const size_t axes = plant->axes, shown = PORTS_SHOWN * axes;
-    const size_t joints = shown * (3 * size + 2 * ports) + 4 * axes * axes + 8 * axes + 2 * (ports + 1);
+    const size_t joints = shown * (3 * size + 2 * ports) + 4 * axes * axes + 8 * axes + 2 * ports;
     const size_t scratch = 4 * ports + axes + joints + crossing;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
@@ -62,7 +62,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
         *vectors[i] = at;
     }
     plant->u_acting = at;
-    plant->du_acting = at + ports + 1;
+    plant->du_acting = at + ports;
     return true;
 }
 
@@ -161,7 +161,7 @@ static bool plant_place_joints(Unit *unit, Plant *plant) {
         plant->acting = unit_alloc(unit, plant_ports(plant), sizeof *plant->acting);
     }
     if (plant->shapes == NULL) {
-        plant->shapes = unit_alloc(unit, plant_ports(plant) + 1, sizeof *plant->shapes); /* and mounts */
+        plant->shapes = unit_alloc(unit, plant_ports(plant), sizeof *plant->shapes);
     }
     return plant->guides != NULL && plant->transmissions != NULL && plant->forecasts != NULL && plant->acting != NULL &&
            plant->shapes != NULL;

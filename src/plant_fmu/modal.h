@@ -28,6 +28,7 @@
 #define modal_set_mode PREFIXED(modal_set_mode)
 #define modal_prepare PREFIXED(modal_prepare)
 #define modal_advance PREFIXED(modal_advance)
+#define modal_advance_held PREFIXED(modal_advance_held)
 #define modal_advance_at PREFIXED(modal_advance_at)
 #define modal_forecast PREFIXED(modal_forecast)
 #define modal_foretold PREFIXED(modal_foretold)
@@ -79,9 +80,14 @@ void modal_prepare(Modal *modal, double h);
 void modal_advance(const Modal *modal, size_t inputs, const double *u, const double *du, const double *q,
                    const double *v, double *q_end, double *v_end);
 
-/* The same with the inputs at any ports: shapes[inputs] of these, modal->shape + port * modal->size. */
+/* The same with modal forces held[size] besides, which stay over the step. */
+void modal_advance_held(const Modal *modal, size_t inputs, const double *u, const double *du, const double *held,
+                        const double *q, const double *v, double *q_end, double *v_end);
+
+/* The same with the inputs at any ports: shapes[inputs] of these, modal->shape + port * modal->size; held: modal forces
+ * besides, or NULL. */
 void modal_advance_at(const Modal *modal, size_t inputs, const double *const *shapes, const double *u, const double *du,
-                      const double *q, const double *v, double *q_end, double *v_end);
+                      const double *held, const double *q, const double *v, double *q_end, double *v_end);
 
 /* What a port shows at the end of a step, its displacement or its speed, without the step itself:
  *   y+ = sum over modes of (by_q q + by_v v) + sum over ports of (held u + ramp du) */

@@ -38,7 +38,8 @@
 #include "plant.h"
 
 static size_t plant_state_size(const Unit *unit) {
-    return sizeof(StateHead) + 2 * plant_state_doubles(unit_derived(unit)) * sizeof(double);
+    const Plant *plant = unit_derived(unit);
+    return sizeof(StateHead) + 2 * (plant_state_doubles(plant) + plant_mounts_doubles(plant)) * sizeof(double);
 }
 
 /* --- start and step */
@@ -127,26 +128,6 @@ static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
     return true;
 }
 
-/* How many of the ports from the first on have forces: mostly none is on tool and slides. */
-static size_t plant_active(const Plant *plant) {
-    size_t active = plant->axes;
-    for (size_t i = active; i < plant_ports(plant); i++) {
-        active = plant->u[i] != 0 || plant->du[i] != 0 ? i + 1 : active;
-    }
-    return active;
-}
-
-/* These ports among those where forces act. */
-static size_t plant_act(Plant *plant, const Modal *modal) {
-    const size_t active = plant_active(plant);
-    for (size_t i = 0; i < active; i++) {
-        plant->shapes[i] = modal->shape + i * modal->size;
-        plant->u_acting[i] = plant->u[i];
-        plant->du_acting[i] = plant->du[i];
-    }
-    return active;
-}
-
 static bool plant_step(Unit *unit, double t, double h) {
     (void)t; /* the structure does not change with time */
     Plant *plant = unit_derived(unit);
@@ -169,25 +150,26 @@ static bool plant_step(Unit *unit, double t, double h) {
     for (size_t i = 0; i < ports; i++) {
         end[i] = u[i] + du[i];
     }
-    if (mounted && !joined) {
-        acting = plant_act(plant, modal);
-    }
-    if (mounted) { /* their forces on the modes, as one more port */
-        plant->shapes[acting] = plant_mounts_held(plant, state);
-        plant->u_acting[acting] = 1;
-        plant->du_acting[acting++] = 0;
-    }
-    if (plant->guided || mounted) {
-        modal_advance_at(modal, acting, plant->shapes, plant->u_acting, plant->du_acting, state + ports,
-                         state + ports + size, q_end, v_end);
+    const double *held = mounted ? plant_mounts_held(unit, plant, plant_mounts_block(plant, state)) : NULL;
+    const double *q = state + ports, *v = q + size;
+    if (plant->guided) {
+        modal_advance_at(modal, acting, plant->shapes, plant->u_acting, plant->du_acting, held, q, v, q_end, v_end);
     } else {
-        modal_advance(modal, plant_active(plant), u, du, state + ports, state + ports + size, q_end, v_end);
+        size_t active = plant->axes; /* mostly, no force is on tool and slides: nothing to add then */
+        for (size_t i = active; i < ports; i++) {
+            active = u[i] != 0 || du[i] != 0 ? i + 1 : active;
+        }
+        if (mounted) {
+            modal_advance_held(modal, active, u, du, held, q, v, q_end, v_end);
+        } else {
+            modal_advance(modal, active, u, du, q, v, q_end, v_end);
+        }
     }
     if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
     }
-    if (mounted && !plant_follow_mounts(plant, state, end, h)) {
+    if (mounted && !plant_follow_mounts(unit, plant, state, end, h)) {
         return unit_fail(unit, "the force of a mount would be no finite number at the end of the step");
     }
     if (plant->errors) {
@@ -230,6 +212,11 @@ static void plant_show_late(Unit *unit) {
 
 /* --- derivatives */
 
+static double plant_mounts_acceleration(Unit *unit, const Plant *plant, const Modal *modal, size_t axis) {
+    const int block = plant->mounts.on ? plant_mounts_block(plant, plant_state(unit)) : 0;
+    return plant->mounts.on ? modal_sum(modal, axis, plant_mounts_held(unit, plant, block)) : 0;
+}
+
 static double plant_output_derivative(Unit *unit, unsigned vr) {
     const Plant *plant = unit_derived(unit);
     const Modal *modal = &plant->modal[plant_head(unit)->cell];
@@ -259,8 +246,7 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
             const TransmissionState *motor = &plant_transmissions(plant, plant_state(unit))[axis];
             return (motor->u - motor->C) / plant->transmissions[axis].J;
         }
-        return modal_acceleration(modal, axis, ports, u, q, v) +
-               (plant->mounts.on ? modal_sum(modal, axis, plant_mounts_held(plant, plant_state(unit))) : 0);
+        return modal_acceleration(modal, axis, ports, u, q, v) + plant_mounts_acceleration(unit, plant, modal, axis);
     case AXIS_VR_guide_F_fr:
         return plant_guides(plant, plant_state(unit))[axis].slope;
     case AXIS_VR_x_a:

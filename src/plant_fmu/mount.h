@@ -14,6 +14,7 @@
 #include "prefix.h"
 
 #define mount_friction PREFIXED(mount_friction)
+#define mount_prepare PREFIXED(mount_prepare)
 #define mount_move PREFIXED(mount_move)
 #define mount_advance PREFIXED(mount_advance)
 #define mount_force PREFIXED(mount_force)
@@ -22,6 +23,7 @@ typedef struct Mount {
     double K_e;        /* [N/m] */
     double F_max, x_2; /* [N], 0: no friction; [m] > 0: where half of F_max is reached from rest */
     double K_v, c;     /* [N/m], [N.s/m]; one of them 0: no viscous part */
+    double h, relaxed; /* share of F_v that relaxes over steps of h, as mount_prepare() leaves it; h 0: no step's */
 } Mount;
 
 /* All numbers, so that it lies among those of a state. */
@@ -36,6 +38,9 @@ double mount_friction(const Mount *mount, const MountState *state, double x);
 
 /* To x [m] without a reversal on the way; one where it begins is found. F_v stays. */
 void mount_move(const Mount *mount, MountState *state, double x);
+
+/* Ahead of many steps of h [s]: saves time, and changes no result. */
+void mount_prepare(Mount *mount, double h);
 
 /* Over h [s] > 0 to x [m], with the speeds v_0 and v_1 [m/s] at both ends. F_v is exact for a mean speed that is
  * held. */

@@ -25,6 +25,9 @@
 
 enum { MOUNTS_EVERY = 4 };
 
+/* w_j of looks that are T apart. */
+static const double even_weights[MOUNT_LOOKS] = {25.0 / 12, -23.0 / 12, 13.0 / 12, -0.25};
+
 /* --- the table */
 
 static const char *const mount_columns[MOUNT_SHAPE] = {"K_lin [N/m]", "K_e [N/m]", "F_max [N]",
@@ -138,12 +141,11 @@ bool plant_derive_mounts(Unit *unit, Plant *plant) {
 
 /* By how much holding changes the force on a mode that turns by `angle` from one look to the next, as a share of it. */
 static double mounts_deviation(double angle) {
-    static const double w[MOUNT_LOOKS] = {25.0 / 12, -23.0 / 12, 13.0 / 12, -0.25}; /* of even looks */
     const double spread = angle > 0 ? sin(angle / 2) / (angle / 2) : 1;
     double real = 0, imaginary = 0;
     for (int j = 0; j < MOUNT_LOOKS; j++) {
-        real += w[j] * cos((j + 0.5) * angle);
-        imaginary -= w[j] * sin((j + 0.5) * angle);
+        real += even_weights[j] * cos((j + 0.5) * angle);
+        imaginary -= even_weights[j] * sin((j + 0.5) * angle);
     }
     return hypot(spread * real - 1, spread * imaginary);
 }
@@ -195,12 +197,18 @@ bool plant_pace_mounts(Unit *unit, Plant *plant, double h) {
 static void mounts_foretell(const double *times, double T, double *w) {
     const double moments[MOUNT_LOOKS] = {1, T / 2, T * T / 6, 0}; /* what is asked of 1, t, t^2, t^3 */
     double at[MOUNT_LOOKS] = {0};
+    bool even = true;
     for (int j = 1; j < MOUNT_LOOKS; j++) {
         at[j] = at[j - 1] - times[j - 1];
+        even = even && fabs(times[j - 1] - T) <= 1e-9 * T;
     }
     for (int j = 0; j < MOUNT_LOOKS; j++) { /* Lagrange's polynomial of look j, by its coefficients */
         double basis[MOUNT_LOOKS] = {1}, scale = 1;
         int degree = 0;
+        if (even) {
+            w[j] = even_weights[j];
+            continue;
+        }
         for (int i = 0; i < MOUNT_LOOKS; i++) {
             if (i == j) {
                 continue;
@@ -217,57 +225,64 @@ static void mounts_foretell(const double *times, double T, double *w) {
     }
 }
 
-bool plant_follow_mounts(Plant *plant, double *state, double *end, double h) {
+/* All ports at the places x, from one block into the other. False where a force is no finite number. */
+static bool mounts_look(Plant *plant, MountsHead *head, const MountPort *was, MountPort *now, double next) {
     Mounts *mounts = &plant->mounts;
-    const MountsHead *was = plant_mounts_head(plant, state);
+    const double T = head->time[0], before = head->time[1];
+    const double per_T = 1 / T, per_before = 1 / before, per_both = T / (T + before);
+    double w[MOUNT_LOOKS], probe = 0;
+    mounts_foretell(head->time, next, w);
+    for (size_t i = 0; i < mounts->ports; i++) {
+        if (mounts->own[i].h != T) {
+            mount_prepare(&mounts->own[i], T);
+        }
+        const double x = mounts->x[i], x_0 = was[i].mount.x, *force = was[i].force;
+        const double K_lin = mounts->rows[i * (MOUNT_SHAPE + plant->archive_modes) + MOUNT_K_LIN];
+        /* Speeds at both ends, of the parabola through the last three places. */
+        const double v = (x - x_0) * per_T, bend = (v - (x_0 - was[i].x_before) * per_before) * per_both;
+        MountState state = was[i].mount;
+        mount_advance(&mounts->own[i], &state, x, v - bend, v + bend, T);
+        const double F = mount_force(&mounts->own[i], &state) - K_lin * x;
+        const double held = w[0] * F + w[1] * force[0] + w[2] * force[1] + w[3] * force[2];
+        head->E += was[i].held * (x - x_0);
+        head->x_max = fmax(head->x_max, fabs(x));
+        now[i] = (MountPort){.mount = state, .x_before = x_0, .force = {F, force[0], force[1]}, .held = held};
+        mounts->held[i] = -held;
+        probe += number_probe(held);
+    }
+    return !isnan(probe);
+}
+
+bool plant_follow_mounts(Unit *unit, Plant *plant, double *state, double *end, double h) {
+    Mounts *mounts = &plant->mounts;
     MountsHead *head = plant_mounts_head(plant, end);
-    *head = *was;
+    const double next = (double)mounts->every * h;
+    *head = *plant_mounts_head(plant, state);
     if (!(head->left > 0)) { /* the first step */
         head->left = (double)mounts->every;
         head->h = h;
-        for (int j = 1; j < MOUNT_LOOKS; j++) {
-            head->time[j] = (double)mounts->every * h; /* it has stood still that long */
-        }
+        head->time[1] = head->time[2] = next; /* it has stood still that long */
     }
     head->time[0] += h;
     head->left = head->h == h ? head->left - 1 : 0;
-    memcpy(plant_mounts_held(plant, end), plant_mounts_held(plant, state),
-           (plant->size + MOUNT_PORT_DOUBLES * mounts->ports) * sizeof(double));
     if (head->left > 0) {
         return true;
     }
-    MountPort *ports = plant_mount_ports(plant, end);
-    const double T = head->time[0], before = head->time[1], next = (double)mounts->every * h;
-    double w[MOUNT_LOOKS], probe = 0;
-    mounts_foretell(head->time, next, w);
+    const int block = plant_mounts_block(plant, state);
+    double *was = plant_mounts_held(unit, plant, block), *now = plant_mounts_held(unit, plant, !block);
     modal_sums(&mounts->at, 0, mounts->ports, end + plant_ports(plant), mounts->x);
-    for (size_t i = 0; i < mounts->ports; i++) {
-        MountPort *port = &ports[i];
-        const double x = mounts->x[i], x_0 = port->mount.x,
-                     K_lin = mounts->rows[i * (MOUNT_SHAPE + plant->archive_modes)];
-        /* Speeds at both ends, of the parabola through the last three places. */
-        const double v = (x - x_0) / T, bend = (v - (x_0 - port->x_before) / before) / (T + before);
-        mount_advance(&mounts->own[i], &port->mount, x, v - bend * T, v + bend * T, T);
-        memmove(port->force + 1, port->force, (MOUNT_LOOKS - 1) * sizeof *port->force);
-        port->force[0] = mount_force(&mounts->own[i], &port->mount) - K_lin * x;
-        port->x_before = x_0;
-        head->E += port->held * (x - x_0);
-        head->x_max = fmax(head->x_max, fabs(x));
-        port->held = 0;
-        for (int j = 0; j < MOUNT_LOOKS; j++) {
-            port->held += w[j] * port->force[j];
-        }
-        mounts->held[i] = -port->held;
-        probe += number_probe(port->held);
+    if (!mounts_look(plant, head, (MountPort *)(void *)(was + plant->size), (MountPort *)(void *)(now + plant->size),
+                     next)) {
+        return false;
     }
-    modal_force(&mounts->at, mounts->held, plant_mounts_held(plant, end));
-    for (int j = MOUNT_LOOKS - 1; j > 0; j--) {
-        head->time[j] = head->time[j - 1];
-    }
-    head->time[0] = 0;
-    head->left = (double)mounts->every;
-    head->h = h;
-    return !isnan(probe);
+    modal_force(&mounts->at, mounts->held, now);
+    *head = (MountsHead){.time = {0, head->time[0], head->time[1]},
+                         .left = (double)mounts->every,
+                         .h = h,
+                         .block = !block,
+                         .E = head->E,
+                         .x_max = head->x_max};
+    return true;
 }
 
 void plant_show_mounts(Unit *unit, const Plant *plant, double *state) {

@@ -65,16 +65,17 @@ enum { MOUNT_K_LIN, MOUNT_K_E, MOUNT_F_MAX, MOUNT_X_2, MOUNT_K_V, MOUNT_C, MOUNT
 /* A port of the mounts in a state, all numbers. */
 typedef struct MountPort {
     MountState mount;
-    double x_before;           /* at the look before the last [m] */
-    double force[MOUNT_LOOKS]; /* beyond the linear spring at the last looks, the latest first [N] */
-    double held;               /* until the next one [N] */
+    double x_before;               /* at the look before the last [m] */
+    double force[MOUNT_LOOKS - 1]; /* beyond the linear spring at the last looks, the latest first [N] */
+    double held;                   /* until the next one [N] */
 } MountPort;
 
 /* Their common part of a state, all numbers. */
 typedef struct MountsHead {
-    double time[MOUNT_LOOKS]; /* since the last look, and between those before [s] */
-    double left;              /* steps until the next */
-    double h;                 /* those steps [s] */
+    double time[MOUNT_LOOKS - 1]; /* since the last look, and between those before [s] */
+    double left;                  /* steps until the next */
+    double h;                     /* those steps [s] */
+    double block;                 /* that counts, 0 or 1 */
     double E, x_max;
 } MountsHead;
 
@@ -129,9 +130,9 @@ typedef struct Plant {
 
 /* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
  * with play or geometry, ways of the slides since the start, what play takes off or adds, and the wind-up of the
- * hysteresis [axes] each, a GuideState and a TransmissionState per axis, and of mounts a MountsHead, modal forces that
- * are held [size] and a MountPort per port: a step leaves its result in the other one, which counts once it is known to
- * be sound. */
+ * hysteresis [axes] each, a GuideState and a TransmissionState per axis, and of mounts a MountsHead: a step leaves its
+ * result in the other one, which counts once it is known to be sound. Behind both, of mounts two blocks of modal forces
+ * that are held [size] and a MountPort per port: a look leaves its result in the one that its start does not name. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
@@ -158,9 +159,13 @@ static inline size_t plant_ports(const Plant *plant) {
 }
 
 static inline size_t plant_state_doubles(const Plant *plant) {
-    const size_t mounts =
-        plant->mounts.ports > 0 ? MOUNTS_HEAD_DOUBLES + plant->size + MOUNT_PORT_DOUBLES * plant->mounts.ports : 0;
+    const size_t mounts = plant->mounts.ports > 0 ? MOUNTS_HEAD_DOUBLES : 0;
     return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES + TRANSMISSION_DOUBLES) * plant->axes + mounts;
+}
+
+/* Of a block of the mounts. */
+static inline size_t plant_mounts_doubles(const Plant *plant) {
+    return plant->mounts.ports > 0 ? plant->size + MOUNT_PORT_DOUBLES * plant->mounts.ports : 0;
 }
 
 static inline StateHead *plant_head(Unit *unit) {
@@ -192,13 +197,13 @@ static inline MountsHead *plant_mounts_head(const Plant *plant, double *state) {
     return (MountsHead *)(void *)(plant_transmissions(plant, state) + plant->axes);
 }
 
-/* Modal forces of the mounts, which they are held at. */
-static inline double *plant_mounts_held(const Plant *plant, double *state) {
-    return (double *)(plant_mounts_head(plant, state) + 1);
+/* Modal forces that the mounts are held at, in a block; their ports follow. */
+static inline double *plant_mounts_held(Unit *unit, const Plant *plant, int block) {
+    return plant_state_at(unit, plant, 2) + (block > 0 ? plant_mounts_doubles(plant) : 0);
 }
 
-static inline MountPort *plant_mount_ports(const Plant *plant, double *state) {
-    return (MountPort *)(void *)(plant_mounts_held(plant, state) + plant->size);
+static inline int plant_mounts_block(const Plant *plant, double *state) {
+    return plant_mounts_head(plant, state)->block > 0;
 }
 
 /* --- load.c: the archive */
@@ -248,7 +253,7 @@ bool plant_derive_mounts(Unit *unit, Plant *plant);
 /* Ahead of a step of h: how often they are looked at. False with the reason logged where no pace is stable. */
 bool plant_pace_mounts(Unit *unit, Plant *plant, double h);
 /* Behind it, with q in `end`: them, where it is time to look at them. False where a force is no finite number. */
-bool plant_follow_mounts(Plant *plant, double *state, double *end, double h);
+bool plant_follow_mounts(Unit *unit, Plant *plant, double *state, double *end, double h);
 void plant_show_mounts(Unit *unit, const Plant *plant, double *state);
 
 #endif

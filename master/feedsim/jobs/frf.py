@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from feedsim import units
 from feedsim.analysis import Figure, Named, linear, responses, truncation
 from feedsim.analysis.campaign import Plan, run_campaign
 from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
@@ -349,7 +348,7 @@ def mount_words(machine: Machine, deflection: float) -> str:
     """How the closed form has mounts that are not linear: a sentence."""
     assert machine.mounts is not None
     how = (
-        f"at {units.show(deflection, 'm')} of deflection (describing function)" if deflection
+        f"at {1e6 * deflection:.4g} um of deflection (describing function)" if deflection
         else f"as they are at rest; {spelt('mount_amplitude')} has them at a deflection"
     )  # fmt: skip
     return f"closed form and margins have the mounts of {machine.mounts.table.name}, which are not linear, {how}"

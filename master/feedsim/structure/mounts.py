@@ -103,13 +103,14 @@ def _read(path: Path, content: bytes, modes: int) -> MountTable:
 def friction_cycle(F_max: Floats, x_2: Floats, x_0: Floats) -> tuple[Floats, Floats]:
     """Stiffness F_0/x_0 [N/m] and loss stiffness E/(pi x_0^2) [N/m] of the friction in a steady cycle of amplitude x_0
     [m] (0: at rest), in closed form; (P,) each."""
-    a = np.maximum(x_0, 1e-9 * x_2)
-    F_0 = F_max / (2 * x_2) * (np.sqrt(x_2**2 + a**2 + 6 * x_2 * a) - x_2 - a)
-    share = np.divide(F_0, F_max, out=np.zeros_like(F_0), where=F_max > 0)
+    # F_0 in the form that does not cancel where x_0 is small.
+    stiffness = 2 * F_max / (np.sqrt(x_2**2 + x_0**2 + 6 * x_2 * x_0) + x_2 + x_0)
+    share = np.divide(stiffness * x_0, F_max, out=np.zeros_like(x_0), where=F_max > 0)
     wide = x_2 * (1 + share)
-    E = 2 * F_max * (2 * a - wide * (1 + share) * np.log1p(2 * a / wide))
+    E = 2 * F_max * (2 * x_0 - wide * (1 + share) * np.log1p(2 * x_0 / wide))
     # The loss is of third order in x_0: below that its closed form is rounding.
-    return F_0 / a, np.where(x_0 > 1e-4 * x_2, np.maximum(E, 0) / (np.pi * a**2), 0.0)
+    swings = x_0 > 1e-4 * x_2
+    return stiffness, np.divide(np.maximum(E, 0), np.pi * x_0**2, out=np.zeros_like(x_0), where=swings)
 
 
 def viscous_cycle(K_v: Floats, c: Floats, omega: float) -> tuple[Floats, Floats]:

@@ -20,8 +20,8 @@ import feedsim
 from feedsim import cosim, scenario
 from feedsim.cosim import Run
 from feedsim.errors import InputError
-from feedsim.structure.modes import checked_modes
-from feedsim.structure.mounts import friction_cycle, read_mounts, viscous_cycle, with_mounts
+from feedsim.structure.modes import checked_modes, with_mounts
+from feedsim.structure.mounts import friction_cycle, read_mounts, viscous_cycle
 from feedsim.structure.pack import pack
 from fmi_helpers import Archive, Instance, Message
 from reference import monolithic
@@ -106,17 +106,9 @@ def test_mounts_that_are_springs_leave_the_bits(tmp_path: Path, fmus: Path) -> N
 
 
 def test_factors_reach_the_plant(rubber: Path, fmus: Path) -> None:
-    """Without friction and viscous part, and as stiff: the linear machine but for rounding."""
     whole = run(rubber, fmus, STOP)
     softer = run(rubber, fmus, STOP, "machine.mounts.F_max=50 %")
     assert np.abs(whole.trace["Z.x_a"] - softer.trace["Z.x_a"]).max() > 0.1e-6
-
-
-def test_the_bed_comes_to_rest_elsewhere(rubber: Path, fmus: Path, tmp_path: Path) -> None:
-    """Friction of the mounts holds the bed off the place where springs would bring it; deflections stay bounded."""
-    springs = machine_with(tmp_path, "")
-    at_rest = [run(place, fmus, STOP.replace("0.3 s", "2 s")).trace["tool.x_Y"][-1] for place in (springs, rubber)]
-    assert 1e-9 < abs(at_rest[0] - at_rest[1]) < 2e-6
 
 
 # --- the plant alone --------------------------------------------------------------------------------------------------
@@ -245,10 +237,10 @@ def test_describing_function_is_that_of_a_complex_matrix(rubber: Path) -> None:
             added = K_e + stiff + K - K_lin + 1j * (loss + D)
             drag = 1j * 2 * base.damping[elastic] * omega * w
             values = np.linalg.eigvals(np.diag(omega**2 + drag) + b.T @ (added[:, None] * b))
-            root = np.sort_complex(np.sqrt(values))[k]
-            w = abs(root)
+            square = np.sort_complex(values)[k]
+            w = np.sqrt(square.real)
         assert seen.frequency[elastic][k] == pytest.approx(w / (2 * np.pi), rel=3e-3)
-        assert seen.damping[elastic][k] == pytest.approx(root.imag / w, rel=0.05)
+        assert seen.damping[elastic][k] == pytest.approx(square.imag / square.real / 2, rel=0.05)
 
 
 def test_at_rest_the_modes_are_those_of_the_table(tmp_path: Path) -> None:

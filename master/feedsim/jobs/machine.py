@@ -40,8 +40,8 @@ from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.build import build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
-from feedsim.structure.modes import Modes, checked_modes, read_modes, write_modes
-from feedsim.structure.mounts import MOUNTS_FILE, MountTable, damped_twice, table_of, write_mounts
+from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
+from feedsim.structure.mounts import MOUNTS_FILE, MountTable, table_of, write_mounts
 from feedsim.structure.table_check import stale
 
 # Exchange step where no machine file says what the control cycle is [s].

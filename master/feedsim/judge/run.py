@@ -21,7 +21,8 @@ from feedsim.nc import Program
 from feedsim.scenario import Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import Modes, checked_modes, read_modes
-from feedsim.structure.mounts import damped_twice, factored, read_mounts
+from feedsim.structure.modes import damped_twice
+from feedsim.structure.mounts import factored, read_mounts
 from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, warnings
 from feedsim.structure.poses_file import GridAxis
 from feedsim.structure.table_check import table_mismatch

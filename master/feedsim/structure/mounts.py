@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,19 +21,7 @@ from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly, Floats
 from feedsim.trace.files import written_whole
 
-if TYPE_CHECKING:
-    from feedsim.structure.modes import Modes
-
 MOUNTS_FILE = "mounts.csv"
-# A spring in the modes is the mounts' stiffness at rest where it agrees to this share: then the modes stay as they are.
-SAME_STIFFNESS = 1e-9
-# A mode lives in the mounts where so much of its strain energy is theirs.
-MOSTLY = 0.5
-# Frames without their mounts have 1 to 3 %: what a table has beyond it is meant for mounts.
-FRAME_DAMPING = 0.03
-# Of a mode's damping in the table: what the mounts bring at their best that is worth a warning.
-NOTICED = 0.25
-AMPLITUDES = np.logspace(-1, 1, 21)  # of x_2, among which friction damps most
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,69 +110,3 @@ def factored(table: MountTable, factors: Mapping[str, Any]) -> Floats:
     """The elements (P, 6) with the factors that a machine has for all of them."""
     names = ("K_lin", "K_e", "F_max", "x_2", "K_v", "c")
     return np.asarray(table.element * np.array([float(factors.get(name, 1.0)) for name in names]))
-
-
-def with_mounts(modes: Modes, table: MountTable, element: Floats, amplitude: float = 0.0) -> Modes:
-    """Modes with the mounts as linear springs and dampers: their tangent at rest, or the describing function of a
-    steady cycle with this amplitude [m] at every mount; `modes` itself where the modes hold that already.
-
-    The viscous part is stiffness and loss at each mode's own frequency. Damping couples modes; its diagonal is kept.
-
-    Raises:
-        InputError: the mounts would not hold the machine.
-    """
-    from feedsim.structure.modes import Modes as Result
-
-    K_lin, K_e, F_max, x_2, K_v, c = element.T
-    stiff, loss = friction_cycle(F_max, x_2, np.full(len(K_lin), amplitude))
-    added = K_e + stiff - K_lin
-    viscous = bool(np.any((K_v > 0) & (c > 0)))
-    if not viscous and not loss.any() and np.all(np.abs(added) <= SAME_STIFFNESS * K_lin):
-        return modes
-    elastic = np.flatnonzero(~modes.rigid)
-    omega = 2 * np.pi * modes.frequency[elastic]
-    b = table.shapes[:, elastic]
-    squares, V = np.linalg.eigh(np.diag(omega**2) + b.T @ (added[:, None] * b))
-    if squares.size and squares[0] <= 0:
-        raise InputError(f"{modes.file}: with these mounts nothing holds the machine: more K_e")
-    new = np.sqrt(squares)
-    drag = np.einsum("im,i,im->m", V, 2 * modes.damping[elastic] * omega, V)
-    b = b @ V
-    for m, w in enumerate(new.tolist()):
-        K, D = viscous_cycle(K_v, c, w)
-        new[m] = math.sqrt(w**2 + float(K @ b[:, m] ** 2))
-        drag[m] += float((loss + D) @ b[:, m] ** 2) / w
-    frequency, damping = modes.frequency.copy(), modes.damping.copy()
-    order = np.argsort(new, kind="stable")
-    frequency[elastic], damping[elastic] = new[order] / (2 * np.pi), (drag / (2 * new))[order]
-    ports = {name: shape.copy() for name, shape in modes.ports.items()}
-    for name, shape in ports.items():
-        shape[elastic] = (modes.ports[name][elastic] @ V)[order]
-    return Result(modes.file, frequency, damping, ports)
-
-
-def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[str]:
-    """Modes on the mounts whose damping in the table is more than a frame's, where the mounts bring theirs besides."""
-    K_lin, _, F_max, x_2, K_v, c = element.T
-    reported = []
-    for k in np.flatnonzero(~modes.rigid).tolist():
-        omega, squares = 2 * np.pi * modes.frequency[k], table.shapes[:, k] ** 2
-        if K_lin @ squares < MOSTLY * omega**2 or modes.damping[k] <= FRAME_DAMPING:
-            continue
-        deflection = np.sqrt(squares / squares.max())
-        typical = float(np.min(x_2[F_max > 0], initial=1.0))
-        bring = max(
-            float((friction_cycle(F_max, x_2, a * typical * deflection)[1] + viscous_cycle(K_v, c, omega)[1]) @ squares)
-            for a in AMPLITUDES.tolist()
-        ) / (2 * omega**2)
-        if bring > NOTICED * modes.damping[k]:
-            reported.append(
-                f"{modes.frequency[k]:.4g} Hz ({100 * modes.damping[k]:.3g} % and up to {100 * bring:.2g} %)"
-            )
-    if not reported:
-        return []
-    return [
-        f"damping counts twice: the table of modes damps modes on the mounts, and the mounts that are not linear damp "
-        f"them besides: {', '.join(reported)}. Give these modes the damping of the frame alone (damping.steps of the "
-        "structure file)"
-    ]

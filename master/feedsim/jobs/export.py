@@ -459,6 +459,11 @@ def machine_pack(
                 raise InputError(f"{doubt}, or let the modes be computed: {spelt('at')}")
             mounts = folder / MOUNTS_FILE if at and loaded.mounts_table is not None else loaded.mounts_table
             grid, follows = None, ""
+            if poses and mounts is not None:
+                raise InputError(
+                    f"{spelt('poses')}: {loaded.name} has mounts that are not linear ({loaded.mounts_table}), which "
+                    "belong to one pose; leave one of the two out"
+                )
             if poses:
                 grid = folder / "poses.bin"
                 follows = f"; {_write_grid(loaded, pose, modes, poses, watch, grid)}"

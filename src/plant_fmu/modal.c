@@ -318,12 +318,24 @@ double modal_foretold(const Forecast *forecast, size_t size, const double *UNALI
     return lanes_total(&sum);
 }
 
-void modal_force(const Modal *modal, const double *u, double *f) {
-    const size_t size = modal->size;
-    for (size_t k = 0; k < size; k += MODAL_LANES) {
+void modal_force(const Modal *modal, const double *UNALIASED u, double *UNALIASED f) {
+    const size_t size = modal->size, ports = modal->ports;
+    size_t k = 0;
+    for (; k + 2 * MODAL_LANES <= size; k += 2 * MODAL_LANES) { /* two at a time: u is read once for them */
+        Lanes sum_0 = {{{0}}}, sum_1 = {{{0}}}, b_k;
+        const double *UNALIASED b = modal->shape + k;
+        for (size_t i = 0; i < ports; i++, b += size) {
+            lanes_read(&b_k, b);
+            lanes_add_scaled(&sum_0, &b_k, u[i]);
+            lanes_read(&b_k, b + MODAL_LANES);
+            lanes_add_scaled(&sum_1, &b_k, u[i]);
+        }
+        lanes_write(f + k, &sum_0);
+        lanes_write(f + k + MODAL_LANES, &sum_1);
+    }
+    if (k < size) {
         Lanes sum = {{{0}}}, b_k;
-        UNROLLED
-        for (size_t i = 0; i < modal->ports; i++) {
+        for (size_t i = 0; i < ports; i++) {
             lanes_read(&b_k, modal->shape + i * size + k);
             lanes_add_scaled(&sum, &b_k, u[i]);
         }

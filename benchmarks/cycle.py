@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -18,13 +19,23 @@ from harness import CIRCLE, ROOT, Contestant, Costs, arguments, digits, measure,
 import fmpy
 import numpy as np
 
+import feedsim
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.archive import Archive
 from feedsim.trace import Trace
 
+DEFAULT = ROOT / "scenarios" / "machines" / "test_centre"
 STEPS = 200_000
 ROUNDS = 5
 LOOPS = {"native loop": True, "Python loop": False}
+MOUNTED = "native loop, four mounts that are not linear"
+SPRINGS = "      - nodes: [B0.0, B0.4, B0.8, B2.0, B2.4, B2.8]\n"
+RUBBER = """\
+      - {nodes: [B0.4, B2.4], offset: [0 mm, -450 mm, 0 mm], stiffness: [45 N/um, 65 N/um, 45 N/um]}
+      - nodes: [B0.0, B0.8, B2.0, B2.8]
+        friction: {F_max: [400 N, 600 N, 400 N], x_2: [20 um, 20 um, 20 um]}
+        viscous: {K_v: [5 N/um, 5 N/um, 5 N/um], c: [4e4 N.s/m, 4e4 N.s/m, 4e4 N.s/m]}
+"""
 # unit -> (driven input, amplitude in SI, output read back, instances in the default machine)
 CASES = {
     "plant": ("Z.M_a", 0.5, "Z.n_a", 1),
@@ -59,8 +70,24 @@ def unit_cost(program: Path, name: str, steps: int = STEPS) -> tuple[float, floa
     return alone, exchanged
 
 
+def mounted(directory: Path) -> Path:
+    """The default machine with four mounts that are not linear, as a folder."""
+    place = directory / "mounted"
+    shutil.copytree(DEFAULT, place, dirs_exist_ok=True)
+    text = (DEFAULT / "structure.yaml").read_text(encoding="utf-8")
+    assert SPRINGS in text
+    (place / "structure.yaml").write_text(text.replace(SPRINGS, RUBBER), encoding="utf-8")
+    built = feedsim.machine_build(place / "structure.yaml", at={"X": "800 mm", "Y": "327 mm", "Z": "100 mm"})
+    built.save(directory / "built", force=True)
+    for name in ("modes.csv", "mounts.csv"):
+        shutil.copy(directory / "built" / name, place / name)
+    machine = (DEFAULT / "machine.yaml").read_text(encoding="utf-8")
+    (place / "machine.yaml").write_text(f"{machine}\nmounts: {{table: mounts.csv}}\n", encoding="utf-8")
+    return place
+
+
 def main(given: Sequence[str] | None = None) -> int:
-    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS), more=_beside)
+    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS, MOUNTED), more=_beside)
     program = build(ROOT / "build" / "bench")
     circle = scenario.load(CIRCLE, bench.circle)
     planned = nc.plan(circle)
@@ -85,6 +112,10 @@ def main(given: Sequence[str] | None = None) -> int:
 
     contestants = [Contestant(name, lambda name=name: stepped(name)) for name in CASES]  # type: ignore[misc]
     contestants += [Contestant(name, lambda native=native: looped(native)) for name, native in LOOPS.items()]  # type: ignore[misc]
+    if MOUNTED in bench.only:
+        rubber = scenario.load(CIRCLE, [f"machine={mounted(program.parent)}", *bench.circle])
+        on_rubber = nc.plan(rubber)
+        contestants.append(Contestant(MOUNTED, lambda: 1e6 * cosim.run(rubber, program=on_rubber).cpu_time / cycles))
     chosen = [each for each in contestants if each.name in bench.only]
     others = {f"native loop, {folder}": folder for folder in bench.given.beside}
     chosen += [Contestant(name, lambda folder=folder: looped(True, folder)) for name, folder in others.items()]  # type: ignore[misc]
@@ -102,9 +133,12 @@ def main(given: Sequence[str] | None = None) -> int:
             if name in costs.costs:
                 told = [f"the whole {name}", "", f"{digits(costs.median(name))} us", 7, costs.ratio_text(name, "units")]
                 rows.append(list(told))
-    rows += [[name, "", f"{digits(costs.median(name))} us", 7, ""] for name in others]
-    if others and "native loop" in costs.costs:
-        print(*(f"{name}: {costs.ratio_text(name, 'native loop')} of the native loop" for name in others), sep="\n")
+    told_besides = [*others, *([MOUNTED] if MOUNTED in costs.costs else [])]
+    rows += [[name, "", f"{digits(costs.median(name))} us", 7, ""] for name in told_besides]
+    if told_besides and "native loop" in costs.costs:
+        print(
+            *(f"{name}: {costs.ratio_text(name, 'native loop')} of the native loop" for name in told_besides), sep="\n"
+        )
     header = ["per 125 us cycle", "doStep alone", "with set, slope and get", "instances", "of all units (quartiles)"]
     baseline = "units" if "units" in costs.costs else None
     bench.tell(table(header, rows), {"us": costs.as_json(baseline), "us, set, slope and get": exchanged.as_json()})

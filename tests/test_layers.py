@@ -81,7 +81,9 @@ SOLE_USERS = {
     "distributed": {"sweep"},
     "dask": {"sweep"},
     "pyarrow": {"sweep"},
-    "feedsim_packager": {"units.py", "structure/pack.py", "ssp/setpoints.py", "cosim/one_unit.py"},
+    "feedsim_packager": {
+        *("units.py", "structure/pack.py", "structure/mounts.py", "ssp/setpoints.py", "cosim/one_unit.py"),
+    },
 }
 
 

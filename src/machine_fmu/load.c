@@ -1,7 +1,7 @@
 /* The archive's machine: its parts, each with its own files, and the settings (resources/settings.csv), a table
  *
  *   name,value
- *   hash.plant,<16 hexadecimal digits>       of axes.csv, modes.csv and poses.bin
+ *   hash.plant,<16 hexadecimal digits>       of axes.csv, modes.csv, poses.bin and mounts.csv
  *   hash.motion,<16 hexadecimal digits>      of setpoints.csv, where the archive holds a motion
  *   X.drive.K_v,66.6                         start value of a parameter, SI; false and true are 0 and 1
  *

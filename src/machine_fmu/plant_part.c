@@ -17,6 +17,8 @@
 #include "../plant_fmu/modal.c"
 #include "../plant_fmu/model.c"
 #include "../plant_fmu/modes.c"
+#include "../plant_fmu/mount.c"
+#include "../plant_fmu/mounts.c"
 #include "../plant_fmu/outputs.c"
 #include "../plant_fmu/poses.c"
 #include "../plant_fmu/resources.c"

@@ -18,7 +18,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
     const size_t axes = plant->axes, shown = PORTS_SHOWN * axes;
-    const size_t joints = shown * 2 * (size + ports) + 4 * axes * axes + 8 * axes + 2 * ports;
+    const size_t joints = shown * (3 * size + 2 * ports) + 4 * axes * axes + 8 * axes + 2 * ports;
     const size_t scratch = 4 * ports + axes + joints + crossing;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
@@ -47,8 +47,10 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     plant->carried = plant->x + axes;
     double *at = plant->carried + crossing;
     for (size_t i = 0; i < shown; i++) {
-        plant->forecasts[i] = (Forecast){.q = at, .v = at + size, .held = at + 2 * size, .ramp = at + 2 * size + ports};
-        at += 2 * (size + ports);
+        double *held = at + 3 * size;
+        plant->forecasts[i] =
+            (Forecast){.q = at, .v = at + size, .f = at + 2 * size, .held = held, .ramp = held + ports};
+        at += 3 * size + 2 * ports;
     }
     double **const matrices[] = {&plant->held, &plant->ramp, &plant->by_angle, &plant->by_n};
     for (size_t i = 0; i < sizeof matrices / sizeof *matrices; i++, at += axes * axes) {
@@ -282,7 +284,7 @@ bool plant_derive(Unit *unit) {
     plant->foretold = NULL; /* other axes may be joined now */
     const char *path = unit_scalars(unit)->modes_file;
     if (plant->ready && strcmp(plant->table, path) == 0) {
-        return plant_join_motors(unit, plant);
+        return plant_derive_mounts(unit, plant) && plant_join_motors(unit, plant);
     }
     uint64_t hash = plant->archive_hash;
     const bool good =
@@ -292,7 +294,7 @@ bool plant_derive(Unit *unit) {
         plant->table_hash = hash;
         snprintf(plant->table, sizeof plant->table, "%s", path);
     }
-    return good && plant_join_motors(unit, plant);
+    return good && plant_derive_mounts(unit, plant) && plant_join_motors(unit, plant);
 }
 
 /* --- saved states */

@@ -40,9 +40,14 @@ static void plant_prepare_joints(Plant *plant, const Modal *modal, double h) {
 }
 
 /* What a port shows at the end of the step with the forces from outside alone. */
-static double plant_without_joints(const Plant *plant, const Forecast *forecast, size_t acting, const double *state) {
+static double plant_without_joints(Unit *unit, const Plant *plant, const Forecast *forecast, size_t acting,
+                                   double *state) {
     const double *q = state + plant_ports(plant);
     double sum = modal_foretold(forecast, plant->size, q, q + plant->size);
+    if (plant->mounts.on) {
+        const Modal by_force = {.size = plant->size, .shape = forecast->f};
+        sum += modal_sum(&by_force, 0, plant_mounts_held(unit, plant, plant_mounts_block(plant, state)));
+    }
     for (size_t i = 0; i < acting; i++) {
         const size_t port = plant->acting[i];
         sum += forecast->held[port] * plant->u[port] + forecast->ramp[port] * plant->du[port];
@@ -148,11 +153,12 @@ bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, dou
     }
     for (size_t i = 0; i < axes; i++) {
         if (plant->guides[i].on) {
-            plant->v_free[i] = plant_without_joints(plant, plant_forecast(plant, SLIDE_SPEED, i), count, state);
+            plant->v_free[i] = plant_without_joints(unit, plant, plant_forecast(plant, SLIDE_SPEED, i), count, state);
         }
         if (plant->transmissions[i].on) {
-            plant->n_free[i] = plant_without_joints(plant, plant_forecast(plant, MOTOR_SPEED, i), count, state);
-            plant->angle_free[i] = plant_without_joints(plant, plant_forecast(plant, MOTOR_ANGLE, i), count, state);
+            plant->n_free[i] = plant_without_joints(unit, plant, plant_forecast(plant, MOTOR_SPEED, i), count, state);
+            plant->angle_free[i] =
+                plant_without_joints(unit, plant, plant_forecast(plant, MOTOR_ANGLE, i), count, state);
         }
     }
     if (!(plant->driven ? plant_settle_transmissions(plant, state, end, h, &settled)

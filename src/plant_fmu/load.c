@@ -101,6 +101,19 @@ static bool plant_load_poses(Unit *unit, Plant *plant, const Resources *resource
            unit_fail(unit, "%s", message);
 }
 
+static bool plant_load_mounts(Unit *unit, Plant *plant, const Resources *resources) {
+    char source[64];
+    snprintf(source, sizeof source, "%smounts.csv", resources->source);
+    if (resources->mounts == NULL) {
+        return true;
+    }
+    if (plant->poses.cells > 0) {
+        return unit_fail(unit, "%s: mounts that are not linear belong to one pose; the archive has a grid of poses",
+                         source);
+    }
+    return plant_read_mounts(unit, plant, resources->mounts, resources->mounts_size, source);
+}
+
 bool plant_load(Unit *unit) {
     Plant *plant = unit_alloc(unit, 1, sizeof *plant);
     if (plant == NULL) {
@@ -112,7 +125,7 @@ bool plant_load(Unit *unit) {
         return false;
     }
     const bool good = plant_load_axes(unit, plant, &resources) && plant_load_modes(unit, plant, &resources) &&
-                      plant_load_poses(unit, plant, &resources);
+                      plant_load_poses(unit, plant, &resources) && plant_load_mounts(unit, plant, &resources);
     resources_free(unit, &resources);
     return good;
 }
@@ -120,6 +133,7 @@ bool plant_load(Unit *unit) {
 void plant_release(Unit *unit) {
     Plant *plant = unit_derived(unit);
     if (plant != NULL) {
+        plant_free_mounts(unit, plant);
         unit_free(unit, plant->transmissions);
         unit_free(unit, plant->forecasts);
         unit_free(unit, plant->acting);

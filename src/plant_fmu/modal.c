@@ -219,15 +219,19 @@ static inline void lanes_end(double *end, const double *c, const Lanes *q, const
 #define UNROLLED
 #endif
 
-/* Inputs at the ports of those shapes, NULL: at the first of all ports. */
+/* Inputs at the ports of those shapes, NULL: at the first of all ports; held: modal forces besides, NULL: none. */
 INLINED void modal_advance_from(const Modal *modal, size_t inputs, const double *const *UNALIASED shapes,
-                                const double *UNALIASED u, const double *UNALIASED du, const double *UNALIASED q,
-                                const double *UNALIASED v, double *UNALIASED q_end, double *UNALIASED v_end) {
+                                const double *UNALIASED u, const double *UNALIASED du, const double *UNALIASED held,
+                                const double *UNALIASED q, const double *UNALIASED v, double *UNALIASED q_end,
+                                double *UNALIASED v_end) {
     const size_t size = modal->size;
     const double *UNALIASED c = modal->update;
     for (size_t k = 0; k < size; k += MODAL_LANES, c += COEFFICIENTS * MODAL_LANES) {
         Lanes f = {{{0}}}, df = {{{0}}}, q_k, v_k;
         const double *UNALIASED b = modal->shape + k;
+        if (held != NULL) {
+            lanes_read(&f, held + k);
+        }
         UNROLLED
         for (size_t i = 0; i < inputs; i++, b += size) {
             Lanes b_k;
@@ -245,20 +249,31 @@ INLINED void modal_advance_from(const Modal *modal, size_t inputs, const double 
 void modal_advance(const Modal *modal, size_t inputs, const double *u, const double *du, const double *q,
                    const double *v, double *q_end, double *v_end) {
     if (inputs == 3) { /* machines of three axes without forces on tool and slides */
-        modal_advance_from(modal, 3, NULL, u, du, q, v, q_end, v_end);
+        modal_advance_from(modal, 3, NULL, u, du, NULL, q, v, q_end, v_end);
     } else {
-        modal_advance_from(modal, inputs, NULL, u, du, q, v, q_end, v_end);
+        modal_advance_from(modal, inputs, NULL, u, du, NULL, q, v, q_end, v_end);
+    }
+}
+
+void modal_advance_held(const Modal *modal, size_t inputs, const double *u, const double *du, const double *held,
+                        const double *q, const double *v, double *q_end, double *v_end) {
+    if (inputs == 3) {
+        modal_advance_from(modal, 3, NULL, u, du, held, q, v, q_end, v_end);
+    } else {
+        modal_advance_from(modal, inputs, NULL, u, du, held, q, v, q_end, v_end);
     }
 }
 
 void modal_advance_at(const Modal *modal, size_t inputs, const double *const *shapes, const double *u, const double *du,
-                      const double *q, const double *v, double *q_end, double *v_end) {
-    if (inputs == 3) {
-        modal_advance_from(modal, 3, shapes, u, du, q, v, q_end, v_end);
+                      const double *held, const double *q, const double *v, double *q_end, double *v_end) {
+    if (held != NULL) {
+        modal_advance_from(modal, inputs, shapes, u, du, held, q, v, q_end, v_end);
+    } else if (inputs == 3) {
+        modal_advance_from(modal, 3, shapes, u, du, NULL, q, v, q_end, v_end);
     } else if (inputs == 4) {
-        modal_advance_from(modal, 4, shapes, u, du, q, v, q_end, v_end);
+        modal_advance_from(modal, 4, shapes, u, du, NULL, q, v, q_end, v_end);
     } else {
-        modal_advance_from(modal, inputs, shapes, u, du, q, v, q_end, v_end);
+        modal_advance_from(modal, inputs, shapes, u, du, NULL, q, v, q_end, v_end);
     }
 }
 
@@ -273,6 +288,7 @@ void modal_forecast(const Modal *modal, size_t port, bool speed, Forecast *forec
         const double b = modal->shape[port * size + k];
         forecast->q[k] = b * c[0];
         forecast->v[k] = b * c[MODAL_LANES];
+        forecast->f[k] = b * c[2 * MODAL_LANES];
         for (size_t from = 0; from < modal->ports; from++) {
             const double shapes = b * modal->shape[from * size + k];
             forecast->held[from] += shapes * c[2 * MODAL_LANES];
@@ -300,6 +316,31 @@ double modal_foretold(const Forecast *forecast, size_t size, const double *UNALI
         lanes_add_product(&sum, &by_v, &v_k);
     }
     return lanes_total(&sum);
+}
+
+void modal_force(const Modal *modal, const double *UNALIASED u, double *UNALIASED f) {
+    const size_t size = modal->size, ports = modal->ports;
+    size_t k = 0;
+    for (; k + 2 * MODAL_LANES <= size; k += 2 * MODAL_LANES) { /* two at a time: u is read once for them */
+        Lanes sum_0 = {{{0}}}, sum_1 = {{{0}}}, b_k;
+        const double *UNALIASED b = modal->shape + k;
+        for (size_t i = 0; i < ports; i++, b += size) {
+            lanes_read(&b_k, b);
+            lanes_add_scaled(&sum_0, &b_k, u[i]);
+            lanes_read(&b_k, b + MODAL_LANES);
+            lanes_add_scaled(&sum_1, &b_k, u[i]);
+        }
+        lanes_write(f + k, &sum_0);
+        lanes_write(f + k + MODAL_LANES, &sum_1);
+    }
+    if (k < size) {
+        Lanes sum = {{{0}}}, b_k;
+        for (size_t i = 0; i < ports; i++) {
+            lanes_read(&b_k, modal->shape + i * size + k);
+            lanes_add_scaled(&sum, &b_k, u[i]);
+        }
+        lanes_write(f + k, &sum);
+    }
 }
 
 double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {

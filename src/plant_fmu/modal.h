@@ -28,9 +28,11 @@
 #define modal_set_mode PREFIXED(modal_set_mode)
 #define modal_prepare PREFIXED(modal_prepare)
 #define modal_advance PREFIXED(modal_advance)
+#define modal_advance_held PREFIXED(modal_advance_held)
 #define modal_advance_at PREFIXED(modal_advance_at)
 #define modal_forecast PREFIXED(modal_forecast)
 #define modal_foretold PREFIXED(modal_foretold)
+#define modal_force PREFIXED(modal_force)
 #define modal_sum PREFIXED(modal_sum)
 #define modal_sums PREFIXED(modal_sums)
 #define modal_acceleration PREFIXED(modal_acceleration)
@@ -78,14 +80,20 @@ void modal_prepare(Modal *modal, double h);
 void modal_advance(const Modal *modal, size_t inputs, const double *u, const double *du, const double *q,
                    const double *v, double *q_end, double *v_end);
 
-/* The same with the inputs at any ports: shapes[inputs] of these, modal->shape + port * modal->size. */
+/* The same with modal forces held[size] besides, which stay over the step. */
+void modal_advance_held(const Modal *modal, size_t inputs, const double *u, const double *du, const double *held,
+                        const double *q, const double *v, double *q_end, double *v_end);
+
+/* The same with the inputs at any ports: shapes[inputs] of these, modal->shape + port * modal->size; held: modal forces
+ * besides, or NULL. */
 void modal_advance_at(const Modal *modal, size_t inputs, const double *const *shapes, const double *u, const double *du,
-                      const double *q, const double *v, double *q_end, double *v_end);
+                      const double *held, const double *q, const double *v, double *q_end, double *v_end);
 
 /* What a port shows at the end of a step, its displacement or its speed, without the step itself:
  *   y+ = sum over modes of (by_q q + by_v v) + sum over ports of (held u + ramp du) */
 typedef struct Forecast {
     double *q, *v;       /* by_q, by_v [size] */
+    double *f;           /* by modal forces that are held [size] */
     double *held, *ramp; /* [ports] */
 } Forecast;
 
@@ -94,6 +102,9 @@ void modal_forecast(const Modal *modal, size_t port, bool speed, Forecast *forec
 
 /* The sum over modes of it. */
 double modal_foretold(const Forecast *forecast, size_t size, const double *q, const double *v);
+
+/* Modal forces f[size] of forces u[ports] at all ports. */
+void modal_force(const Modal *modal, const double *u, double *f);
 
 /* Displacement at a port from q; with v in place of q the speed there. */
 double modal_sum(const Modal *modal, size_t port, const double *q);

@@ -17,6 +17,9 @@
  * M_a motor torque, M_fr friction torque, M_0 constant load [N.m]; F_a force on the slide, F_d on the tool [N]; omega_k
  * = 2 pi frequency; n_kA, x_kA, tcp_kd: mode shapes at the ports, columns of the mode table (modes.h).
  *
+ * With mounts (mount.h) that are not linear, f_k gets -b_kp (F_p(x_p) - K_p x_p) per direction p of each besides,
+ * x_p = sum over k of b_kp q_k, K_p the spring that the modes hold.
+ *
  * With poses (poses.h) these are the modes of the cell that the axes stand in. At the end of a step that takes an axis
  * out of its cell, q and v are carried over into the next one, x_a unchanged; what is reported then belongs to the new
  * cell, so that outputs, their derivatives and the start of the next step are those of one state.
@@ -35,7 +38,8 @@
 #include "plant.h"
 
 static size_t plant_state_size(const Unit *unit) {
-    return sizeof(StateHead) + 2 * plant_state_doubles(unit_derived(unit)) * sizeof(double);
+    const Plant *plant = unit_derived(unit);
+    return sizeof(StateHead) + 2 * (plant_state_doubles(plant) + plant_mounts_doubles(plant)) * sizeof(double);
 }
 
 /* --- start and step */
@@ -77,6 +81,7 @@ static void plant_start(Unit *unit) {
     plant_show_tool(unit, plant, plant->y);
     shown->pose_cell = (int)head->cell;
     shown->pose_crossings = 0;
+    shown->mounts_E = shown->mounts_x_max = 0;
     shown->pose_E_kin_lost = shown->pose_E_el_lost = 0;
     shown->pose_held = shown->pose_jump_x_a = shown->pose_jump_n_a = shown->pose_jump_tool = 0;
 }
@@ -131,30 +136,41 @@ static bool plant_step(Unit *unit, double t, double h) {
     const uint64_t place = 1 - plant_head(unit)->place;
     double *state = plant_state(unit), *end = plant_state_at(unit, plant, place);
     double *q_end = end + ports, *v_end = q_end + size;
-    const bool joined = plant->guided || plant->driven;
+    const bool joined = plant->guided || plant->driven, mounted = plant->mounts.on;
     plant_gather(unit, h, plant->u, plant->du);
     modal_prepare(modal, h);
     const double *u = plant->u, *du = plant->du;
     size_t acting = 0;
+    if (mounted && !plant_pace_mounts(unit, plant, h)) {
+        return false;
+    }
     if (joined && !plant_join(unit, plant, modal, state, end, h, &acting)) {
         return false;
     }
     for (size_t i = 0; i < ports; i++) {
         end[i] = u[i] + du[i];
     }
+    const double *held = mounted ? plant_mounts_held(unit, plant, plant_mounts_block(plant, state)) : NULL;
+    const double *q = state + ports, *v = q + size;
     if (plant->guided) {
-        modal_advance_at(modal, acting, plant->shapes, plant->u_acting, plant->du_acting, state + ports,
-                         state + ports + size, q_end, v_end);
+        modal_advance_at(modal, acting, plant->shapes, plant->u_acting, plant->du_acting, held, q, v, q_end, v_end);
     } else {
         size_t active = plant->axes; /* mostly, no force is on tool and slides: nothing to add then */
         for (size_t i = active; i < ports; i++) {
             active = u[i] != 0 || du[i] != 0 ? i + 1 : active;
         }
-        modal_advance(modal, active, u, du, state + ports, state + ports + size, q_end, v_end);
+        if (mounted) {
+            modal_advance_held(modal, active, u, du, held, q, v, q_end, v_end);
+        } else {
+            modal_advance(modal, active, u, du, q, v, q_end, v_end);
+        }
     }
     if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
+    }
+    if (mounted && !plant_follow_mounts(unit, plant, state, end, h)) {
+        return unit_fail(unit, "the force of a mount would be no finite number at the end of the step");
     }
     if (plant->errors) {
         double *ways = plant_ways(plant, end);
@@ -171,6 +187,9 @@ static bool plant_step(Unit *unit, double t, double h) {
     if (joined) {
         plant_show_guides(unit, plant, end);
         plant_show_transmissions(unit, plant, end);
+    }
+    if (mounted) {
+        plant_show_mounts(unit, plant, end);
     }
     if (plant->errors) {
         plant_show_play(unit, plant, plant_ways(plant, end));
@@ -192,6 +211,11 @@ static void plant_show_late(Unit *unit) {
 }
 
 /* --- derivatives */
+
+static double plant_mounts_acceleration(Unit *unit, const Plant *plant, const Modal *modal, size_t axis) {
+    const int block = plant->mounts.on ? plant_mounts_block(plant, plant_state(unit)) : 0;
+    return plant->mounts.on ? modal_sum(modal, axis, plant_mounts_held(unit, plant, block)) : 0;
+}
 
 static double plant_output_derivative(Unit *unit, unsigned vr) {
     const Plant *plant = unit_derived(unit);
@@ -222,7 +246,7 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
             const TransmissionState *motor = &plant_transmissions(plant, plant_state(unit))[axis];
             return (motor->u - motor->C) / plant->transmissions[axis].J;
         }
-        return modal_acceleration(modal, axis, ports, u, q, v);
+        return modal_acceleration(modal, axis, ports, u, q, v) + plant_mounts_acceleration(unit, plant, modal, axis);
     case AXIS_VR_guide_F_fr:
         return plant_guides(plant, plant_state(unit))[axis].slope;
     case AXIS_VR_x_a:

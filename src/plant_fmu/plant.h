@@ -10,6 +10,7 @@
 #include "guide.h"
 #include "modal.h"
 #include "modes.h"
+#include "mount.h"
 #include "poses.h"
 #include "transmission.h"
 #include "unit.h"
@@ -35,7 +36,48 @@
 #define plant_show_guides PREFIXED(plant_show_guides)
 #define plant_show_transmissions PREFIXED(plant_show_transmissions)
 
+#define plant_read_mounts PREFIXED(plant_read_mounts)
+#define plant_free_mounts PREFIXED(plant_free_mounts)
+#define plant_derive_mounts PREFIXED(plant_derive_mounts)
+#define plant_pace_mounts PREFIXED(plant_pace_mounts)
+#define plant_follow_mounts PREFIXED(plant_follow_mounts)
+#define plant_show_mounts PREFIXED(plant_show_mounts)
+
 #define NO_AXIS ((size_t)-1)
+
+/* Levelling mounts that are not linear, a port per direction of each; forces beyond the linear springs that the modes
+ * hold. They are looked at every few steps and held between, at their mean over that time as the forces at the last
+ * looks foretell it. */
+typedef struct Mounts {
+    size_t ports;              /* 0: the archive has none */
+    double *rows;              /* [ports][MOUNT_SHAPE + archive_modes] of its table */
+    bool on;                   /* one of them is other than the linear spring; what follows then counts */
+    Mount *own;                /* [ports] with the factors */
+    Modal at;                  /* their ports: shapes alone */
+    double *memory, *x, *held; /* of the shapes; [ports]; [ports] */
+    double h;                  /* step that what follows belongs to, 0: none */
+    size_t every;              /* steps from one look to the next, 0: no pace is stable */
+} Mounts;
+
+/* A row of the table of mounts: the spring of the modes, the element, the modes' shapes there. */
+enum { MOUNT_K_LIN, MOUNT_K_E, MOUNT_F_MAX, MOUNT_X_2, MOUNT_K_V, MOUNT_C, MOUNT_SHAPE, MOUNT_LOOKS = 4 };
+
+/* A port of the mounts in a state, all numbers. */
+typedef struct MountPort {
+    MountState mount;
+    double x_before;               /* at the look before the last [m] */
+    double force[MOUNT_LOOKS - 1]; /* beyond the linear spring at the last looks, the latest first [N] */
+    double held;                   /* until the next one [N] */
+} MountPort;
+
+/* Their common part of a state, all numbers. */
+typedef struct MountsHead {
+    double time[MOUNT_LOOKS - 1]; /* since the last look, and between those before [s] */
+    double left;                  /* steps until the next */
+    double h;                     /* those steps [s] */
+    double block;                 /* that counts, 0 or 1 */
+    double E, x_max;
+} MountsHead;
 
 /* Derived data. Ports of the modal systems: the axes' n, the tool's directions, the axes' x. A torque or force acts at
  * each. */
@@ -70,6 +112,8 @@ typedef struct Plant {
     bool driven; /* a motor with a transmission */
     Transmission *transmissions;
 
+    Mounts mounts;
+
     /* What follows counts where there is a guide or a transmission. */
     Forecast *forecasts;                  /* [PORTS_SHOWN][axes], for */
     const Modal *foretold;                /* this modal system */
@@ -86,8 +130,9 @@ typedef struct Plant {
 
 /* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
  * with play or geometry, ways of the slides since the start, what play takes off or adds, and the wind-up of the
- * hysteresis [axes] each, and a GuideState and a TransmissionState per axis: a step leaves its result in the other one,
- * which counts once it is known to be sound. */
+ * hysteresis [axes] each, a GuideState and a TransmissionState per axis, and of mounts a MountsHead: a step leaves its
+ * result in the other one, which counts once it is known to be sound. Behind both, of mounts two blocks of modal forces
+ * that are held [size] and a MountPort per port: a look leaves its result in the one that its start does not name. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
@@ -99,7 +144,9 @@ typedef enum PortShown { SLIDE_SPEED, MOTOR_SPEED, MOTOR_ANGLE, PORTS_SHOWN } Po
 
 enum {
     GUIDE_DOUBLES = sizeof(GuideState) / sizeof(double),
-    TRANSMISSION_DOUBLES = sizeof(TransmissionState) / sizeof(double)
+    TRANSMISSION_DOUBLES = sizeof(TransmissionState) / sizeof(double),
+    MOUNT_PORT_DOUBLES = sizeof(MountPort) / sizeof(double),
+    MOUNTS_HEAD_DOUBLES = sizeof(MountsHead) / sizeof(double)
 };
 
 /* The first of the ports at the slides. */
@@ -112,7 +159,13 @@ static inline size_t plant_ports(const Plant *plant) {
 }
 
 static inline size_t plant_state_doubles(const Plant *plant) {
-    return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES + TRANSMISSION_DOUBLES) * plant->axes;
+    const size_t mounts = plant->mounts.ports > 0 ? MOUNTS_HEAD_DOUBLES : 0;
+    return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES + TRANSMISSION_DOUBLES) * plant->axes + mounts;
+}
+
+/* Of a block of the mounts. */
+static inline size_t plant_mounts_doubles(const Plant *plant) {
+    return plant->mounts.ports > 0 ? plant->size + MOUNT_PORT_DOUBLES * plant->mounts.ports : 0;
 }
 
 static inline StateHead *plant_head(Unit *unit) {
@@ -138,6 +191,19 @@ static inline GuideState *plant_guides(const Plant *plant, double *state) {
 
 static inline TransmissionState *plant_transmissions(const Plant *plant, double *state) {
     return (TransmissionState *)(void *)(plant_guides(plant, state) + plant->axes);
+}
+
+static inline MountsHead *plant_mounts_head(const Plant *plant, double *state) {
+    return (MountsHead *)(void *)(plant_transmissions(plant, state) + plant->axes);
+}
+
+/* Modal forces that the mounts are held at, in a block; their ports follow. */
+static inline double *plant_mounts_held(Unit *unit, const Plant *plant, int block) {
+    return plant_state_at(unit, plant, 2) + (block > 0 ? plant_mounts_doubles(plant) : 0);
+}
+
+static inline int plant_mounts_block(const Plant *plant, double *state) {
+    return plant_mounts_head(plant, state)->block > 0;
 }
 
 /* --- load.c: the archive */
@@ -178,5 +244,16 @@ bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, dou
 void plant_follow_joints(Unit *unit, const Plant *plant, const Modal *modal, double *end);
 void plant_show_guides(Unit *unit, const Plant *plant, double *state);
 void plant_show_transmissions(Unit *unit, const Plant *plant, double *state);
+
+/* --- mounts.c: levelling mounts that are not linear */
+/* The archive's table of them, after its modes; false with the fault logged. */
+bool plant_read_mounts(Unit *unit, Plant *plant, const char *text, size_t size, const char *source);
+void plant_free_mounts(Unit *unit, Plant *plant);
+bool plant_derive_mounts(Unit *unit, Plant *plant);
+/* Ahead of a step of h: how often they are looked at. False with the reason logged where no pace is stable. */
+bool plant_pace_mounts(Unit *unit, Plant *plant, double h);
+/* Behind it, with q in `end`: them, where it is time to look at them. False where a force is no finite number. */
+bool plant_follow_mounts(Unit *unit, Plant *plant, double *state, double *end, double h);
+void plant_show_mounts(Unit *unit, const Plant *plant, double *state);
 
 #endif

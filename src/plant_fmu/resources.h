@@ -1,6 +1,6 @@
-/* The machine data of the archive: axes.csv, modes.csv and, where there is one, poses.bin from the resources directory;
- * or, where the importer gave none, axes.csv and modes.csv from the copy compiled into the unit. Checked against the
- * hash in the instantiation GUID. */
+/* The machine data of the archive: axes.csv, modes.csv and, where there are, poses.bin and mounts.csv from the
+ * resources directory; or, where the importer gave none, axes.csv and modes.csv from the copy compiled into the unit.
+ * Checked against the hash in the instantiation GUID. */
 #ifndef FEEDSIM_RESOURCES_H
 #define FEEDSIM_RESOURCES_H
 
@@ -10,9 +10,10 @@
 #define resources_free PREFIXED(resources_free)
 
 typedef struct Resources {
-    const char *source;         /* how messages begin their names */
-    char *axes, *modes, *poses; /* bytes of the files, each closed by a zero that the size does not count */
-    size_t axes_size, modes_size, poses_size; /* poses NULL: the machine has one pose */
+    const char *source;                  /* how messages begin their names */
+    char *axes, *modes, *poses, *mounts; /* bytes of the files, each closed by a zero that the size does not count */
+    size_t axes_size, modes_size, poses_size, mounts_size; /* poses NULL: the machine has one pose; mounts NULL: none is
+                                                              other than linear */
 } Resources;
 
 /* false, with the reason logged and nothing to free, where a file cannot be read or belongs to another archive. */

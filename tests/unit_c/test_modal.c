@@ -290,7 +290,7 @@ static void forecasts_are_what_steps_do(void) {
     }
     modal_prepare(&modal, h);
     const double *const shapes[] = {modal.shape + (PORTS - 1) * SIZE, modal.shape + SIZE};
-    modal_advance_at(&modal, 2, shapes, u, du, q, v, q_end, v_end);
+    modal_advance_at(&modal, 2, shapes, u, du, NULL, q, v, q_end, v_end);
     double whole[PORTS] = {0}, change[PORTS] = {0}, q_prefix[SIZE], v_prefix[SIZE];
     whole[PORTS - 1] = u[0];
     whole[1] = u[1];
@@ -299,8 +299,8 @@ static void forecasts_are_what_steps_do(void) {
     modal_advance(&modal, PORTS, whole, change, q, v, q_prefix, v_prefix);
     for (size_t port = 0; port < PORTS; port++) {
         for (int speed = 0; speed < 2; speed++) {
-            double by_q[SIZE], by_v[SIZE], held[PORTS], ramp[PORTS];
-            Forecast forecast = {by_q, by_v, held, ramp};
+            double by_q[SIZE], by_v[SIZE], by_f[SIZE], held[PORTS], ramp[PORTS];
+            Forecast forecast = {by_q, by_v, by_f, held, ramp};
             modal_forecast(&modal, port, speed == 1, &forecast);
             double y = modal_foretold(&forecast, modal.size, q, v);
             for (size_t i = 0; i < 2; i++) {
@@ -310,6 +310,24 @@ static void forecasts_are_what_steps_do(void) {
             CHECK_NEAR(y, modal_sum(&modal, port, speed == 1 ? v_prefix : q_prefix), speed == 1 ? 1e-13 : 1e-16);
         }
     }
+    double u_all[PORTS] = {0}, f[SIZE], none[PORTS] = {0}, q_held[SIZE], v_held[SIZE], by[3][SIZE], numbers[2][PORTS];
+    for (size_t port = 0; port < PORTS; port++) {
+        u_all[port] = 100 * pseudo_random();
+    }
+    modal_force(&modal, u_all, f); /* as one, forces at ports are what they are at each */
+    modal_advance(&modal, PORTS, u_all, none, q, v, q_end, v_end);
+    modal_advance_held(&modal, 0, u_all, none, f, q, v, q_held, v_held);
+    modal_advance_at(&modal, 0, shapes, u, du, f, q, v, q_prefix, v_prefix);
+    Forecast forecast = {by[0], by[1], by[2], numbers[0], numbers[1]};
+    modal_forecast(&modal, 1, true, &forecast);
+    double foretold = modal_foretold(&forecast, modal.size, q, v);
+    for (size_t k = 0; k < SIZE; k++) {
+        CHECK_NEAR(q_held[k], q_end[k], 1e-15);
+        CHECK_NEAR(v_held[k], v_end[k], 1e-12);
+        CHECK_EQUAL(v_prefix[k], v_held[k]);
+        foretold += forecast.f[k] * f[k];
+    }
+    CHECK_NEAR(foretold, modal_sum(&modal, 1, v_held), 1e-12);
     for (size_t first = 0; first < PORTS; first++) { /* sums at once are single ones, to the bit */
         double sums[PORTS];
         modal_sums(&modal, first, PORTS - first, q_end, sums);

@@ -37,6 +37,7 @@ SOURCES_test_gms       := $(addprefix src/friction_gms_fmu/,gms.c level.c)
 
 SOURCES_test_geometry := src/plant_fmu/geometry.c
 SOURCES_test_transmission := src/plant_fmu/transmission.c
+SOURCES_test_mount := src/plant_fmu/mount.c
 SOURCES_test_guide := $(addprefix src/plant_fmu/,guide.c guide_law.c)
 SOURCES_test_modal := src/plant_fmu/modal.c
 SOURCES_test_cells := $(addprefix src/plant_fmu/,cells.c modal.c)

@@ -52,7 +52,7 @@ def pack_whole(
     pose = {axis: machine.pose[axis] for axis in machine.axes}
     with packaging(), _poses(machine) as poses:
         given = whole_machine.WholeMachine(
-            plant_tables(machine.modes, pose, poses),
+            plant_tables(machine.modes, pose, poses, machine.mounts_table),
             setpoint_table(program) if program is not None else None,
             {name: whole_machine.spelled(value) for name, value in settings.items()},
         )
@@ -65,7 +65,7 @@ def pack_tables(base: Path, out: Path, machine: Machine) -> None:
 
     pose = {axis: machine.pose[axis] for axis in machine.axes}
     with packaging(), _poses(machine) as poses:
-        given = whole_machine.WholeMachine(plant_tables(machine.modes, pose, poses), None, {})
+        given = whole_machine.WholeMachine(plant_tables(machine.modes, pose, poses, machine.mounts_table), None, {})
         packed(base, out, given, name=machine.name, note=machine.note, trial=False, level=0)
 
 

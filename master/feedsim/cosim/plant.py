@@ -18,7 +18,7 @@ from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import SAME_POSITION
 from feedsim.structure.modes import Modes, checked_modes, with_transmissions
-from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, POSES_IN_ARCHIVE, pack
+from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, MOUNTS_IN_ARCHIVE, POSES_IN_ARCHIVE, pack
 from feedsim.structure.poses_file import read_cell
 
 _START = ".x_0"  # of every axis of a plant
@@ -33,7 +33,8 @@ def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
     place of the archive's; None where the archive's own counts.
 
     A machine that names an archive under `plant` has that. Otherwise plant.fmu in the folder `fmus` serves with the
-    machine's table of modes; where it has other axes than the machine, the machine is packed into it first.
+    machine's table of modes; where it has other axes than the machine, or the machine has mounts that are not linear,
+    the machine is packed into it first.
 
     Raises:
         InputError: no such archive, or it does not fit the machine.
@@ -41,14 +42,14 @@ def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
     if machine.plant is not None:
         return open_own(machine.plant, machine), None
     general = Archive(fmus / "plant.fmu")
-    if set(axes_of(general)) == set(machine.axes):
+    if machine.mounts_table is None and set(axes_of(general)) == set(machine.axes):
         return general, machine.modes
     general.close()
 
     def make(out: Path) -> None:
         pack(
             general.path, out, modes=machine.modes, pose={axis: machine.pose[axis] for axis in machine.axes},
-            name=machine.name, note=machine.note, trial=False, level=0,
+            mounts=machine.mounts_table, name=machine.name, note=machine.note, trial=False, level=0,
         )  # fmt: skip
 
     return packed_for(machine, general.path, make), None
@@ -70,7 +71,7 @@ def packed_for(machine: Machine, general: Path, make: Callable[[Path], None]) ->
 
     `make` need not try it, which is instantiated next anyway, nor compress it: it is unpacked at once.
     """
-    files = (general, machine.modes, *([machine.plant] if machine.plant is not None else []))
+    files = (general, *(file for file in (machine.modes, machine.plant, machine.mounts_table) if file is not None))
     try:
         contents = tuple(map(STORE.digest, files))
     except OSError as error:
@@ -116,6 +117,20 @@ def _check_own(archive: Archive, machine: Machine) -> None:
         outside = machine.modes.read_bytes()
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
+    mounts = archive.directory / MOUNTS_IN_ARCHIVE
+    if machine.mounts_table is None and mounts.is_file():
+        raise InputError(
+            f"{archive.path}: it holds mounts that are not linear; the machine file names no table of them (mounts)"
+        )
+    if machine.mounts_table is not None:
+        try:
+            same_mounts = mounts.is_file() and mounts.read_bytes() == machine.mounts_table.read_bytes()
+        except OSError as error:
+            raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
+        if not same_mounts:
+            raise InputError(
+                f"{archive.path}: its table of mounts is not the machine's, {machine.mounts_table}; {pack_anew}"
+            )
     if inside != outside:
         packed = _packed_pose(archive)
         if any(abs(packed.get(axis, position) - position) > SAME_POSITION for axis, position in machine.pose.items()):
@@ -135,16 +150,16 @@ def _check_own(archive: Archive, machine: Machine) -> None:
         )
 
 
-def plant_modes(machine: Machine) -> tuple[Modes, list[str]]:
+def plant_modes(machine: Machine, amplitude: float = 0.0) -> tuple[Modes, list[str]]:
     """Modes at the machine's pose, and what a user should know of them, a sentence each.
 
     A plant that follows its axes has at the start the modes of the cell in which the pose lies, which are those of the
-    cell's centre. Any other plant has the machine's table.
+    cell's centre. Any other plant has the machine's table. amplitude: of mounts that are not linear [m]; 0: at rest.
 
     Raises:
         InputError: the table is broken or contradicts the machine file.
     """
-    table = checked_modes(machine)
+    table = checked_modes(machine, amplitude)
     if machine.plant is None:
         return table, []
     try:

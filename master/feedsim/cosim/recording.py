@@ -31,6 +31,7 @@ PLANT_SIGNALS = ("x_a", "n_a")
 MEASURED = "x_m"  # of a drive: of the present inputs
 GUIDE_SIGNAL = "guide.F_fr"  # of axes with friction there
 TRANSMISSION_SIGNALS = ("transmission.F", "transmission.way")  # of axes with one
+MOUNT_SIGNALS = ("mounts.E", "mounts.x_max")  # where some are not linear
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 # Of the coupling, not of a unit: recorded where it is asked for.
 RESIDUAL, RESIDUAL_UNIT = "residual", "J"
@@ -65,9 +66,10 @@ def columns_of(machine: Machine, loaded: Sequence[str] = (), *, residual: bool =
 
 
 def _effects(machine: Machine) -> list[str]:
-    """Columns of the plant that only axes with such an effect have."""
+    """Columns of the plant that only machines with such an effect have."""
     guides = [f"{name}.{GUIDE_SIGNAL}" for name in machine.guided]
-    return guides + [f"{name}.{signal}" for name in machine.transmitted for signal in TRANSMISSION_SIGNALS]
+    transmissions = [f"{name}.{signal}" for name in machine.transmitted for signal in TRANSMISSION_SIGNALS]
+    return [*guides, *transmissions, *(MOUNT_SIGNALS if machine.mounts is not None else ())]
 
 
 def loaded_inputs(scenario: Scenario) -> list[str]:

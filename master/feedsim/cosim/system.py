@@ -96,7 +96,8 @@ class System(Closing):
             type(self) is System
             and tuple(machine.axes) == self.axes
             and machine.plant == own.plant
-            and (machine.plant is None or machine.modes == own.modes)
+            and machine.mounts_table == own.mounts_table
+            and (machine.plant is machine.mounts_table is None or machine.modes == own.modes)
             and all(archive_path(machine, r.axis, r.role, fmus) == r.archive.path for r in self.roles.values())
         )
 
@@ -106,7 +107,7 @@ class System(Closing):
         InputError: a unit refuses a value.
         """
         self.machine = machine
-        if machine.plant is None:
+        if self.plant_modes_file is not None:
             self.plant_modes_file = machine.modes
         self.roles = {name: filled(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
         for unit in self.instances.values():

@@ -34,6 +34,7 @@ from feedsim.structure import pack as archive
 from feedsim.structure.build import build
 from feedsim.structure.geometry.assemble import movable
 from feedsim.structure.modes import read_modes, write_modes
+from feedsim.structure.mounts import MOUNTS_FILE, table_of, write_mounts
 from feedsim.structure.poses import grid_axis, pose_grid
 from feedsim.structure.poses_file import GridAxis, write_poses
 from feedsim.structure.table_check import table_mismatch
@@ -452,10 +453,17 @@ def machine_pack(
         pose = _pose_of(loaded, at)
         with TemporaryFolder() as folder:
             modes = _modes_at(loaded, pose, folder / "modes.csv") if at else loaded.modes
-            checked_modes(loaded.model_copy(update={"modes": modes}))  # what a run would refuse should not be packed
+            # what a run would refuse should not be packed
+            checked_modes(loaded.model_copy(update={"modes": modes} | ({"mounts": None} if at else {})))
             if not at and (doubt := table_mismatch(loaded)) is not None:
                 raise InputError(f"{doubt}, or let the modes be computed: {spelt('at')}")
+            mounts = folder / MOUNTS_FILE if at and loaded.mounts_table is not None else loaded.mounts_table
             grid, follows = None, ""
+            if poses and mounts is not None:
+                raise InputError(
+                    f"{spelt('poses')}: {loaded.name} has mounts that are not linear ({loaded.mounts_table}), which "
+                    "belong to one pose; leave one of the two out"
+                )
             if poses:
                 grid = folder / "poses.bin"
                 follows = f"; {_write_grid(loaded, pose, modes, poses, watch, grid)}"
@@ -465,6 +473,7 @@ def machine_pack(
                 modes=modes,
                 pose=pose,
                 poses=grid,
+                mounts=mounts,
                 name=loaded.name if name is None else name,
                 note=loaded.note if note is None else note,
                 terminals=terminals,
@@ -502,7 +511,8 @@ def _pose_of(machine: Machine, at: Positions) -> dict[str, float]:
 
 
 def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
-    """Table of the machine's modes at `pose` [m], computed from its structure and written to `out`.
+    """Table of the machine's modes at `pose` [m], computed from its structure and written to `out`; that of its mounts
+    beside it, where the machine has some that are not linear.
 
     Raises:
         InputError: the machine has no structure, its kind is known at one pose only, or it is faulty.
@@ -512,7 +522,14 @@ def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
             f"{machine.name}: has no structure to compute modes from at another pose; give it the key structure, or "
             f"leave {spelt('at')} out"
         )
-    write_modes(out, build(load_structure(machine.structure), pose).solution.modes)
+    built = build(load_structure(machine.structure), pose)
+    write_modes(out, built.solution.modes)
+    if machine.mounts is not None:
+        if (mounts := table_of(built.assembly, built.solution.shapes)) is None:
+            raise InputError(
+                f"{machine.structure}: all of its mounts are linear; the machine file names a table of others"
+            )
+        write_mounts(out.with_name(MOUNTS_FILE), mounts)
     return out
 
 

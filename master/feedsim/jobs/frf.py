@@ -153,6 +153,14 @@ def frf(
             many=True,
         ),
     ] = (),
+    mount_amplitude: Annotated[
+        Value | None,
+        Option(
+            "LENGTH",
+            "deflection of the mounts that are not linear, '10 um': the closed form has them as their describing "
+            "function at this amplitude (default: as they are at rest)",
+        ),
+    ] = None,
     full_model: Annotated[
         bool,
         Option(
@@ -256,11 +264,18 @@ def frf(
         tool=tool,
     )
     archives = None if fmus is None else Path(fmus)
-    modes, doubts = plant_modes(machine)
+    deflection = 0.0
+    if mount_amplitude is not None:
+        deflection = quantity("mount_amplitude", mount_amplitude, "m", "10 um", positive=True)
+        if machine.mounts is None:
+            raise InputError(f"{spelt('mount_amplitude')}: the machine has no mounts that are not linear (key mounts)")
+    modes, doubts = plant_modes(machine, deflection)
     frequency = responses.frequencies(machine, modes, plan.band, responses.BAND_RATIO)
     wanted = linear.names(chosen, tool=tool)
     overlays, warnings = _overlays(overlay, wanted)
     warnings += doubts
+    if machine.mounts is not None:
+        warnings.append(mount_words(machine, deflection))
     inputs = [*(file for _, file in loaded.files), *(overlay.file for overlay in overlays)]
     with kept(out, FrfResult.check_place, watch, inputs, texts, force=force):
         watch.progress("closed form", 0, 1)
@@ -327,6 +342,16 @@ def _full_model(machine: Machine, watch: Watch, warnings: list[str]) -> Truncati
         warnings.append(f"no comparison with the full model: {error}")
     watch.progress("full model", 1, 1)
     return result
+
+
+def mount_words(machine: Machine, deflection: float) -> str:
+    """How the closed form has mounts that are not linear: a sentence."""
+    assert machine.mounts is not None
+    how = (
+        f"at {1e6 * deflection:.4g} um of deflection (describing function)" if deflection
+        else f"as they are at rest; {spelt('mount_amplitude')} has them at a deflection"
+    )  # fmt: skip
+    return f"closed form and margins have the mounts of {machine.mounts.table.name}, which are not linear, {how}"
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine) -> tuple[str, ...]:

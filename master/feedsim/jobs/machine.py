@@ -40,7 +40,8 @@ from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.build import build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
-from feedsim.structure.modes import Modes, checked_modes, read_modes, write_modes
+from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
+from feedsim.structure.mounts import MOUNTS_FILE, MountTable, table_of, write_mounts
 from feedsim.structure.table_check import stale
 
 # Exchange step where no machine file says what the control cycle is [s].
@@ -177,32 +178,46 @@ class BuildResult(MachineResult):
         ]
 
     def files(self) -> Mapping[str, Content]:
-        """The table of modes, and the record of its origin."""
-        return {TABLE_FILE: lambda path: write_modes(path, self.info.modes), BUILD_FILE: to_json(self.record())}
+        """The table of modes, that of mounts that are not linear, and the record of their origin."""
+        modes: Content = lambda path: write_modes(path, self.info.modes)  # noqa: E731
+        mounts: dict[str, Content] = {}
+        if (table := self.mounts) is not None:
+            mounts[MOUNTS_FILE] = lambda path: write_mounts(path, table)
+        return {TABLE_FILE: modes, **mounts, BUILD_FILE: to_json(self.record())}
+
+    @property
+    def mounts(self) -> MountTable | None:
+        """The mounts that are not linear; None where all are."""
+        built = self.info.built
+        return table_of(built.assembly, built.solution.shapes) if built is not None else None
 
     @classmethod
     def check_place(cls, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """As :meth:`Result.check_place`."""
-        check_place(folder, (TABLE_FILE, BUILD_FILE), inputs, kind=cls.kind, own=_of_build(folder))
+        check_place(folder, (TABLE_FILE, MOUNTS_FILE, BUILD_FILE), inputs, kind=cls.kind, own=_of_build(folder))
 
     def save(
         self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
     ) -> tuple[Path, ...]:
-        """Write modes.csv and build.json, without report and pictures. Whole or not at all. Raises OutputError."""
-        place = Path(folder)
+        """Write modes.csv, mounts.csv where there are mounts that are not linear, and build.json, without report and
+        pictures. Whole or not at all. Raises OutputError."""
+        place, mounts = Path(folder), self.mounts
 
         def fill(fresh: Path, names: Sequence[str]) -> None:
             write_modes(fresh / TABLE_FILE, self.info.modes)
+            if mounts is not None:
+                write_mounts(fresh / MOUNTS_FILE, mounts)
             write_text(fresh / BUILD_FILE, to_json(self.record()))
 
+        names = (TABLE_FILE, *((MOUNTS_FILE,) if mounts is not None else ()), BUILD_FILE)
         with replacing(force or forced()):
             self.check_writable(place, self.inputs)
-            return write_results(place, (TABLE_FILE, BUILD_FILE), (), fill, kind=self.kind, own=_of_build(place))
+            return write_results(place, names, (), fill, kind=self.kind, own=_of_build(place))
 
 
 def _of_build(folder: Path) -> Sequence[str]:
     """Files of an earlier build, which has no summary that lists them."""
-    return (TABLE_FILE, BUILD_FILE) if begins_with(b'"format"')(folder / BUILD_FILE) else ()
+    return (TABLE_FILE, MOUNTS_FILE, BUILD_FILE) if begins_with(b'"format"')(folder / BUILD_FILE) else ()
 
 
 @job("masses, inertias, leads, coupling limits and modes")
@@ -363,6 +378,13 @@ def _info(
     )  # fmt: skip
     as_it_is = pose == dict(described.pose) and limit is None and not static_correction and not fresh
     warnings = _stale(described, built.solution.modes) if as_it_is else []
+    if (mounts := table_of(built.assembly, built.solution.shapes)) is not None:
+        warnings += damped_twice(built.solution.modes, mounts, mounts.element)
+        if loaded is not None and loaded.mounts is None:
+            warnings.append(
+                "the structure has mounts that are not linear; runs take their stiffness alone, until the machine file "
+                f"names their table: mounts: {{table: {MOUNTS_FILE}}}"
+            )
     return info_of_model(described.name, described.note, built, h, friction, warnings)
 
 

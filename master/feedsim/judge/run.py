@@ -20,7 +20,9 @@ from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.nc import Program
 from feedsim.scenario import Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 from feedsim.scenario.coupling import SCHEMES
-from feedsim.structure import Modes, checked_modes
+from feedsim.structure import Modes, checked_modes, read_modes
+from feedsim.structure.modes import damped_twice
+from feedsim.structure.mounts import factored, read_mounts
 from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, warnings
 from feedsim.structure.poses_file import GridAxis
 from feedsim.structure.table_check import table_mismatch
@@ -381,8 +383,17 @@ def _foreseen(
     """What the parameters and the loads alone show a user to doubt, a sentence each."""
     return (
         *control(scenario.machine, loops, program), *exchange_stability(scenario, modes),
-        *unbalanced(scenario, acting), *sizes(scenario.machine, program, acting),
+        *unbalanced(scenario, acting), *sizes(scenario.machine, program, acting), *mounts(scenario.machine),
     )  # fmt: skip
+
+
+def mounts(machine: Machine) -> list[str]:
+    """Damping of mounts that the table of modes has besides."""
+    if machine.mounts is None:
+        return []
+    modes = read_modes(machine.modes, list(machine.axes))
+    table = read_mounts(machine.mounts.table, len(modes.frequency))
+    return damped_twice(modes, table, factored(table, machine.mounts.parameters()))
 
 
 def _limits(run: Run) -> list[str]:

@@ -295,7 +295,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
         *sentences(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
-    own = machine.plant is not None or machine.transmitted  # not the modes that the unit holds
+    own = machine.plant is not None or machine.transmitted or machine.mounts  # not the modes that the unit holds
     tables = {} if not own else {"table": _table(modes, machine), "pose": _table(here, machine)}
     scheme = SCHEMES[coupling.scheme]
     # Judged is all friction of an axis, wherever it acts.

@@ -90,7 +90,7 @@ def chosen(scenario: Scenario, wanted: Sequence[str], *, planned: bool) -> list[
         InputError: a pattern fits none; it lists what there is.
     """
     machine = scenario.machine
-    known = [*(_of_motions(scenario) if planned else []), *_of_axes(machine), *_of_guides(machine)]
+    known = [*(_of_motions(scenario) if planned else []), *_of_axes(machine), *_of_structure(machine)]
     if not wanted:
         moved = {axis for motion in scenario.motions for axis in motion.axes} or set(scenario.machine.axes)
         usual = {
@@ -117,7 +117,9 @@ def fits(knob: Knob, pattern: str) -> bool:
 def _is_on(knob: Knob) -> bool:
     """Whether a knob is an effect that the machine has: its value is not that of a machine without."""
     parts = knob.key.split(".")
-    effect = any(part in (*EFFECTS, "geometry", "hysteresis", "guide", "transmission", "play") for part in parts)
+    effect = any(
+        part in (*EFFECTS, "geometry", "mounts", "hysteresis", "guide", "transmission", "play") for part in parts
+    )
     return effect and knob.value != knob.without and (knob.choices != () or parts[-1] not in SETTINGS)
 
 
@@ -180,12 +182,18 @@ def _effects() -> dict[str, Any]:
     return {name: row.start for name, row in table.items() if name.partition(".")[0] in EFFECTS}
 
 
-def _of_guides(machine: Machine) -> list[Knob]:
-    given = machine.geometry.parameters() if machine.geometry is not None else {}
+def _of_structure(machine: Machine) -> list[Knob]:
+    """Geometry of the guides, and factors of mounts that are not linear where there are any."""
+    given = {name: float(row.start) for name, row in variables.parameters("plant").items()
+             if name.startswith("geometry.")}  # fmt: skip
+    given |= {
+        name: float(value) for name, value in machine.errors.items() if name in given or name.startswith("mounts.")
+    }
     table = variables.parameters("plant")
     return [
-        _number(f"machine.{name}", "guides", name, float(given.get(name.partition(".")[2], 0.0)), row, ((name, 1.0),))
-        for name, row in table.items() if name.startswith("geometry.")
+        _number(f"machine.{name}", "mounts" if name.startswith("mounts.") else "guides", name, value, table[name],
+                ((name, 1.0),))
+        for name, value in given.items()
     ]  # fmt: skip
 
 

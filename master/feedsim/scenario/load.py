@@ -207,6 +207,8 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
         name, kind, notes, settings = scenario.name, "scenario", [machine.note, scenario.note], scenario.settings
     kept = tuple(note for note in notes if note)
     files = (*files, ("modes", machine.modes))
+    if machine.mounts is not None:
+        files = (*files, ("mounts", machine.mounts.table))
     return Subject(machine, kind, name, file, kept, settings, tuple(changes.spread(overrides)), files, scenario)
 
 

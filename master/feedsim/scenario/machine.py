@@ -190,8 +190,20 @@ class PathLimits(Model):
 
 if TYPE_CHECKING:
     Geometry = ParameterGroup
+    MountFactors = ParameterGroup
 else:
     Geometry = group("plant", "geometry", "Errors of the guides at the tool, zero where the axes start")
+    MountFactors = group("plant", "mounts", "Factors on all mounts that are not linear")
+
+
+class Mounts(MountFactors):
+    """Levelling mounts that are not linear: their table, and factors on all of them."""
+
+    table: File = Field(description="Table of these mounts (CSV, feedsim machine build writes it)")
+
+    def parameters(self) -> dict[str, Parameter]:
+        """The factors, as :meth:`ParameterGroup.parameters`."""
+        return {name: value for name, value in super().parameters().items() if name != "table"}
 
 
 class Machine(Model):
@@ -232,6 +244,9 @@ class Machine(Model):
     )
 
     geometry: Geometry | None = Field(default=None, description="Errors of the guides at the tool")
+    mounts: Mounts | None = Field(
+        default=None, description="Levelling mounts that are not linear; none: the springs of the modes"
+    )
 
     _directory: Path = PrivateAttr(default=Path())
     _files: tuple[tuple[str, Path], ...] = PrivateAttr(default=())
@@ -263,7 +278,8 @@ class Machine(Model):
 
     @property
     def errors(self) -> dict[str, Parameter]:
-        """Parameters of the plant for play, hysteresis, transmissions, friction at the guides and geometry, if any."""
+        """Parameters of the plant for play, hysteresis, transmissions, friction at the guides, geometry and mounts, as
+        far as there are any."""
         play: dict[str, Parameter] = {f"{name}.play": axis.play for name, axis in self.axes.items() if axis.play}
         for name, axis in self.axes.items():
             wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
@@ -272,7 +288,17 @@ class Machine(Model):
             play |= {f"{name}.transmission.{key}": value for key, value in joined.items()}
             play |= {f"{name}.guide.{key}": value for key, value in axis.friction_at_guide.items()}
         geometry = self.geometry.parameters() if self.geometry is not None else {}
-        return play | {f"geometry.{name}": value for name, value in geometry.items()}
+        mounts = self.mounts.parameters() if self.mounts is not None else {}
+        return (
+            play
+            | {f"geometry.{name}": value for name, value in geometry.items()}
+            | {f"mounts.{name}": value for name, value in mounts.items()}
+        )
+
+    @property
+    def mounts_table(self) -> Path | None:
+        """Table of the mounts that are not linear; None where all are springs."""
+        return self.mounts.table if self.mounts is not None else None
 
     def shipped_drive(self, axis: str, who: str) -> Drive:
         """The parameters of an axis's drive, which `who` needs. InputError: it is another maker's unit."""

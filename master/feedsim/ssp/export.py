@@ -110,8 +110,8 @@ def _archives(
     else:
         pose = {axis: machine.pose[axis] for axis in machine.axes}
         pack(
-            plant, folder / "plant.fmu", modes=machine.modes, pose=pose, name=machine.name, note=machine.note,
-            trial=False,
+            plant, folder / "plant.fmu", modes=machine.modes, pose=pose, mounts=machine.mounts_table,
+            name=machine.name, note=machine.note, trial=False,
         )  # fmt: skip
     pack_setpoints(setpoint, folder / "setpoint.fmu", program, name=scenario.name, note=scenario.note)
     for path, name in sources.items():

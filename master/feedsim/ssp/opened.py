@@ -30,7 +30,7 @@ from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
 from feedsim.ssp.system_structure import Structure
 from feedsim.ssp.values import values
 from feedsim.structure.assembly import SAME_POSITION
-from feedsim.structure.pack import MODES_IN_ARCHIVE
+from feedsim.structure.pack import MODES_IN_ARCHIVE, MOUNTS_IN_ARCHIVE
 
 WHOLE_CYCLE_TOLERANCE = 1e-6  # of a position cycle: a stop time this little behind an instant of the grid lies on it
 
@@ -169,6 +169,10 @@ def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str,
             raise InputError(f"{path}: {component}: its archive has no {place}")
         with readable(f"{path}: {component}: {place} cannot be unpacked"):
             shutil.copyfile(source, folder / name)
+    mounts = parts.archives[roles.plant].directory / MOUNTS_IN_ARCHIVE
+    if mounts.is_file():
+        with readable(f"{path}: {roles.plant}: {MOUNTS_IN_ARCHIVE} cannot be unpacked"):
+            shutil.copyfile(mounts, folder / rebuilt.MOUNTS_RESOURCE)
     needed = rebuilt.named_files(own)
     if own is not None and own["machine"].get("structure") == STRUCTURE:
         needed.append(STRUCTURE)

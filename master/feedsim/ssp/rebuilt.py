@@ -29,6 +29,7 @@ from feedsim.ssp.parameter_set import Value, number
 from feedsim.ssp.roles import Roles
 from feedsim.ssp.setpoints import Table
 from feedsim.ssp.values import start_value
+from feedsim.structure.pack import MOUNTS_IN_ARCHIVE
 
 # --- What the units cannot know of a scenario: motions, evaluation, limits, names; as the text that travels in an SSP -
 # It has the keys of a scenario file, every quantity with its unit. What a unit has a parameter for is left out: there
@@ -126,7 +127,7 @@ def _notes(annotation: Any) -> list[Quantity]:
 
 
 FILTER_NAMES = {number: name for name, number in reversed(FILTER_TYPES.items())}
-MODES_RESOURCE, SETPOINTS_RESOURCE = "modes.csv", "setpoints.csv"  # beside the scenario's data
+MODES_RESOURCE, SETPOINTS_RESOURCE, MOUNTS_RESOURCE = "modes.csv", "setpoints.csv", "mounts.csv"  # beside the data
 # What the annotation may show at its top.
 OWN_KEYS = ("name", "note", "machine", "motions", "coupling", "recording", "logging", "evaluate")
 MAX_ANNOTATION_DEPTH = 50  # levels of the annotation; a scenario has some 10
@@ -323,6 +324,8 @@ def scenario_data(
     geometry = _group(parts, roles.plant).get("geometry", {}) if roles.plant in parts.archives else {}
     if any(plant[f"geometry.{name}"] for name in geometry):
         machine["geometry"] = {name: value for name, value in geometry.items() if plant[f"geometry.{name}"]}
+    if (parts.archives[roles.plant].directory / MOUNTS_IN_ARCHIVE).is_file():
+        machine["mounts"] = {"table": MOUNTS_RESOURCE, **_group(parts, roles.plant).get("mounts", {})}
     if reported.get("structure") == STRUCTURE:
         machine["structure"] = STRUCTURE
     if parts.coupling is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,18 @@ class Geometry:
     lines: Integers
 
 
+class MountPort(NamedTuple):
+    """A direction of a mount that is not linear.
+
+    name: "bed.B0.4 X". element: K_lin [N/m], K_e [N/m], F_max [N], x_2 [m], K_v [N/m], c [N.s/m]. port: (N,) vector b,
+    whose b^T u is its deflection.
+    """
+
+    name: str
+    element: tuple[float, ...]
+    port: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """M u'' + K u = sum over the ports of b F;  the displacement at a port is b^T u.
@@ -59,6 +71,7 @@ class Assembly:
         geometry: None where only matrices are known.
         pose: axis -> position [m]; empty where it is not known.
         units: that the file gives its numbers in; None of a structure without such a choice.
+        mounts: directions of mounts that are not linear.
     """
 
     name: str
@@ -70,6 +83,7 @@ class Assembly:
     geometry: Geometry | None
     pose: Mapping[str, float]
     units: UnitSystem | None = SI
+    mounts: tuple[MountPort, ...] = ()
 
 
 def translating_mass(assembly: Assembly) -> Floats:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import Floats
+from feedsim.structure.mounts import MountTable, factored, friction_cycle, read_mounts, viscous_cycle
 from feedsim.trace.files import written_whole
 from feedsim.trace.layout import named_columns, twice
 
@@ -29,6 +30,15 @@ TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")
 LEAD_TOLERANCE = 1e-3
 MOST_INERTIA = 0.95  # of J_inf, on the motor's side of a transmission; as the unit plant has it
 MOST_PROBLEMS = 20
+# A spring in the modes is the mounts' stiffness at rest where it agrees to this share: then the modes stay as they are.
+SAME_STIFFNESS = 1e-9
+# A mode lives in the mounts where so much of its strain energy is theirs.
+MOSTLY = 0.5
+# Frames without their mounts have 1 to 3 %: what a table has beyond it is meant for mounts.
+FRAME_DAMPING = 0.03
+# Of a mode's damping in the table: what the mounts bring at their best that is worth a warning.
+NOTICED = 0.25
+AMPLITUDES = np.logspace(-1, 1, 21)  # of x_2, among which friction damps most
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,9 +235,74 @@ def joined(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) 
     return Modes(modes.file, result / (2 * np.pi), damping, ports)
 
 
-def checked_modes(machine: Machine) -> Modes:
+def with_mounts(modes: Modes, table: MountTable, element: Floats, amplitude: float = 0.0) -> Modes:
+    """Modes with the mounts as linear springs and dampers: their tangent at rest, or the describing function of a
+    steady cycle with this amplitude [m] at every mount; `modes` itself where the modes hold that already.
+
+    The viscous part is stiffness and loss at each mode's own frequency. Damping couples modes; its diagonal is kept.
+
+    Raises:
+        InputError: the mounts would not hold the machine.
+    """
+    K_lin, K_e, F_max, x_2, K_v, c = element.T
+    stiff, loss = friction_cycle(F_max, x_2, np.full(len(K_lin), float(amplitude)))
+    added = K_e + stiff - K_lin
+    viscous = bool(np.any((K_v > 0) & (c > 0)))
+    if not viscous and not loss.any() and np.all(np.abs(added) <= SAME_STIFFNESS * K_lin):
+        return modes
+    elastic = np.flatnonzero(~modes.rigid)
+    omega = 2 * np.pi * modes.frequency[elastic]
+    b = table.shapes[:, elastic]
+    squares, V = np.linalg.eigh(np.diag(omega**2) + b.T @ (added[:, None] * b))
+    if squares.size and squares[0] <= 0:
+        raise InputError(f"{modes.file}: with these mounts nothing holds the machine: more K_e")
+    new = np.sqrt(squares)
+    drag = np.einsum("im,i,im->m", V, 2 * modes.damping[elastic] * omega, V)
+    b = b @ V
+    for m, w in enumerate(new.tolist()):
+        K, D = viscous_cycle(K_v, c, w)
+        new[m] = math.sqrt(w**2 + float(K @ b[:, m] ** 2))
+        drag[m] += float((loss + D) @ b[:, m] ** 2) / w
+    frequency, damping = modes.frequency.copy(), modes.damping.copy()
+    order = np.argsort(new, kind="stable")
+    frequency[elastic], damping[elastic] = new[order] / (2 * np.pi), (drag / (2 * new))[order]
+    ports = {name: shape.copy() for name, shape in modes.ports.items()}
+    for name, shape in ports.items():
+        shape[elastic] = (modes.ports[name][elastic] @ V)[order]
+    return Modes(modes.file, frequency, damping, ports)
+
+
+def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[str]:
+    """Modes on the mounts whose damping in the table is more than a frame's, where the mounts bring theirs besides."""
+    K_lin, _, F_max, x_2, K_v, c = element.T
+    reported = []
+    for k in np.flatnonzero(~modes.rigid).tolist():
+        omega, squares = 2 * np.pi * modes.frequency[k], table.shapes[:, k] ** 2
+        if K_lin @ squares < MOSTLY * omega**2 or modes.damping[k] <= FRAME_DAMPING:
+            continue
+        deflection = np.sqrt(squares / squares.max())
+        typical = float(np.min(x_2[F_max > 0], initial=1.0))
+        bring = max(
+            float((friction_cycle(F_max, x_2, a * typical * deflection)[1] + viscous_cycle(K_v, c, omega)[1]) @ squares)
+            for a in AMPLITUDES.tolist()
+        ) / (2 * omega**2)
+        if bring > NOTICED * modes.damping[k]:
+            reported.append(
+                f"{modes.frequency[k]:.4g} Hz ({100 * modes.damping[k]:.3g} % and up to {100 * bring:.2g} %)"
+            )
+    if not reported:
+        return []
+    return [
+        f"damping counts twice: the table of modes damps modes on the mounts, and the mounts that are not linear damp "
+        f"them besides: {', '.join(reported)}. Give these modes the damping of the frame alone (damping.steps of the "
+        "structure file)"
+    ]
+
+
+def checked_modes(machine: Machine, amplitude: float = 0.0) -> Modes:
     """The machine's mode table, consistent with its axes: one rigid mode per axis, leads that agree with the pitches.
-    Transmissions of the machine are part of it, their contacts closed.
+    Transmissions of the machine are part of it, their contacts closed, and mounts that are not linear, as they are at
+    rest or at an amplitude [m].
 
     Raises:
         InputError: the table is broken or contradicts the machine file.
@@ -243,6 +318,15 @@ def checked_modes(machine: Machine) -> Modes:
             )
     if problems:
         raise InputError.of(f"{machine.modes}: the modes contradict the machine", problems)
+    return linear_modes(machine, modes, amplitude)
+
+
+def linear_modes(machine: Machine, modes: Modes, amplitude: float = 0.0) -> Modes:
+    """Modes of the structure with what the machine has besides: its mounts that are not linear, at rest or at an
+    amplitude [m] (:func:`with_mounts`), and transmissions. Raises InputError."""
+    if machine.mounts is not None:
+        table = read_mounts(machine.mounts.table, len(modes.frequency))
+        modes = with_mounts(modes, table, factored(table, machine.mounts.parameters()), amplitude)
     return with_transmissions(machine, modes)
 
 

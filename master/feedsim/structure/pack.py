@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 AXES_IN_ARCHIVE = "resources/axes.csv"
 MODES_IN_ARCHIVE = "resources/modes.csv"
 POSES_IN_ARCHIVE = "resources/poses.bin"
+MOUNTS_IN_ARCHIVE = "resources/mounts.csv"
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ def pack(
     modes: Path,
     pose: Mapping[str, float],
     poses: Path | None = None,
+    mounts: Path | None = None,
     name: str = "",
     note: str = "",
     trial: bool = True,
@@ -62,6 +64,7 @@ def pack(
         modes: table of the modes at the pose, with the ports of all axes; its bytes are packed as they are.
         pose: axis -> position at the start [m]; the axes in the order that the archive shall have them.
         poses: poses.bin, the modes of a grid of poses, for a plant that follows its axes.
+        mounts: mounts.csv, mounts that are not linear, at the modes' pose.
         name, note: what the archive's description and documentation say of the machine.
         trial: instantiate the packed unit once, where the base has a binary for this platform.
         level: of compression, 0 (none) to 9.
@@ -72,7 +75,7 @@ def pack(
         OutputError: `out` cannot be written.
     """
     with packaging():
-        given = plant_tables(modes, pose, poses)
+        given = plant_tables(modes, pose, poses, mounts)
         return packed(base, out, given, name=name, note=note, trial=trial, level=level, terminals=terminals)
 
 
@@ -89,7 +92,9 @@ def packaging() -> Iterator[None]:
         raise InputError(str(error), error.problems) from error
 
 
-def plant_tables(modes: Path, pose: Mapping[str, float], poses: Path | None) -> MachineTables:
+def plant_tables(
+    modes: Path, pose: Mapping[str, float], poses: Path | None, mounts: Path | None = None
+) -> MachineTables:
     """A machine's files as an archive holds them, checked; arguments as those of `pack`."""
     from feedsim_packager import machine_tables
     from feedsim_packager.resources import File
@@ -97,7 +102,7 @@ def plant_tables(modes: Path, pose: Mapping[str, float], poses: Path | None) -> 
     return machine_tables.check(
         File("axes.csv", machine_tables.axes_csv(pose)),
         File.at(modes),
-        File.at(poses) if poses is not None else None,
+        *(File.at(path) if path is not None else None for path in (poses, mounts)),
     )
 
 

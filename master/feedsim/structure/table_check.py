@@ -10,15 +10,19 @@ import numpy as np
 
 from feedsim import units
 from feedsim.cache import cached
-from feedsim.errors import FeedsimError
+from feedsim.errors import FeedsimError, few
 from feedsim.scenario import Machine
+from feedsim.structure.assembly import MAX_SHOWN_LABELS
 from feedsim.structure.file import CODE, State, digest_of, state_of
 from feedsim.structure.modes import Modes, read_modes
+from feedsim.structure.mounts import MountTable, read_mounts, table_of
 
 # A table and a structure that belong together agree to the eigensolver's error (1e-8); a changed structure is far off.
 EIGENVALUE_TOLERANCE = 1e-5
 # A mode table belongs to a structure where its frequencies are the structure's, to the digits that tables are given in.
 SAME_FREQUENCY = 1e-3
+# Mode shapes at mounts, of the largest: the digits of tables, where modes lie near one another.
+SAME_SHAPE = 1e-2
 
 
 def table_mismatch(machine: Machine) -> str | None:
@@ -33,10 +37,14 @@ def table_mismatch(machine: Machine) -> str | None:
 
     def find() -> str:
         built = _modes(structure, state_of(structure), tuple(machine.pose.items()))
-        return stale(read_modes(machine.modes, list(machine.axes)), built, SAME_FREQUENCY) if built else ""
+        if built is None:
+            return ""
+        table = read_modes(machine.modes, list(machine.axes))
+        return stale(table, built[0], SAME_FREQUENCY) or _other_mounts(machine, table, built[1])
 
     try:
-        files = [digest_of(path, state_of(path)) for path in (structure, machine.modes)]
+        paths = (structure, machine.modes, *([machine.mounts.table] if machine.mounts is not None else []))
+        files = [digest_of(path, state_of(path)) for path in paths]
         how = cached("table-of-modes", [files, [*machine.pose.items()], [*machine.axes]], CODE, find)
     except (OSError, FeedsimError):
         return None
@@ -55,8 +63,10 @@ def _shown(pose: Mapping[str, float], between: str) -> str:
 
 
 @lru_cache(maxsize=32)
-def _modes(structure: Path, state: State, pose: tuple[tuple[str, float], ...]) -> Modes | None:
-    """Modes at the pose; `state` is that of the file, so that a changed one is read anew."""
+def _modes(
+    structure: Path, state: State, pose: tuple[tuple[str, float], ...]
+) -> tuple[Modes, MountTable | None] | None:
+    """Modes at the pose, and mounts that are not linear; `state` is that of the file: a changed one is read anew."""
     # Loaded where there is something to solve.
     from feedsim.structure.geometry.assemble import assembler_of, structure_axes, structure_of
     from feedsim.structure.solve import solve
@@ -67,7 +77,28 @@ def _modes(structure: Path, state: State, pose: tuple[tuple[str, float], ...]) -
         return None
     assembly = assembler_of(structure, state).at({axis: position for axis, position in pose if axis in axes})
     # The sparse way: of a model of some hundred degrees of freedom, in less than half the time of full matrices.
-    return solve(assembly, cutoff=description.cutoff, damping=description.damping, dense_limit=0, described=False).modes
+    found = solve(assembly, cutoff=description.cutoff, damping=description.damping, dense_limit=0, described=False)
+    return found.modes, table_of(assembly, found.shapes)
+
+
+def _other_mounts(machine: Machine, modes: Modes, built: MountTable | None) -> str:
+    """In words where the machine's table of mounts is not the structure's; "" where it is, or there is none."""
+    if machine.mounts is None:
+        return ""
+    if built is None:
+        return f"{machine.mounts.table} has mounts that are not linear; the structure has none"
+    table = read_mounts(machine.mounts.table, len(modes.frequency))
+    if table.names != built.names:
+        own, others = (few(names, MAX_SHOWN_LABELS) for names in (table.names, built.names))
+        return f"{machine.mounts.table} has the mounts {own}; the structure has {others}"
+    if table.shapes.shape != built.shapes.shape:
+        return ""  # cut off elsewhere, or with pseudo-modes
+    off = np.abs(table.element - built.element) > SAME_FREQUENCY * np.abs(built.element)
+    moved = np.abs(table.shapes - built.shapes).max(axis=1) > SAME_SHAPE * np.abs(built.shapes).max(axis=1)
+    if not (off.any() or moved.any()):
+        return ""
+    name = table.names[int(np.flatnonzero(off.any(axis=1) | moved)[0])]
+    return f"mount {name} of {machine.mounts.table} is another one than the structure's"
 
 
 def stale(table: Modes, built: Modes, tolerance: float = EIGENVALUE_TOLERANCE) -> str:

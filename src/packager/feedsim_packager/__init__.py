@@ -4,7 +4,7 @@
     units          unit expressions -> SI base units and conversion factors
     table          variables.def, through the C preprocessor -> rows, checked
     resources      files that a unit reads: what all kinds of them have in common
-    machine_tables axes.csv, modes.csv and poses.bin of the plant -> checked, embedded
+    machine_tables axes.csv, modes.csv, poses.bin and mounts.csv of the plant -> checked, embedded
     setpoints      setpoints.csv of the unit setpoint -> written, checked, embedded
     kinds          the kinds of resources, and which files make them
     poses          checks poses.bin

@@ -36,7 +36,7 @@ class Kind:
 
 
 def _read_machine(files: Mapping[str, Path]) -> Resources:
-    return machine_tables.read(files["axes"], files["modes"], files.get("poses"))
+    return machine_tables.read(files["axes"], files["modes"], files.get("poses"), files.get("mounts"))
 
 
 def _read_setpoints(files: Mapping[str, Path]) -> Resources:
@@ -45,9 +45,8 @@ def _read_setpoints(files: Mapping[str, Path]) -> Resources:
 
 def _read_whole_machine(files: Mapping[str, Path]) -> Resources:
     motion = setpoints.check(File.at(files["setpoints"])) if "setpoints" in files else None
-    return whole_machine.check(
-        machine_tables.read(files["axes"], files["modes"], files.get("poses")), File.at(files["settings"]), motion
-    )
+    tables = machine_tables.read(files["axes"], files["modes"], files.get("poses"), files.get("mounts"))
+    return whole_machine.check(tables, File.at(files["settings"]), motion)
 
 
 KINDS: Mapping[str, Kind] = {
@@ -56,6 +55,7 @@ KINDS: Mapping[str, Kind] = {
             "axes": Option("axes.csv of the machine", True, lambda unit: unit / "resources" / "axes.csv"),
             "modes": Option("modes.csv of the machine", True, lambda unit: DEFAULT_MODES),
             "poses": Option("poses.bin of the machine: modes of a grid of poses", False, lambda unit: None),
+            "mounts": Option("mounts.csv of the machine: mounts that are not linear", False, lambda unit: None),
         },
         _read_machine,
     ),
@@ -70,6 +70,7 @@ KINDS: Mapping[str, Kind] = {
             "axes": Option("axes.csv of the machine", True, lambda unit: _DEFAULT_AXES),
             "modes": Option("modes.csv of the machine", True, lambda unit: DEFAULT_MODES),
             "poses": Option("poses.bin of the machine: modes of a grid of poses", False, lambda unit: None),
+            "mounts": Option("mounts.csv of the machine: mounts that are not linear", False, lambda unit: None),
             "settings": Option(
                 "settings.csv of the machine: start values of its parameters",
                 True,

@@ -1,5 +1,5 @@
 """A machine's resource files: which axes it has and where they stand (axes.csv), its modes (modes.csv), and where the
-plant shall follow its axes the modes of a grid of poses (poses.bin)."""
+plant shall follow its axes the modes of a grid of poses (poses.bin), or mounts that are not linear (mounts.csv)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from .resources import AXIS_NAME, AXIS_NAME_RULE, MOST_AXES, File, Resources, co
 
 AXES_HEADER = ("axis", "x_0 [m]")
 DIRECTIONS = ("X", "Y", "Z")  # of the machine frame: ports of the tool force
+MOUNT_COLUMNS = ("mount", "K_lin [N/m]", "K_e [N/m]", "F_max [N]", "x_2 [m]", "K_v [N/m]", "c [N.s/m]")
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class MachineTables(Resources):
     modes_csv: bytes
     poses_bin: bytes | None  # None: the machine stays in one pose
     axes: tuple[Axis, ...]
+    mounts_csv: bytes | None = None  # None: all mounts are the linear springs of the modes
 
     kind = "machine"
     noun = "Machine"
@@ -43,7 +45,8 @@ class MachineTables(Resources):
     def files(self) -> dict[str, bytes]:
         """Archive path -> content, in the order in which they are hashed."""
         result = {"resources/axes.csv": self.axes_csv, "resources/modes.csv": self.modes_csv}
-        return result if self.poses_bin is None else result | {"resources/poses.bin": self.poses_bin}
+        more = {"resources/poses.bin": self.poses_bin, "resources/mounts.csv": self.mounts_csv}
+        return result | {path: content for path, content in more.items() if content is not None}
 
     def start(self, axis: str, row: str) -> str:
         """Start value of x_0."""
@@ -53,13 +56,17 @@ class MachineTables(Resources):
         """Its axes, and what its modes do."""
         axes = ", ".join(f"{axis.name} at {axis.x_0:.9g} m" for axis in self.axes)
         grid = " Its modes follow the axes by the grid of poses in resources/poses.bin." if self.poses_bin else ""
-        return f"Its axes: {axes}.{grid}"
+        mounts = " Mounts that are not linear are in resources/mounts.csv." if self.mounts_csv else ""
+        return f"Its axes: {axes}.{grid}{mounts}"
 
     def embedded_source(self) -> bytes:
         """axes.csv and modes.csv as constants."""
+        more = {"poses.bin": self.poses_bin, "mounts.csv": self.mounts_csv}  # one of them at most
+        left = next((name for name, content in more.items() if content is not None), None)
+        head = _EMBEDDED_HEAD if left is None else _EMBEDDED_HEAD_MORE.format(left)
         return "".join(
             (
-                _EMBEDDED_HEAD if self.poses_bin is None else _EMBEDDED_HEAD_POSES,
+                head,
                 '#include "embedded_resources.h"\n',
                 constant("embedded_axes", self.axes_csv),
                 constant("embedded_modes", self.modes_csv),
@@ -85,12 +92,15 @@ def modes_header(axes: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-def read(axes_path: Path, modes_path: Path, poses_path: Path | None = None) -> MachineTables:
+def read(
+    axes_path: Path, modes_path: Path, poses_path: Path | None = None, mounts_path: Path | None = None
+) -> MachineTables:
     """Read and check the files; raises InputError with all problems of the file at fault."""
-    return check(File.at(axes_path), File.at(modes_path), File.at(poses_path) if poses_path else None)
+    more = (File.at(path) if path else None for path in (poses_path, mounts_path))
+    return check(File.at(axes_path), File.at(modes_path), *more)
 
 
-def check(axes: File, modes: File, grid: File | None = None) -> MachineTables:
+def check(axes: File, modes: File, grid: File | None = None, mounts: File | None = None) -> MachineTables:
     """The resources that these contents make; raises InputError with all problems of the file at fault."""
     result = _axes(axes)
     names = [axis.name for axis in result]
@@ -98,7 +108,13 @@ def check(axes: File, modes: File, grid: File | None = None) -> MachineTables:
         raise InputError(modes.name, problems)
     if grid is not None:
         poses.check(grid.content, names, grid.name)
-    return MachineTables(axes.content, modes.content, grid.content if grid is not None else None, result)
+    if mounts is not None:
+        if grid is not None:
+            raise InputError(f"{mounts.name}: mounts that are not linear belong to one pose; {grid.name} has a grid")
+        if problems := list(mount_problems(mounts.content, len(_rows(modes.content)) - 1)):
+            raise InputError(mounts.name, problems)
+    grid_content, mounts_content = (file.content if file is not None else None for file in (grid, mounts))
+    return MachineTables(axes.content, modes.content, grid_content, result, mounts_content)
 
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
@@ -172,6 +188,31 @@ def _check_modes(content: bytes, axes: Sequence[str], axes_file: str) -> Iterato
         yield from _check_physics(header, table)
 
 
+def mounts_header(modes: int) -> tuple[str, ...]:
+    """Columns of mounts.csv for a table of so many modes, in this order."""
+    return (*MOUNT_COLUMNS, *(f"mode_{k}" for k in range(modes)))
+
+
+def mount_problems(content: bytes, modes: int) -> Iterator[str]:
+    """What is wrong with mounts.csv, for a table of so many modes."""
+    rows, header = _rows(content), mounts_header(modes)
+    if not rows or tuple(rows[0][1]) != header:
+        yield f"line 1: the header must be {','.join(MOUNT_COLUMNS)},mode_0 ... mode_{modes - 1}: modes.csv has {modes}"
+        return
+    if not rows[1:]:
+        yield "no mount is listed"
+    for line, fields in rows[1:]:
+        if len(fields) != len(header):
+            yield f"line {line}: {len(fields)} fields, expected {len(header)}"
+            continue
+        for name, text in zip(header[1:], fields[1:], strict=True):
+            value = finite(text)
+            if value is None:
+                yield f"line {line}: {name} is '{text}', not a finite number"
+            elif name in MOUNT_COLUMNS and (value < 0 or (name == "x_2 [m]" and value == 0)):
+                yield f"line {line}: {name} is {text}, allowed is {'above 0' if name == 'x_2 [m]' else '0 or more'}"
+
+
 def _check_physics(header: Sequence[str], rows: Sequence[tuple[int, Sequence[float | None]]]) -> Iterator[str]:
     """What the unit refuses in a table of sound numbers: damped rigid modes, rotors and scales that nothing moves."""
     columns: dict[str, list[float]] = {name: [] for name in header}
@@ -190,7 +231,7 @@ def _check_physics(header: Sequence[str], rows: Sequence[tuple[int, Sequence[flo
 _EMBEDDED_HEAD = """\
 /* Generated by the packager: resources/axes.csv and resources/modes.csv, for targets that have no files. */
 """
-_EMBEDDED_HEAD_POSES = """\
-/* Generated by the packager: resources/axes.csv and resources/modes.csv. The archive follows its axes by
- * resources/poses.bin, which is not embedded (it may have megabytes): without a resource location it is refused. */
+_EMBEDDED_HEAD_MORE = """\
+/* Generated by the packager: resources/axes.csv and resources/modes.csv. The archive follows
+ * resources/{}, which is not embedded (it may have megabytes): without a resource location it is refused. */
 """

@@ -59,6 +59,7 @@ def _input(machine: Machine, setpoints: Setpoints, cycles: int, steps: int) -> b
     parts: list[list[float]] = []
     parts.append([len(machine.axes), len(modes), count, steps, cycles, machine.T_c, machine.T_pos])
     parts.append(modes.ravel().tolist())
+    parts.append([float(len(machine.mounts)), *machine.mounts.ravel().tolist()])
     for name, axis in machine.axes.items():
         parts.append([axis.x_0, axis.M_0])
         parts.append([axis.friction[key] for key in FRICTION_KEYS] + [axis.drive[key] for key in DRIVE_KEYS])
@@ -74,7 +75,7 @@ def simulate(
     `duration` [s] (default: as long as the setpoints), `step`: largest integration step [s]. Returns arrays over the
     control cycle: ``time`` [s], per axis ``A.x_a`` [m], ``A.n_a`` [rad/s], ``A.M_a``, ``A.M_fr`` [N.m], ``A.z``,
     ``A.c`` [rad], ``A.i_d``, ``A.i_q`` [A] at that instant and ``A.x_e`` [m], ``A.n_s``, ``A.n_ref`` [rad/s], ``A.M_s``
-    [N.m] of the sample taken there; ``tool.x_X`` .. [m].
+    [N.m] of the sample taken there; ``tool.x_X`` .. [m], ``mounts.E`` [J].
     """
     if duration is None:
         duration = (len(next(iter(setpoints.x_s.values()))) - 1) * machine.T_pos
@@ -86,7 +87,8 @@ def simulate(
         source.write_bytes(text)
         subprocess.run([str(program), str(source), str(output)], check=True)
         values = np.fromfile(output, dtype=np.float64)
-    names = [f"{a}.{name}" for a in machine.axes for name in AXIS_COLUMNS] + [f"tool.x_{d}" for d in "XYZ"]
+    names = [f"{a}.{name}" for a in machine.axes for name in AXIS_COLUMNS]
+    names += [*(f"tool.x_{d}" for d in "XYZ"), "mounts.E"]
     rows = values.reshape(cycles + 1, len(names))
     result = {"time": np.arange(cycles + 1, dtype=np.float64) * machine.T_c}
     return result | dict(zip(names, rows.T, strict=True))

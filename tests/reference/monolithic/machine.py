@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +42,11 @@ class Axis:
 
 @dataclass
 class Machine:
-    """Cycles [s], axes, and the mode table: frequency [Hz], damping [1], n, x (modes, axes) and tcp (modes, 3)."""
+    """Cycles [s], axes, and the mode table: frequency [Hz], damping [1], n, x (modes, axes) and tcp (modes, 3).
+
+    mounts: (P, 6 + modes) per direction of a mount that is not linear K_lin, K_e [N/m], F_max [N], x_2 [m], K_v [N/m],
+    c [N.s/m] and the mode shapes there.
+    """
 
     T_c: float
     T_pos: float
@@ -55,6 +59,7 @@ class Machine:
     n: NDArray[np.float64]
     x: NDArray[np.float64]
     tcp: NDArray[np.float64]
+    mounts: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
 
     def copy(self) -> Machine:
         """An independent copy."""

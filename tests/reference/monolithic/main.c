@@ -39,6 +39,19 @@ static void read_modes(FILE *file, int modes) {
     }
 }
 
+static void read_mounts(FILE *file, int modes) {
+    for (int m = 0; m < machine.mounts; ++m) {
+        Mount *p = &machine.mount[m];
+        double *const values[] = {&p->K_lin, &p->K_e, &p->F_max, &p->x_2, &p->K_v, &p->c};
+        for (size_t i = 0; i < sizeof values / sizeof *values; ++i) {
+            *values[i] = number(file, "mount");
+        }
+        for (int i = 0; i < modes; ++i) {
+            p->port[i] = number(file, "mount's mode");
+        }
+    }
+}
+
 static void read_axis(FILE *file, Friction *f, Drive *d) {
     double *const friction[] = {&f->sigma_0, &f->sigma_1, &f->sigma_2, &f->F_C,       &f->F_S, &f->v_s,
                                 &f->beta,    &f->F_log,   &f->v_log,   &f->asymmetry, &f->W,   &f->gamma};
@@ -99,6 +112,13 @@ static void record(FILE *file, const double *x_start, const double *M_a) {
         double tool = dot(machine.tcp_port[d], state.q, machine.modes);
         fwrite(&tool, sizeof tool, 1, file);
     }
+    double E = 0; /* beyond the springs that the modes hold */
+    for (int m = 0; m < machine.mounts; ++m) {
+        const Mount *p = &machine.mount[m];
+        const double x = dot(p->port, state.q, machine.modes);
+        E += state.E[m] - p->K_lin * x * x / 2;
+    }
+    fwrite(&E, sizeof E, 1, file);
 }
 
 int main(int argc, char **argv) {
@@ -118,6 +138,12 @@ int main(int argc, char **argv) {
         return 1;
     }
     read_modes(input, modes);
+    machine.mounts = (int)number(input, "mounts");
+    if (machine.mounts < 0 || machine.mounts > MAX_MOUNTS) {
+        fprintf(stderr, "monolithic: counts out of range\n");
+        return 1;
+    }
+    read_mounts(input, modes);
     double x_start[MAX_AXES], M_a[MAX_AXES] = {0}, M_next[MAX_AXES];
     for (int a = 0; a < machine.axes; ++a) {
         Drive *drive = &control[a].drive;

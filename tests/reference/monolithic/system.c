@@ -40,7 +40,18 @@ double friction_torque(const Friction *p, double n, double z, double c, double *
 /* Time derivative of the whole state at one Runge-Kutta stage; dq/dt is v and needs no room of its own. */
 typedef struct {
     double v[MAX_MODES], z[MAX_AXES], c[MAX_AXES];
+    double F_f[MAX_MOUNTS], F_v[MAX_MOUNTS], E[MAX_MOUNTS];
 } Rate;
+
+static double mount_force(const Mount *p, const State *x, int m, double speed, Rate *rate, int modes) {
+    const double deflection = dot(p->port, x->q, modes), side = x->side[m];
+    const double left = p->F_max - side * x->F_f[m], at_reversal = p->F_max - side * x->F_s[m];
+    const double force = p->K_e * deflection + x->F_f[m] + x->F_v[m];
+    rate->F_f[m] = p->F_max > 0 ? left * left / (at_reversal * at_reversal) * p->F_max / p->x_2 * speed : 0;
+    rate->F_v[m] = p->c > 0 ? p->K_v * (speed - x->F_v[m] / p->c) : 0;
+    rate->E[m] = force * speed;
+    return force - p->K_lin * deflection;
+}
 
 static void rate_of(const System *s, const State *x, const double *M_a, Rate *rate) {
     double F[MAX_AXES];
@@ -58,6 +69,13 @@ static void rate_of(const System *s, const State *x, const double *M_a, Rate *ra
             rate->v[i] += s->n_port[a][i] * F[a];
         }
     }
+    for (int m = 0; m < s->mounts; ++m) {
+        const double *port = s->mount[m].port;
+        const double force = mount_force(&s->mount[m], x, m, dot(port, x->v, s->modes), rate, s->modes);
+        for (int i = 0; i < s->modes; ++i) {
+            rate->v[i] -= port[i] * force;
+        }
+    }
 }
 
 /* out = x + h * rate, where the rate of q is the v of the stage the rate belongs to. */
@@ -72,6 +90,12 @@ static void shifted(const System *s, const State *x, const State *stage, const R
         out->z[a] = x->z[a] + h * rate->z[a];
         out->c[a] = x->c[a] + h * rate->c[a];
     }
+    for (int m = 0; m < s->mounts; ++m) {
+        out->F_f[m] = x->F_f[m] + h * rate->F_f[m];
+        out->F_v[m] = x->F_v[m] + h * rate->F_v[m];
+        out->F_s[m] = x->F_s[m];
+        out->side[m] = x->side[m];
+    }
 }
 
 void advance(const System *s, State *x, double T, int steps, const double *M_begin, const double *M_end) {
@@ -80,6 +104,13 @@ void advance(const System *s, State *x, double T, int steps, const double *M_beg
     Rate k1, k2, k3, k4;
     double M[3][MAX_AXES];
     for (int j = 0; j < steps; ++j) {
+        for (int m = 0; m < s->mounts; ++m) { /* a reversal lies within a step: 1e-6 N of friction */
+            const double speed = dot(s->mount[m].port, x->v, s->modes), side = speed < 0 ? -1 : 1;
+            if (side != x->side[m]) {
+                x->side[m] = side;
+                x->F_s[m] = x->F_f[m];
+            }
+        }
         for (int a = 0; a < s->axes; ++a) {
             for (int half = 0; half < 3; ++half) {
                 M[half][a] = M_begin[a] + (M_end[a] - M_begin[a]) * (2 * j + half) / (2.0 * steps);
@@ -100,6 +131,11 @@ void advance(const System *s, State *x, double T, int steps, const double *M_beg
         for (int a = 0; a < s->axes; ++a) {
             x->z[a] += h / 6 * (k1.z[a] + 2 * k2.z[a] + 2 * k3.z[a] + k4.z[a]);
             x->c[a] = clip(x->c[a] + h / 6 * (k1.c[a] + 2 * k2.c[a] + 2 * k3.c[a] + k4.c[a]), s->friction[a].W / 2);
+        }
+        for (int m = 0; m < s->mounts; ++m) {
+            x->F_f[m] += h / 6 * (k1.F_f[m] + 2 * k2.F_f[m] + 2 * k3.F_f[m] + k4.F_f[m]);
+            x->F_v[m] += h / 6 * (k1.F_v[m] + 2 * k2.F_v[m] + 2 * k3.F_v[m] + k4.F_v[m]);
+            x->E[m] += h / 6 * (k1.E[m] + 2 * k2.E[m] + 2 * k3.E[m] + k4.E[m]);
         }
     }
 }

@@ -6,11 +6,20 @@
 #define MAX_AXES 4
 #define MAX_MODES 512
 #define DIRECTIONS 3
+#define MAX_MOUNTS 24
 
 /* LuGre model (Eqs. 1, 6, 7) with the engaging model (Eqs. 2-4), motor side: rad, rad/s, N.m */
 typedef struct {
     double sigma_0, sigma_1, sigma_2, F_C, F_S, v_s, beta, F_log, v_log, asymmetry, W, gamma;
 } Friction;
+
+/* A direction of a mount. The modes hold the spring K_lin; K_e x + F_f + F_v acts in its place. F_f as a differential
+ * equation, by Berg's law between two reversals: dF_f/dx = (F_max -+ F_f)^2/(x_2 F_max (1 -+ F_s/F_max)^2) for x rising
+ * (-) or falling (+), F_s: F_f at the last reversal. F_v: dF_v/dt = K_v (dx/dt - F_v/c). */
+typedef struct {
+    double K_lin, K_e, F_max, x_2, K_v, c;
+    double port[MAX_MODES];
+} Mount;
 
 typedef struct {
     int axes, modes; /* modes: padded to whole vectors with zero columns */
@@ -20,11 +29,16 @@ typedef struct {
     double n_port[MAX_AXES][MAX_MODES];              /* torque in, speed out */
     double x_port[MAX_AXES][MAX_MODES];              /* linear scale */
     double tcp_port[DIRECTIONS][MAX_MODES];
+    int mounts;
+    Mount mount[MAX_MOUNTS];
 } System;
 
 typedef struct {
     double q[MAX_MODES], v[MAX_MODES]; /* modal displacement and its derivative */
     double z[MAX_AXES], c[MAX_AXES];
+    double F_f[MAX_MOUNTS], F_v[MAX_MOUNTS];
+    double F_s[MAX_MOUNTS], side[MAX_MOUNTS]; /* of mounts: force at the last reversal, sign of the speed since */
+    double E[MAX_MOUNTS];                     /* work done against K_e x + F_f + F_v */
 } State;
 
 double dot(const double *a, const double *b, int count);

@@ -23,6 +23,7 @@ from feedsim.scenario.structure.parts import (
     Scale,
     Section,
     Stiffness,
+    StiffnessOrNone,
     Tool,
 )
 
@@ -77,14 +78,70 @@ class PointMass(Model):
     )
 
 
+Stiffnesses = tuple[StiffnessOrNone, StiffnessOrNone, StiffnessOrNone]
+Force = Annotated[float, Quantity("N", minimum=0)]
+Deflection = Annotated[float, Quantity("m", above=0, example="20 um")]
+Damper = Annotated[float, Quantity("N.s/m", minimum=0)]
+
+
+class MountFriction(Model):
+    """Friction of a mount: stiff where it turns back, and never beyond its limit."""
+
+    F_max: tuple[Force, Force, Force] = Field(description="Limit of the force along X, Y, Z; 0 N: none")
+    x_2: tuple[Deflection, Deflection, Deflection] = Field(
+        description="Deflection from rest at which half of F_max is reached"
+    )
+
+
+class MountViscous(Model):
+    """Spring and damper in series, beside the rest of a mount."""
+
+    K_v: Stiffnesses = Field(description="Stiffness of the spring along X, Y, Z")
+    c: tuple[Damper, Damper, Damper] = Field(description="Damper")
+
+
 class Mount(Model):
-    """A spring to the ground at a node, or one at each of several nodes."""
+    """A spring to the ground at a node, or one at each of several nodes; with friction or a viscous part it is not
+    linear."""
 
     nodes: Nodes = Field(description="Node, or nodes with one such mount each")
     offset: Point = Field(default=(0.0, 0.0, 0.0), description="Where the mount acts, as seen from the node")
     stiffness: tuple[Stiffness, Stiffness, Stiffness] = Field(
-        description="Stiffness (of each) along X, Y, Z of the frame"
+        description="Stiffness (of each) along X, Y, Z of the frame; that of the modes"
     )
+    elastic: Stiffnesses | None = Field(
+        default=None, description="Elastic part of a mount that is not linear (default: stiffness less F_max/x_2)"
+    )
+    friction: MountFriction | None = Field(default=None, description="Friction, beside the elastic part")
+    viscous: MountViscous | None = Field(default=None, description="Spring and damper in series, beside both")
+
+    @property
+    def linear(self) -> bool:
+        """Whether it is the spring of the modes and nothing else."""
+        return self.elastic is None and self.friction is None and self.viscous is None
+
+    @property
+    def elements(self) -> tuple[tuple[float, float, float, float, float, float], ...]:
+        """K_lin [N/m], K_e [N/m], F_max [N], x_2 [m], K_v [N/m], c [N.s/m] along X, Y, Z. Without friction x_2 is
+        1 m, which acts nowhere."""
+        result = []
+        for d, K_lin in enumerate(self.stiffness):
+            F_max, x_2 = (self.friction.F_max[d], self.friction.x_2[d]) if self.friction else (0.0, 1.0)
+            K_v, c = (self.viscous.K_v[d], self.viscous.c[d]) if self.viscous else (0.0, 0.0)
+            K_e = K_lin - F_max / x_2 if self.elastic is None else self.elastic[d]
+            result.append((K_lin, K_e, F_max, x_2, K_v, c))
+        return tuple(result)
+
+    @model_validator(mode="after")
+    def _elastic_is_left(self) -> Self:
+        for direction, (K_lin, K_e, F_max, x_2, _, _) in zip("XYZ", self.elements, strict=True):
+            if K_e < 0:
+                raise fault(
+                    f"along {direction} friction has the stiffness F_max/x_2 = {F_max / x_2 / 1e6:.6g} N/um at rest, "
+                    f"more than the mount's {K_lin / 1e6:.6g} N/um: less F_max, a larger x_2, or give the elastic part",
+                    beside=("friction",),
+                )
+        return self
 
 
 class Carriage(Model):

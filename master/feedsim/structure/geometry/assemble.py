@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.checks import contradictions, held, node, nodes, pose_faults, rail
-from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure, Mount
 from feedsim.scenario.structure.load import load_structure
 from feedsim.scenario.structure.parts import Drive
-from feedsim.structure.assembly import Assembly, Floats, Geometry
+from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort
 from feedsim.structure.file import State
 from feedsim.structure.geometry.mesh import FRAME, Mesh, symmetric, weighted
 from feedsim.structure.geometry.points import Row, rigid
@@ -29,18 +29,25 @@ from feedsim.structure.geometry.points import Row, rigid
 
 
 Springs = Iterator[tuple[float, Row]]
+FRAME_BY_LETTER = tuple(zip("XYZ", FRAME, strict=True))
+
+
+def mount_rows(mesh: Mesh, name: str) -> Iterator[tuple[str, Mount, int, Row]]:
+    """Mounts of a body, a direction of each at a time: name, what the file says, number of the direction, row."""
+    for mount in mesh.structure.bodies[name].mounts:
+        for item in (item for text in mount.nodes for item in nodes(mesh.structure, name, text)):
+            number = mesh.number(item)
+            grip = rigid(np.array(mount.offset), np.zeros((1, 3)), [int(mesh.first_dof[number])])
+            for d, (letter, direction) in enumerate(FRAME_BY_LETTER):
+                yield f"{item} {letter}", mount, d, grip.displacement(direction)
 
 
 def body_springs(mesh: Mesh, origins: Mapping[str, Floats], positions: Floats) -> Springs:
     """Mounts and carriages."""
     structure = mesh.structure
     for name, body in structure.bodies.items():
-        for mount in body.mounts:
-            for item in (item for text in mount.nodes for item in nodes(structure, name, text)):
-                number = mesh.number(item)
-                grip = rigid(np.array(mount.offset), np.zeros((1, 3)), [int(mesh.first_dof[number])])
-                for direction, stiffness in zip(FRAME, mount.stiffness, strict=True):
-                    yield stiffness, grip.displacement(direction)
+        for _, mount, d, row in mount_rows(mesh, name):
+            yield mount.stiffness[d], row
         for carriage in body.carriages:
             point = origins[name] + carriage.at
             number = mesh.number(nodes(structure, name, carriage.node)[0])
@@ -159,6 +166,12 @@ class Assembler:
             geometry=_geometry(mesh, positions),
             pose=pose,
             units=None,
+            mounts=tuple(
+                MountPort(name, mount.elements[d], row.dense(mesh.size))
+                for body in structure.bodies
+                for name, mount, d, row in mount_rows(mesh, body)
+                if not mount.linear
+            ),
         )
 
 

@@ -18,7 +18,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, f
+from scipy.special import chdtrc, chdtri, fdtrc
 
 from feedsim.estimation.interval import student
 
@@ -34,7 +34,7 @@ MAX_TWO_STEP_RECORDS = 100  # records up to which two steps are looked for: thei
 LIKELIHOOD_RATIO = 100.0
 SINGULAR = 1e-9  # of a column: what is left of it beside the others, where it says nothing of its own
 FLOOR = 1e-9  # of the values' size: no standard deviation is taken for less
-ITERATIONS = 60
+ITERATIONS, ACCURACY = 60, 1e-6  # steps of Newton's method at most, and the last one over tau^2
 FURTHEST = 36525.0  # [days] beyond the last record, from which on a limit counts as not reached
 
 
@@ -139,7 +139,7 @@ def weighted(designs: Array, value: Array, sigma: Array, target: float | None = 
         squares = np.maximum(np.sum(residuals**2 / variance, axis=1), 1e-300)
         slope = np.maximum(np.sum((residuals / variance) ** 2, axis=1), 1e-300)
         better = np.maximum(tau2 + (squares / wanted - 1.0) * squares / slope, 0.0)
-        if np.all(np.abs(better - tau2) <= 1e-10 * better):
+        if np.all(np.abs(better - tau2) <= ACCURACY * better):
             break
         tau2 = better
     return Weighted(coefficients, covariance, residuals, tau2, 1.0 / variance, free, regular)
@@ -279,7 +279,7 @@ def _probability(series: Series, small: _Class, place: tuple[int, ...], large: _
     _, _, residuals, _ = solve(designs, series.value, 1.0 / every.weights)
     gain = np.sum(every.weights * residuals**2, axis=1) - every.squares
     gain = np.where(every.regular, gain, 0.0)
-    return min(1.0, len(large.places) * float(np.min(f.sf(np.maximum(gain, 0.0) / more, more, every.free))))
+    return min(1.0, len(large.places) * float(np.min(fdtrc(more, every.free, np.maximum(gain, 0.0) / more))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,7 +399,7 @@ def _excess(model: Fitted) -> float:
     base = series.base()
     design[:, 1 : base.shape[1]] = base[:, 1:]
     _, _, residuals, _ = solve(design[None], series.value, series.known_sigma()[None] ** 2)
-    return float(chi2.sf(np.sum(residuals**2 / series.known_sigma() ** 2), model.free))
+    return float(chdtrc(model.free, np.sum(residuals**2 / series.known_sigma() ** 2)))
 
 
 def _untested(series: Series) -> Change:
@@ -553,5 +553,5 @@ def scatter(name: str, unit: str, machines: Sequence[tuple[Array, Array]]) -> Sc
 def _profile(design: Array, value: Array, sigma: Array) -> tuple[float, float]:
     """Interval of 95 % of tau: the sum of squares is one of chi^2 there."""
     free = design.shape[0] - design.shape[1]
-    low, high = (weighted(design[None], value, sigma, float(chi2.ppf(p, free))).tau2[0] for p in (0.975, 0.025))
+    low, high = (weighted(design[None], value, sigma, float(chdtri(free, p))).tau2[0] for p in (0.025, 0.975))
     return math.sqrt(float(low)), math.sqrt(float(high))

@@ -34,6 +34,7 @@ from feedsim.report.results import SUMMARY, Content
 from feedsim.scenario import Friction, GmsFriction
 from feedsim.scenario.roles import GMS
 from feedsim.sheets import read_rows
+from feedsim.trace.trace import MAX_MAGNITUDE
 
 FORM = "YYYY-MM-DD or YYYY-MM-DDThh:mm"
 COMPENSATIONS = ("friction_pulse", "friction_table")  # groups of a drive that compensate friction
@@ -242,8 +243,9 @@ def _of_result(
         recorded = content.get("recorded")
         own = (content.get("machine") or {}).get("name", "") if isinstance(content.get("machine"), dict) else ""
         law = content.get("settings", {}).get("law", Friction.law) if kind == "identify" else ""
-    except (KeyError, TypeError, AttributeError, ValueError):
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError):
         raise InputError(f"{file}: is no summary of a result that this version can read") from None
+    values = {name: one for name, one in values.items() if abs(one.value) <= MAX_MAGNITUDE and not one.sigma < 0}
     if not values:
         raise InputError(f"{file}: a result of kind {kind} holds no values to follow")
     if moment is None and recorded:
@@ -365,8 +367,8 @@ def _number(text: str, where: str, name: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where}: {name} {text!r} is no number")
+    if not abs(value) <= MAX_MAGNITUDE:
+        raise InputError(f"{where}: {name} {text!r}; a number up to {MAX_MAGNITUDE:g} is needed")
     return value
 
 
@@ -450,7 +452,7 @@ def _of_dates(
         for one in runs:
             if one.name in asked:
                 with given("limit", f"{one.name}={asked[one.name]}"):
-                    limits[one.name] = amount(asked[one.name], one.unit, f"3 {one.unit}")
+                    limits[one.name] = amount(asked[one.name], one.unit, f"3 {one.unit}", positive=True)
             else:
                 limits[one.name] = 0.0
     found = changes([*series, *runs])
@@ -529,8 +531,8 @@ def _simulated(
     fmus: File | None,
     watch: Watch,
 ) -> list[Series]:
-    """Figures of the scenario's run with the friction of each date; where the machine compensates friction, also how
-    much larger each is than without."""
+    """Magnitudes of figures of the scenario's run with the friction of each date; where the machine compensates
+    friction, also how much larger each is than without."""
     order = sorted((entry for entry in entries if _frictions(entry)), key=lambda entry: entry.moment or datetime.min)
     if len(order) < 2:
         raise InputError(
@@ -556,12 +558,14 @@ def _simulated(
             for name, axis in plan.machine.axes.items()
             if (off := {group: None for group in COMPENSATIONS if getattr(axis.drive, group, None) is not None})
         }
-        values = {name: figures[name].value for name in names}
+        values = {name: abs(figures[name].value) for name in names}
         units |= {name: figures[name].unit for name in names}
         if axes:
             machine = plan.machine.model_copy(update={"axes": {**plan.machine.axes, **axes}})
             without = run(plan.model_copy(update={"machine": machine}), fmus=fmus).figures
-            values |= {f"{name} {page.COMPENSATED}": figures[name].value - without[name].value for name in names}
+            values |= {
+                f"{name} {page.COMPENSATED}": abs(figures[name].value) - abs(without[name].value) for name in names
+            }
             units |= {f"{name} {page.COMPENSATED}": figures[name].unit for name in names}
         if days and entry.days == days[-1]:  # another axis on the same day
             for name, value in values.items():

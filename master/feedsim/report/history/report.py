@@ -29,6 +29,7 @@ FILES = (VALUES, CHANGES, FLEET)  # besides report.html and summary.json
 FORMAT = 1
 MONTH = 365.25 / 12  # [d]
 BEGIN = datetime(1970, 1, 1)
+FIRST_DAY, LAST_DAY = (float((edge - BEGIN).days) for edge in (datetime.min, datetime.max))
 COMPENSATED = "against no compensation"  # behind a figure: how much larger it is than without compensation
 SCATTERS = 0.01  # chance of the scatter about a model, below which the intervals do not hold it
 MOST_ANSWERS = 6
@@ -138,7 +139,8 @@ def number(value: float) -> str:
 
 
 def date_text(day: float) -> str:
-    """Day since 1970 as a date."""
+    """Day since 1970 as a date; beyond the calendar its first or last one."""
+    day = min(max(day, FIRST_DAY), LAST_DAY)
     return (BEGIN + timedelta(days=day)).date().isoformat()
 
 
@@ -161,8 +163,8 @@ def answers(history: History) -> list[str]:
     if changed:
         same = len(history.changes) - len(changed)
         lines.append(
-            f"{same} of {len(history.changes)} quantities have not changed beyond doubt; the chance of a false alarm is "
-            f"{100 * ERROR_RATE:.0f} % at most."
+            f"{same} of {len(history.changes)} quantities have not changed beyond doubt; the chance of a false alarm "
+            f"is {100 * ERROR_RATE:.0f} % at most."
         )
     return lines
 
@@ -204,7 +206,8 @@ def sentence(change: Change, history: History) -> str:
     text = (
         f"{series.name} {' and '.join(parts)}: from {rounded(*begin)} to {rounded(*end)} {unit} on {date_text(last)}"
     ).replace("  ", " ")
-    text += f" ({_percent(begin[0], end[0])})." if begin[0] else "."
+    relative = begin[0] * end[0] > 0 and not series.name.endswith(COMPENSATED)
+    text += f" ({_percent(begin[0], end[0])})." if relative else "."
     if change.rival is not None:
         text += f" {_rival(change)}"
     if series.name in history.limits:
@@ -255,7 +258,8 @@ def _capital(text: str) -> str:
 
 
 def _percent(before: float, after: float) -> str:
-    return f"{100 * (after / before - 1):+.2g} %"
+    share = 100 * (after - before) / abs(before)
+    return f"{share:+.2g} %" if abs(share) < 100 else f"{share:+.0f} %"
 
 
 def _with_half(value: float, half: float) -> str:
@@ -334,14 +338,14 @@ def _rate_text(model: Fitted) -> str:
 def _remark(one: Change) -> str:
     """Scatter that the intervals do not hold, and what covariates explain."""
     parts = []
-    if one.model.tau2 > 0 and one.excess < SCATTERS:
-        spread = math.sqrt(one.model.tau2)
-        share = f" ({100 * spread / abs(one.model.coefficients[0]):.2g} %)" if one.model.coefficients[0] else ""
+    if one.excess < SCATTERS and not testable(one.series):
+        parts.append("differs by more than its intervals")
+    elif one.excess < SCATTERS and one.model.tau2 > 0:
+        spread, level = math.sqrt(one.model.tau2), abs(float(one.model.coefficients[0]))
+        share = f" ({100 * spread / level:.2g} %)" if level else ""
         parts.append(
             f"scatters between records by {spread:.2g} {plain_unit(one.series.unit)}{share} besides its intervals"
         )
-    elif not testable(one.series) and one.excess < SCATTERS:
-        parts.append("differs by more than its intervals")
     parts += [f"{slope} over {name}" for name, slope, shown in _slopes(one) if shown]
     return "; ".join(parts).replace("  ", " ")
 

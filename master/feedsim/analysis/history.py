@@ -25,15 +25,15 @@ from feedsim.estimation.interval import student
 Array = NDArray[np.float64]
 
 ERROR_RATE = 0.01  # chance that any quantity is said to change though none does; likewise that a model is too large
-MIN_RECORDS = 3  # of two dates nothing tells a change from scatter between records
+MIN_RECORDS = 3  # two dates may differ by scatter between records
 LEAST_SEGMENT = 2  # records before, and between, steps: one alone is an outlier; behind the last step one will do
 MAX_STEPS = 2
 MAX_TWO_STEP_RECORDS = 100  # records up to which two steps are looked for: their pairs grow with the square
-# Ratio of likelihoods from which on a rate is told from a step: evidence of that strength is misleading in at most one
-# of 100 cases (R. Royall, Statistical Evidence, 1997).
+# Of likelihoods, from which on a rate is distinguished from a step: evidence of that strength is misleading in at most
+# one of 100 cases (R. Royall, Statistical Evidence, 1997).
 LIKELIHOOD_RATIO = 100.0
 SINGULAR = 1e-9  # of a column: what is left of it beside the others, where it says nothing of its own
-FLOOR = 1e-9  # of the values' size: no standard deviation is taken for less
+LEAST_SIGMA = 1e-9  # of the values' size: no standard deviation is taken for less
 ITERATIONS, ACCURACY = 60, 1e-6  # steps of Newton's method at most, and the last one over tau^2
 FURTHEST = 36525.0  # [days] beyond the last record, from which on a limit counts as not reached
 
@@ -56,7 +56,7 @@ class Series:
 
     def known_sigma(self) -> Array:
         """(K,) with a floor. Where one is missing it is the median of the others; without any the scatter says all."""
-        least = FLOOR * max(float(np.max(np.abs(self.value))), 1e-300)
+        least = LEAST_SIGMA * max(float(np.max(np.abs(self.value))), 1e-300)
         there = np.isfinite(self.sigma)
         usual = float(np.median(self.sigma[there])) if np.any(there) else 0.0
         return np.asarray(np.maximum(np.where(there, self.sigma, usual), least))
@@ -290,7 +290,7 @@ class Change:
         model: the smallest that no larger one improves on. It has no elements where the quantity has not changed.
         probability: of so much of a change by scatter alone, of this quantity by itself.
         threshold: what that has to be below, which minds how many quantities are tested; 0 where it is not tested.
-        rival: the other model of as many elements where the dates do not tell them apart, a rate and a step.
+        rival: the other model of as many elements where the dates fit both about as well, a rate and a step.
         excess: chance of so much scatter about the model if the intervals of the results held all of it; nan without
             intervals.
         constant: the model without a change.
@@ -386,7 +386,7 @@ def changes(every: Sequence[Series]) -> list[Change]:
 
 
 def testable(series: Series) -> bool:
-    """Whether there are dates enough to tell a change from scatter between records."""
+    """Whether there are dates enough to distinguish a change from scatter between records."""
     return len(series.days) >= MIN_RECORDS
 
 

@@ -362,8 +362,8 @@ def _known(
             values["v_log"] = typical / BEND
             fixed["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     if fleet is not None:
-        told = prior.correlation.names if prior is not None else ()
-        fleet = fleet.restricted([name for name in fleet.names if name not in told and name not in fixed])
+        known = prior.correlation.names if prior is not None else ()
+        fleet = fleet.restricted([name for name in fleet.names if name not in known and name not in fixed])
         starts = dict(zip(fleet.names, map(float, fleet.values), strict=True))
         values |= {name: value for name, value in starts.items() if name not in ("F_C", "sigma_2")}
         values["F_S"] = max(values["F_S"], values["F_C"])

@@ -179,7 +179,7 @@ class Provenance:
         torque_delay: by how much the torque is logged later than the position [s], as the mapping gives it. It is not
             taken out of the records.
         warnings: what a user should know.
-        day: on which it was recorded, ISO 8601; "" where the file does not tell.
+        day: on which it was recorded, ISO 8601; "" where the file has no date.
     """
 
     file: Path
@@ -451,7 +451,7 @@ def _provenance(
 
 
 def recording_day(sources: Sequence[Provenance]) -> str | None:
-    """On which the first of the files was recorded, ISO 8601; None where none tells."""
+    """On which the first of the files was recorded, ISO 8601; None where none has a date."""
     return min((source.day for source in sources if source.day), default=None)
 
 

@@ -38,7 +38,7 @@ from feedsim.trace.trace import MAX_MAGNITUDE
 
 FORM = "YYYY-MM-DD or YYYY-MM-DDThh:mm"
 COMPENSATIONS = ("friction_pulse", "friction_table")  # groups of a drive that compensate friction
-COLUMNS = ("result", "date", "machine", "kind", "law", "quantity", "value", "unit", "sigma", "status")
+LIST_COLUMNS = ("result", "date", "machine", "kind", "law", "quantity", "value", "unit", "sigma", "status")
 EXAMPLE = "results/z_march@2026-03-01"
 
 
@@ -66,7 +66,7 @@ class HistoryResult(Result):
 
     @property
     def findings(self) -> Sequence[str]:
-        """What was left out, and what the results do not tell."""
+        """What was left out, and what the results leave open."""
         return self.history.findings
 
     @property
@@ -150,8 +150,8 @@ def history(
 
     Takes results of identify friction, identify drive, circle and replay. A change is named where the test of
     'constant' over all dates fails at 1 %, corrected for the number of quantities. A step, such as a lost preload or a
-    lubrication, is told from a rate, such as wear. Scatter between records counts, whether the intervals of the results
-    hold it or not. With --machines the results are of several machines, and their scatter becomes a prior.
+    lubrication, is distinguished from a rate, such as wear. Scatter between records counts, whether the intervals of
+    the results hold it or not. With --machines the results are of several machines, and their scatter becomes a prior.
 
     Command line:
         feedsim example z_wear ball_screw fleet xz_circle
@@ -193,10 +193,10 @@ def history(
         out, HistoryResult.check_place, watch, files, [f"{name}={text}" for name, text in asked.items()], force=force
     ):
         if machines:
-            found = _of_machines(entries, chosen)
+            fields = _of_machines(entries, chosen)
         else:
-            found = _of_dates(entries, chosen, limits, scenario, texts, fmus, watch)
-        result = HistoryResult(History(entries, files=files, settings=asked, scenario=str(scenario or ""), **found))
+            fields = _of_dates(entries, chosen, limits, scenario, texts, fmus, watch)
+        result = HistoryResult(History(entries, files=files, settings=asked, scenario=str(scenario or ""), **fields))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result
@@ -260,8 +260,8 @@ def _values_of(kind: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Fol
     if kind == "identify":
         yield from _parameters(content["axis"], content["parameters"])
     elif kind == "identify-drive":
-        for axis, found in content["axes"].items():
-            yield from _parameters(axis, found["parameters"])
+        for axis, group in content["axes"].items():
+            yield from _parameters(axis, group["parameters"])
     else:
         half = {
             f"{prefix}.{cause['name']}": cause["half_interval"] / abs(cause["value"])
@@ -296,7 +296,9 @@ def _listed(path: Path) -> Iterator[Entry]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     if not rows:
-        raise InputError(f"{path}: is empty; a header with {' or '.join(COLUMNS[:1] + COLUMNS[5:6])} is needed")
+        raise InputError(
+            f"{path}: is empty; a header with {' or '.join(LIST_COLUMNS[:1] + LIST_COLUMNS[5:6])} is needed"
+        )
     heads = [head.strip() for head in rows[0][1]]
     values = "quantity" in heads
     needed = ("date", "quantity", "value", "unit") if values else ("result", "date")
@@ -310,7 +312,7 @@ def _listed(path: Path) -> Iterator[Entry]:
         if len(cells) != len(heads):
             raise InputError(f"{path}:{line}: {len(cells)} cells, the header has {len(heads)}")
         table.append((f"{path}:{line}", dict(zip(heads, (cell.strip() for cell in cells), strict=True))))
-    conditions = [head for head in heads if head not in COLUMNS]
+    conditions = [head for head in heads if head not in LIST_COLUMNS]
     if not values:
         for where, row in table:
             moment = _moment(row["date"], where) if row["date"] else None
@@ -333,15 +335,15 @@ def _of_values(
         key = tuple(row.get(name, "") for name in ("result", "date", "machine", "kind", "law"))
         groups.setdefault(key, []).append((where, row))
     for (result, day, machine, kind, law), rows in groups.items():
-        found: dict[str, Followed] = {}
+        fields: dict[str, Followed] = {}
         for where, row in rows:
-            if row["quantity"] in found:
+            if row["quantity"] in fields:
                 raise InputError(f"{where}: {row['quantity']} is there twice of {day or 'one result'}")
             value = _number(row["value"], where, "value")
             sigma = _number(row["sigma"], where, "sigma") if row.get("sigma") else math.nan
             if sigma < 0:
                 raise InputError(f"{where}: sigma {sigma:g}; a standard deviation is not below 0")
-            found[row["quantity"]] = Followed(value, row["unit"], sigma, row.get("status") or "estimated")
+            fields[row["quantity"]] = Followed(value, row["unit"], sigma, row.get("status") or "estimated")
         where, first = rows[0]
         moment = _moment(day, where) if day else None
         name = result or f"{path.name} of {day or machine}"
@@ -353,7 +355,7 @@ def _of_values(
             machine,
             machine or path.stem,
             law or Friction.law,
-            found,
+            fields,
             _conditions(first, conditions, where),
         )
 
@@ -409,7 +411,7 @@ def _called(name: str, entries: Sequence[Entry], more: str = "") -> str:
 
 def _meant(name: str, known: Sequence[str]) -> str | None:
     parameter, _, axis = name.rpartition("_")
-    return next((each for each in (name, f"{axis}.{parameter}") if each in known), None)
+    return next((quantity for quantity in (name, f"{axis}.{parameter}") if quantity in known), None)
 
 
 # --- One machine over time --------------------------------------------------------------------------------------------
@@ -455,12 +457,12 @@ def _of_dates(
                     limits[one.name] = amount(asked[one.name], one.unit, f"3 {one.unit}", positive=True)
             else:
                 limits[one.name] = 0.0
-    found = changes([*series, *runs])
+    results = changes([*series, *runs])
     crossings = {
-        one.series.name: crossing(one.model, limits[one.series.name]) for one in found if one.series.name in limits
+        one.series.name: crossing(one.model, limits[one.series.name]) for one in results if one.series.name in limits
     }
     return {
-        "changes": found,
+        "changes": results,
         "limits": limits,
         "crossings": crossings,
         "findings": findings,
@@ -476,15 +478,15 @@ def _series(entries: Sequence[Entry], chosen: Sequence[str]) -> tuple[list[Serie
     for name in names:
         rows = [(entry, entry.values[name]) for entry in order if name in entry.values]
         good = [(entry, value) for entry, value in rows if value.status == "estimated"]
-        left = [f"{entry.day} ({value.status})" for entry, value in rows if value.status != "estimated"]
+        omitted = [f"{entry.day} ({value.status})" for entry, value in rows if value.status != "estimated"]
         for (a, _), (b, _) in pairwise(good):
             if a.moment == b.moment:
                 raise InputError(
                     f"{a.name} and {b.name}: both have {name} of {a.day}; give the times, too (T14:30), or leave one "
                     "of them out"
                 )
-        if good and left:
-            findings.append(Note(f"{name}: left out, as not determined by the record: {few(left, 6)}"))
+        if good and omitted:
+            findings.append(Note(f"{name}: left out, as not determined by the record: {few(omitted, 6)}"))
         if len(good) < 2:
             if good and len(order) > 1:
                 findings.append(Note(f"{name}: determined on {good[0][0].day} alone, so it has no history"))
@@ -595,7 +597,7 @@ def _frictions(entry: Entry) -> dict[str, str]:
     model = GmsFriction if entry.law == GMS else Friction
     return {
         f"machine.axes.{axis}.friction.{parameter}": f"{followed.value!r} {followed.unit}".removesuffix(" 1")
-        for (axis, _, parameter), followed in ((name.partition("."), each) for name, each in entry.values.items())
+        for (axis, _, parameter), followed in ((name.partition("."), value) for name, value in entry.values.items())
         if parameter in model.model_fields
     }
 

@@ -175,7 +175,7 @@ def _nothing(history: History) -> str:
     if not history.tested:
         return (
             f"No change can be named: of {many} between {first} and {last} there are fewer than {MIN_RECORDS} dates, "
-            "and two values do not tell a change from scatter between records."
+            "and two values may differ by scatter between records."
         )
     return (
         f"Nothing has changed beyond doubt: {many} between {first} and {last}; the chance of a false alarm is "
@@ -224,7 +224,7 @@ def _rival(change: Change) -> str:
         (True, 1): "a rate and a step",
         (False, 2): "two steps",
     }[change.rival.rate, len(change.rival.steps)]
-    return f"The dates do not tell this from {what}; another record does."
+    return f"The dates fit {what} about as well; another record decides."
 
 
 def _limit_sentence(history: History, change: Change) -> str:
@@ -496,16 +496,27 @@ def figures_of(history: History) -> Iterator[tuple[str, Figure]]:
         if one.model.steps:
             day = date_text(float(one.series.days[one.model.steps[-1]]))
             yield f"{name}.step", Figure(one.model.step_sizes()[-1][0], unit, f"last step of {name}, seen on {day}")
-    for each in history.scatters:
-        yield f"{each.name}.mean", Figure(each.mean, each.unit, f"mean of {each.name} over machines")
+    for machine_scatter in history.scatters:
         yield (
-            f"{each.name}.between",
-            Figure(each.between, each.unit, f"standard deviation of {each.name} between machines"),
+            f"{machine_scatter.name}.mean",
+            Figure(machine_scatter.mean, machine_scatter.unit, f"mean of {machine_scatter.name} over machines"),
         )
-        if math.isfinite(each.within):
+        yield (
+            f"{machine_scatter.name}.between",
+            Figure(
+                machine_scatter.between,
+                machine_scatter.unit,
+                f"standard deviation of {machine_scatter.name} between machines",
+            ),
+        )
+        if math.isfinite(machine_scatter.within):
             yield (
-                f"{each.name}.within",
-                Figure(each.within, each.unit, f"standard deviation of {each.name} within a machine"),
+                f"{machine_scatter.name}.within",
+                Figure(
+                    machine_scatter.within,
+                    machine_scatter.unit,
+                    f"standard deviation of {machine_scatter.name} within a machine",
+                ),
             )
 
 

@@ -214,6 +214,8 @@ def test_balanced_scatter_is_that_of_the_analysis_of_variance() -> None:
     assert found.mean == pytest.approx(value.mean())
     half = student.ppf(0.975, 5) * math.sqrt(np.var(value.mean(axis=1), ddof=1) / 6)
     assert found.half == pytest.approx(half, rel=1e-4)
+    further = math.sqrt(between + within + np.var(value.mean(axis=1), ddof=1) / 6)
+    assert 1.96 * found.predicted == pytest.approx(student.ppf(0.975, 5) * further, rel=1e-4)
 
 
 def test_scatter_is_near_that_of_restricted_maximum_likelihood() -> None:

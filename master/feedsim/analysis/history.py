@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, fdtrc
 
-from feedsim.estimation.interval import student
+from feedsim.estimation.interval import NORMAL_95, student
 
 Array = NDArray[np.float64]
 
@@ -500,7 +500,8 @@ class Scatter:
         mean, half: and half of its interval of 95 %. machines, records: how many.
         between, within: standard deviations; nan where no machine has two records. Their intervals are of 95 % (Q
             profile: W. Viechtbauer, Stat. Med. 26, 2007).
-        predicted: standard deviation of a value of a further machine.
+        predicted: standard deviation of a value of a further machine, of which 1.96 on either side are the prediction
+            interval of 95 % (J. Higgins et al., J. R. Stat. Soc. A 172, 2009): few machines make it wider.
     """
 
     name: str
@@ -546,7 +547,7 @@ def scatter(name: str, unit: str, machines: Sequence[tuple[Array, Array]]) -> Sc
         _profile(ones, means[0], deviations),
         within,
         within_interval,
-        math.sqrt(between2 + tau2 + variance),
+        math.sqrt(between2 + tau2 + variance) * student(len(machines) - 1) / NORMAL_95,
     )
 
 

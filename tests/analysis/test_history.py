@@ -195,7 +195,10 @@ def test_limits_that_are_passed_and_that_are_not_reached() -> None:
     assert crossing(wear, 0.95).state == "passed"
     assert crossing(wear, 0.95).day == pytest.approx(days[-1] / 2, rel=0.05)
     assert crossing(wear, 1.2).state == "never"
-    assert crossing(wear, 1.2, side=-1).state == "beyond"
+    assert crossing(wear, 0.8, side=1).state == "beyond"  # as a compensation that does not help from the first date on
+    gained = model(-0.1 + 0.2 * days / days[-1])
+    assert crossing(gained, 0.0, side=1).state == "passed"
+    assert crossing(gained, 0.0, side=1).day == pytest.approx(days[-1] / 2, rel=0.05)
     assert crossing(lost, 0.8).interval == (days[8], days[9])
     assert crossing(lost, 0.5).state == "never"
 

@@ -458,8 +458,13 @@ def _of_dates(
             else:
                 limits[one.name] = 0.0
     results = changes([*series, *runs])
+    # Against no compensation a figure is below 0 as long as that helps.
     crossings = {
-        one.series.name: crossing(one.model, limits[one.series.name]) for one in results if one.series.name in limits
+        one.series.name: crossing(
+            one.model, limits[one.series.name], 1 if one.series.name.endswith(page.COMPENSATED) else 0
+        )
+        for one in results
+        if one.series.name in limits
     }
     return {
         "changes": results,

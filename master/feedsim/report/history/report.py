@@ -17,7 +17,7 @@ from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, Crossing, 
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.report import formatting
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
-from feedsim.report.content import Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, plain_unit, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import finite, hashed, inputs_part, quantity, software
@@ -538,29 +538,24 @@ def report_of(history: History, figures: Mapping[str, Figure]) -> Report:
     heads, rows = _scatter_rows(history) if history.scatters else _change_rows(history)
     letters = "lrrlrrr" if history.scatters else "lrrrlrlrp"
     table = Table(letters, [_capital(head) for head in heads], [[code(row[0]), *map(typeset, row[1:])] for row in rows])
-    said = answers(history)
     if history.scatters:
         method = FLEET_METHOD
         subtitle = f"{counted(len(history.entries), 'result')} of {len(history.machines)} machines"
-        lead = [
-            f"{history.scatters[0].name} and {len(history.scatters) - 1} others over {len(history.machines)} machines."
-        ]
-        said = [*said[:2], *said[2:]] or lead
         next_step: Text = (
             "Use it for a further machine:\n",
-            code(f"feedsim identify friction LOG.csv --prior THIS_FOLDER/{FLEET}"),
+            code(f"feedsim identify friction LOG.csv --prior {FOLDER}/{FLEET}"),
         )
     else:
         method = METHOD.format(rate=100 * ERROR_RATE, tested=history.tested)
         subtitle = (
             " to ".join(date_text(edge) for edge in _span(history)) + f", {counted(len(history.entries), 'result')}"
         )
-        next_step = ("Add the next record:\n", code(f"feedsim history THIS_FOLDER/{VALUES} RESULT@DATE"))
+        next_step = ("Add the next record:\n", code(f"feedsim history {FOLDER}/{VALUES} RESULT@DATE"))
     pictures = [_picture(one, history) for one in history.ranked]
     return Report(
         "Scatter between machines" if history.scatters else "History",
         subtitle,
-        answer=said,
+        answer=answers(history),
         warnings=history.findings,
         tiles=_tiles(history),
         next_step=next_step,

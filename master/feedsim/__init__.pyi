@@ -13,6 +13,7 @@ from feedsim.jobs.diff import Overlay as Overlay
 from feedsim.jobs.diff import diff as diff
 from feedsim.jobs.export import export as export
 from feedsim.jobs.frf import frf as frf
+from feedsim.jobs.history import history as history
 from feedsim.jobs.identify import identify_friction as identify_friction
 from feedsim.jobs.identify_drive import identify_drive as identify_drive
 from feedsim.jobs.identify_modes import identify_modes as identify_modes

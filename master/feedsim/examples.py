@@ -1,4 +1,4 @@
-"""Scenarios, studies, machines, structures and notebooks that come along, and copies of them for the user to change.
+"""Scenarios, studies, machines, structures, histories and notebooks that come along, and copies for the user to change.
 
 May use: files, installation, signals, errors. Start reading at copy().
 """
@@ -25,6 +25,7 @@ _KINDS = {
     "study": "studies/*.yaml",
     "machine": "machines/*/machine.yaml",
     "structure": "structures/*/structure.yaml",
+    "history": "histories/*.csv",
     "notebook": "notebooks/*.ipynb",
 }
 _FOR_EDITORS = re.compile(r"# yaml-language-server: \$schema=(\S+)\n")  # a first line
@@ -36,7 +37,7 @@ class Example:
 
     Attributes:
         name: by which it is asked for.
-        kind: "scenario", "study", "machine", "structure" or "notebook".
+        kind: "scenario", "study", "machine", "structure", "history" or "notebook".
         file: what stands for it.
         about: its first sentence.
     """
@@ -129,7 +130,11 @@ def _asked(names: Iterable[str]) -> list[Example]:
     result: list[Example] = []
     for name in names:
         if not (
-            meant := [example for example in known if example.name == name.removesuffix(".yaml").removesuffix(".ipynb")]
+            meant := [
+                example
+                for example in known
+                if example.name == name.removesuffix(".yaml").removesuffix(".csv").removesuffix(".ipynb")
+            ]
         ):
             others = sorted({example.name for example in known})
             near = "".join(f", did you mean {other}?" for other in get_close_matches(name, others, 1))

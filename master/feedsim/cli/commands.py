@@ -36,6 +36,7 @@ COMMANDS = {
     "tune feedforward": "jobs.tune_feedforward:tune_feedforward",
     "tune proposals": "jobs.tune_proposals:tune_proposals",
     "diff": "jobs.diff:diff",
+    "history": "jobs.history:history",
     "compare": "jobs.compare:compare",
     "export": "jobs.export:export",
     "sweep": "jobs.sweep:sweep",

@@ -7,15 +7,21 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
 from feedsim import units
-from feedsim.errors import OutputError
+from feedsim.analysis.history import Scatter
+from feedsim.arguments import amount
+from feedsim.errors import InputError, OutputError
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.parameter import Prior
 from feedsim.fields import Quantity
+from feedsim.files.checked import read_group
+from feedsim.identify.parameters import PARAMETER_KINDS
 from feedsim.identify.read import Provenance, distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Balance, Estimate, Identification
@@ -86,6 +92,62 @@ def friction_yaml(identified: Identified, software: Mapping[str, str]) -> str:
     lines = {name: _line(estimates[name]) for name in model.model_fields if name in estimates}
     origin = _origin(identified, software)
     return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION_FILE, model=model)
+
+
+def fleet_yaml(axes: Mapping[str, Sequence[Scatter]], machines: Sequence[str]) -> str:
+    """Text of fleet.yaml: axis -> mean and scatter of its parameters over machines of one kind.
+
+    `deviation` is that of a value of a further machine: what identify friction --prior expects of it.
+    """
+    content: dict[str, Any] = {"machines": list(machines), "axes": {}}
+    for axis, scatters in axes.items():
+        content["axes"][axis] = {
+            one.name.partition(".")[2]: {
+                "mean": _quantity(one.mean, one.unit),
+                "deviation": _quantity(one.predicted, one.unit),
+                "between": _quantity(one.between, one.unit),
+                **({"within": _quantity(one.within, one.unit)} if math.isfinite(one.within) else {}),
+                "machines": one.machines,
+                "results": one.records,
+            }
+            for one in scatters
+        }
+    text: str = yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=FILE_COLUMNS)
+    head = "# Friction of machines of one kind, by feedsim history --machines; SI, motor side."
+    return f"{head}\n# To use: feedsim identify friction LOG.csv --prior fleet.yaml\n{text}"
+
+
+def read_fleet(path: Path | str) -> dict[str, Prior]:
+    """Axis -> what fleet.yaml has of its friction: means with the deviations of a further machine, uncorrelated.
+
+    Raises InputError: no such file, an entry that is none.
+    """
+    source = read_group(Path(path))
+    axes = source.data.get("axes")
+    if not isinstance(axes, dict) or not all(isinstance(group, dict) for group in axes.values()):
+        raise InputError(f"{path}: no group axes; a fleet.yaml of feedsim history --machines is needed")
+    result = {}
+    for axis, group in axes.items():
+        known: dict[str, tuple[float, float]] = {}
+        for name, entry in group.items():
+            where = f"{path}: axes.{axis}.{name}"
+            if name not in PARAMETER_KINDS:
+                raise InputError(f"{where}: no parameter of friction; there are {', '.join(PARAMETER_KINDS)}")
+            if not isinstance(entry, dict) or not {"mean", "deviation"} <= set(entry):
+                raise InputError(f"{where}: mean and deviation are needed")
+            unit = PARAMETER_KINDS[name].unit
+            try:
+                mean, deviation = (amount(entry[key], unit, f"1 {unit}") for key in ("mean", "deviation"))
+                PARAMETER_KINDS[name].check("the mean is", mean)
+            except (InputError, TypeError, ValueError) as error:
+                raise InputError(f"{where}: {error}") from None
+            if not deviation > 0:
+                raise InputError(f"{where}: deviation {entry['deviation']}; more than 0 is needed")
+            if name not in ("M_0", "J", "delay"):  # of the single machine and its control, not of the kind
+                known[name] = mean, deviation
+        values = np.array([mean for mean, _ in known.values()])
+        result[str(axis)] = Prior(tuple(known), values, np.diag([deviation**2 for _, deviation in known.values()]))
+    return result
 
 
 def constant_load_hint(identification: Identification) -> str:

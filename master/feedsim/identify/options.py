@@ -9,6 +9,7 @@ from pathlib import Path
 
 from feedsim import variables
 from feedsim.errors import InputError
+from feedsim.estimation.parameter import Prior
 from feedsim.identify.parameters import CONSTANT_SPEED, PARAMETER_KINDS, Kind, check_fixed, estimate
 from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
@@ -34,6 +35,7 @@ class Options:
         fallback: name -> SI value, for what the records do not determine: the friction of the machine so far.
         stages: 1 stationary friction, 2 pre-sliding.
         law: that is fitted.
+        fleet: what machines of the same kind have; None: not known.
         seed: of the random starts.
 
     Raises InputError: a lead or an inertia that is not above 0, a delay or a value of `hold` outside its range
@@ -51,6 +53,7 @@ class Options:
     fallback: Mapping[str, float] = field(default_factory=dict)
     stages: tuple[int, ...] = STAGES
     law: str = Friction.law
+    fleet: Prior | None = None
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -78,6 +81,7 @@ class Asked:
         delay: of the torque channel [s]; None: not said.
         estimated: "inertia", "delay", or both: to be estimated, whatever mapping and machine say.
         hold, free, stages, law: as in :class:`Options`.
+        fleets: axis -> what machines of the same kind have, as in :class:`Options`.
     """
 
     axis: str | None = None
@@ -90,6 +94,7 @@ class Asked:
     free: tuple[str, ...] = ()
     stages: tuple[int, ...] = STAGES
     law: str = Friction.law
+    fleets: Mapping[str, Prior] = field(default_factory=dict)
 
     def with_traces(self, sources: Sequence[Provenance], machine: Machine | None = None) -> Options:
         """What is known when the traces are read: this, else what their mapping says, else the machine.
@@ -112,6 +117,8 @@ class Asked:
             modes = checked_modes(machine)
             reason = f"J_tot of the modes of {machine.name}, whose flexibility is taken off the torque"
             J = estimate("J", modes.J_tot(axis), status="given", reason=reason)
+        if self.fleets and axis not in self.fleets:
+            raise InputError(f"the prior is of the axes {', '.join(self.fleets)}; the traces are of {axis}")
         friction = machine.shipped_frictions.get(axis) if machine is not None else None
         delays = {source.torque_delay for source in sources}
         of_mapping = delays.pop() if len(delays) == 1 and "delay" not in self.estimated else None
@@ -127,6 +134,7 @@ class Asked:
             fallback=_of_law(friction, self.law) if friction is not None else {},
             stages=self.stages,
             law=self.law,
+            fleet=self.fleets.get(axis),
         )
 
     def _axis(self, sources: Sequence[Provenance]) -> str:

@@ -230,6 +230,7 @@ def dynamic(
     delay: float | None = None,
     hold: Mapping[str, float] | None = None,
     free: Collection[str] = (),
+    fleet: Prior | None = None,
     I_P: float | None = None,
     progress: Progress | None = None,
 ) -> Dynamic:
@@ -245,6 +246,7 @@ def dynamic(
         J: inertia [kg.m2]; with a standard deviation it is refined, without it is held; None: estimated.
         delay: of the torque channel [s]; None: estimated.
         hold: name -> value that is not touched. free: what is usually held but is to be estimated (beta, v_log).
+        fleet: what machines of the same kind have; it counts for what stage 1 has not estimated with it already.
         I_P: lead [m/rad], for advice in micrometres.
         progress: is called with what is done and the share of the work that lies behind.
 
@@ -256,9 +258,9 @@ def dynamic(
     fine = models(records, law, without=without)
     if not fine:
         raise InputError("stage 2: nothing moves in " + ", ".join(record.name for record in records))
-    known = _known(fine, prior, J, delay, hold or {}, free)
+    known = _known(fine, prior, J, delay, hold or {}, free, fleet)
     weights = [_first_weights(model) for model in fine]
-    base = _base(known, law.names, prior is not None, delay is None)
+    base = _base(known, law.names, prior is not None or fleet is not None, delay is None)
     tell("start values", 0.1)
     search = Search(fine, known.prior, weights)
     states = np.zeros((len(fine), 2))
@@ -272,7 +274,7 @@ def dynamic(
     groups = [group for group in REFINEMENTS if set(group) <= set(law.names)]
     if WITHOUT_NEUTRAL & set(law.names):
         groups.append(("sigma_1",))  # once more: beside the usual spread it may not have shown
-    if prior is not None:
+    if prior is not None or fleet is not None:
         groups = [group for group in groups if LATE & set(group)]
     for k, group in enumerate(groups):
         tell("refinements", 0.4 + 0.48 * k / len(groups))
@@ -302,6 +304,7 @@ def _known(
     delay: float | None,
     hold: Mapping[str, float],
     free: Collection[str],
+    fleet: Prior | None,
 ) -> _Known:
     values = {**NO_EFFECT, "J": 0.0, "delay": delay if delay is not None else 0.0}
     fixed: dict[str, tuple[Status, str]] = {
@@ -358,6 +361,13 @@ def _known(
         if "v_log" not in hold and "v_log" not in free and typical > FAR_ABOVE * DEFAULT_SHAPES["v_log"]:
             values["v_log"] = typical / BEND
             fixed["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
+    if fleet is not None:
+        known = prior.correlation.names if prior is not None else ()
+        fleet = fleet.restricted([name for name in fleet.names if name not in known and name not in fixed])
+        starts = dict(zip(fleet.names, map(float, fleet.values), strict=True))
+        values |= {name: value for name, value in starts.items() if name not in ("F_C", "sigma_2")}
+        values["F_S"] = max(values["F_S"], values["F_C"])
+        priors.append(fleet)
     values.setdefault("sigma_0", 0.0)
     reported = tuple(name for one in priors for name in one.names)
     return _Known(values, Prior.joined(priors), reported, fixed, drift)

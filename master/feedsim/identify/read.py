@@ -179,6 +179,7 @@ class Provenance:
         torque_delay: by how much the torque is logged later than the position [s], as the mapping gives it. It is not
             taken out of the records.
         warnings: what a user should know.
+        day: on which it was recorded, ISO 8601; "" where the file has no date.
     """
 
     file: Path
@@ -193,6 +194,7 @@ class Provenance:
     inertia: float | None = None
     torque_delay: float | None = None
     warnings: tuple[str, ...] = ()
+    day: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +271,7 @@ def read_records(
         signs = checked(path, records, chosen.axis)
         unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
     warnings = (*recording.notes, *chosen.notes, *unread, *drive.warnings, *gaps, *signs)
-    return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
+    return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings, recording.day))
 
 
 def read_traces(
@@ -426,6 +428,7 @@ def _provenance(
     columns: Mapping[str, str],
     drive: _Drive,
     warnings: tuple[str, ...],
+    day: str,
 ) -> Provenance:
     inertia = mapping.inertia if mapping is not None else None
     if mapping is not None and mapping.mass is not None and drive.pitch is not None:
@@ -443,7 +446,13 @@ def _provenance(
         inertia=inertia,
         torque_delay=mapping.delay.torque if mapping is not None else None,
         warnings=warnings,
+        day=day,
     )
+
+
+def recording_day(sources: Sequence[Provenance]) -> str | None:
+    """On which the first of the files was recorded, ISO 8601; None where none has a date."""
+    return min((source.day for source in sources if source.day), default=None)
 
 
 def distinct(files: Sequence[Path]) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.parameter import Prior
 from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import Inertia, contradiction, inertia
 from feedsim.identify.magnitudes import check_estimates, check_inertia, check_size
@@ -28,6 +29,7 @@ from feedsim.identify.parameters import (
     FIXED,
     NO_EFFECT,
     PRE_SLIDING,
+    curve,
     estimate,
 )
 from feedsim.identify.plateaus import plateaus
@@ -105,6 +107,7 @@ USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
 # relative, standard deviations: a given inertia that is off by both is worth a warning
 INERTIA_MISMATCH, INERTIA_SIGMAS = 0.1, 4.0
 NOTHING_TOLD = Correlation((), np.zeros((0, 0)))
+FLEET_SHARE = 0.9  # of the fleet's standard deviation, from which on a value is the fleet's rather than the records'
 SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
 
 
@@ -253,7 +256,8 @@ class _Run:
         self.progress("stage 1: Stribeck curve", 0, 1)
         hold, free = self._held(CONSTANT_SPEED)
         try:
-            return stationary(result, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
+            stage = stationary(result, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
+            return stage if self.options.fleet is None else with_fleet(stage, self.options.fleet)
         except InputError as error:
             self.reasons[1] = str(error)
             self.warnings.append(f"no Stribeck curve: {error}")
@@ -290,6 +294,7 @@ class _Run:
                 delay=self.options.delay,
                 hold=hold,
                 free=free,
+                fleet=self.options.fleet,
                 I_P=self.options.I_P,
                 progress=lambda what, share: self.progress(f"stage 2: {what}", round(100 * share), 100),
             )
@@ -358,6 +363,8 @@ class _Run:
         for name in self.law.names:
             if name not in result:
                 result[name] = self._absent(name, result)
+        if self.options.fleet is not None:
+            result |= _of_fleet(self.options.fleet, result)
         if result["F_S"].value < result["F_C"].value:
             reason = "no rise towards rest is seen: the fit puts it below F_C"
             result["F_S"] = replace(
@@ -376,6 +383,10 @@ class _Run:
             return estimate(name, options.hold[name], status="held", reason="as asked for")
         if name in DEFAULT_SHAPES and name not in options.free:
             return estimate(name, DEFAULT_SHAPES[name], status="held", reason="usual value")
+        if options.fleet is not None and name in options.fleet.names:
+            at = options.fleet.names.index(name)
+            sigma = float(np.sqrt(options.fleet.covariance[at, at]))
+            return estimate(name, float(options.fleet.values[at]), sigma)
         if name in options.fallback:
             return held(options.fallback[name], "value of the machine file")
         if name in ("F_C", "F_S"):
@@ -395,6 +406,46 @@ class _Run:
         begin = perf_counter()
         yield
         self.seconds[step] = perf_counter() - begin
+
+
+def with_fleet(stage: Stationary, fleet: Prior) -> Stationary:
+    """Stage 1 with what machines of the same kind have: the Bayesian update of a linear model.
+
+    What may have drifted is in the intervals, not in the weights, as in stage 2: the fleet takes nothing off it.
+    """
+    names = stage.correlation.names
+    own = fleet.restricted(names)
+    if not own.names:
+        return stage
+    at = [names.index(name) for name in own.names]
+    weighed = stage.covariance - stage.drift
+    gain = weighed[:, at] @ np.linalg.inv(weighed[np.ix_(at, at)] + own.covariance)
+    rest = np.eye(len(names))
+    rest[:, at] -= gain
+    values = np.array([stage.estimates[name].value for name in names])
+    values = values + gain @ (own.values - values[at])
+    drift = rest @ stage.drift @ rest.T
+    covariance = rest @ weighed + drift
+    sigma = np.sqrt(np.diag(covariance))
+    moved = {
+        name: replace(stage.estimates[name], value=float(value), sigma=float(deviation))
+        for name, value, deviation in zip(names, values, sigma, strict=True)
+    }
+    matrix = Correlation(names, covariance / np.outer(sigma, sigma))
+    estimates = {**stage.estimates, **moved}
+    line = curve({name: one.value for name, one in estimates.items()}, stage.speeds)
+    return replace(stage, estimates=estimates, covariance=covariance, drift=drift, correlation=matrix, torque=line)
+
+
+def _of_fleet(fleet: Prior, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Estimates that are the fleet's, as the records add little to them: they are given rather than estimated."""
+    sigmas = dict(zip(fleet.names, map(float, np.sqrt(np.diag(fleet.covariance))), strict=True))
+    reason = "of the fleet: these records add little"
+    return {
+        name: replace(estimates[name], status="given", reason=reason)
+        for name, sigma in sigmas.items()
+        if name in estimates and estimates[name].status == "estimated" and estimates[name].sigma > FLEET_SHARE * sigma
+    }
 
 
 def begins(records: Sequence[Record]) -> list[float]:

@@ -14,9 +14,10 @@ from feedsim.analysis import Figure, Named
 from feedsim.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
+from feedsim.estimation.parameter import Prior
 from feedsim.files.columns import load_columns
 from feedsim.identify import STAGES, Asked, Estimate, Identification, Identified, named_apart, read_traces
-from feedsim.identify.friction_file import FRICTION_FILE
+from feedsim.identify.friction_file import FRICTION_FILE, read_fleet
 from feedsim.identify.parameters import PARAMETER_KINDS
 from feedsim.identify.stages import identify as identified_from
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, job, out
@@ -145,6 +146,15 @@ def identify_friction(
             group="what is known",
         ),
     ] = None,
+    prior: Annotated[
+        File | None,
+        Option(
+            "FLEET.yaml",
+            "what machines of the same kind have (feedsim history --machines): it counts as far as the traces leave a "
+            "parameter open",
+            group="what is known",
+        ),
+    ] = None,
     hold: Annotated[
         Pairs[Value],
         Option("NAME=VALUE,...", "parameters that keep a value, e.g. beta=1", many=True, group="what is known"),
@@ -201,10 +211,13 @@ def identify_friction(
     if law not in (laws := (Friction.law, *FRICTION_UNITS)):
         raise InputError(f"{spelt('law')} {law}: {' or '.join(laws)} is needed")
     kept_values = pairs("hold", hold, "NAME=VALUE is needed, for example beta=1 or v_log='3 rad/s'")
-    asked = _asked(axes, inertia, mass, delay, kept_values, listed(free), stages, law)
+    fleets = read_fleet(prior) if prior is not None else {}
+    asked = _asked(axes, inertia, mass, delay, kept_values, listed(free), stages, law, fleets)
     settings = _settings(inertia, mass, delay, kept_values, listed(free), stages)
     if law != Friction.law:
         settings["law"] = law
+    if prior is not None:
+        settings["prior"] = Path(prior).name
     unit = FRICTION_UNITS.get(law, FRICTION_ROLE.shipped)
     subject = load_subject(machine) if machine is not None else None
     described = subject.machine if subject is not None else None
@@ -216,7 +229,7 @@ def identify_friction(
     sources = tuple(entry.provenance for entry in recorded)
     known = asked.with_traces(sources, described)
     records = named_apart(recorded)
-    inputs = [*files, *([Path(columns)] if columns is not None else [])]
+    inputs = [*files, *(Path(file) for file in (columns, prior) if file is not None)]
     inputs += [file for _, file in subject.files] if subject is not None else []
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
     asked_for = [f"{name}={value}" for name, value in settings.items()]
@@ -242,6 +255,7 @@ def _asked(
     free: tuple[str, ...],
     stages: str | int | Sequence[int],
     law: str,
+    fleets: Mapping[str, Prior],
 ) -> Asked:
     """What the arguments say of the axis, as values. Raises InputError."""
     if inertia is not None and mass is not None:
@@ -273,6 +287,7 @@ def _asked(
         free=free,
         stages=_stages(stages),
         law=law,
+        fleets=fleets,
     )
 
 

@@ -70,6 +70,11 @@ class Table:
         """Where the columns are named, for messages: "file.csv:1"."""
         return f"{self.where}:{self.header_line}"
 
+    @property
+    def day(self) -> str:
+        """Of the first row, ISO 8601, as time stamps have it; "" where they have none."""
+        return next((read.day for read in self.dates.values() if isinstance(read, Stamps) and read.day), "")
+
     @cached_property
     def _indices(self) -> Mapping[str, int]:
         return {name: i for i, name in enumerate(self.names)}
@@ -246,7 +251,7 @@ def _dated(table: Table) -> Table:
     for i, name in enumerate(names):
         if (values := _whole(table, i)) is not None and not header_units[i] and (begin := epoch(name, values)):
             note = f"{table.where}: column {name!r} is taken as milliseconds since 1970; time counts from {begin} UTC"
-            dates[i] = Stamps(values - values[0], note)
+            dates[i] = Stamps(values - values[0], note, begin[:10])
             header_units[i] = "ms"
     if not dates:
         return table

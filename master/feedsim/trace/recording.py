@@ -77,6 +77,11 @@ class Recording:
                 )
         return values
 
+    @property
+    def day(self) -> str:
+        """On which it was recorded, ISO 8601, as its time stamps have it; "" where they have none."""
+        return self._table.day if self._table is not None else ""
+
     def _vector(self, name: str) -> Array:
         """InputError: no such column, a number that is not finite or too large."""
         values = self._columns.get(self.called(name) or name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -37,10 +38,14 @@ Order = Callable[[str, str, str], date]  # parts of a date -> the day; ValueErro
 
 @dataclass(frozen=True, eq=False)
 class Stamps:
-    """Seconds since the first stamp, and what a reader of the file should know."""
+    """Seconds since the first stamp, and what a reader of the file should know.
+
+    day: of the first stamp, ISO 8601; "" where the stamps have no date, or it is not clear.
+    """
 
     seconds: Array
     note: str
+    day: str = ""
 
 
 def is_stamp(cell: str) -> bool:
@@ -76,16 +81,29 @@ def stamps(cells: Sequence[str], lines: Sequence[int], where: str, name: str) ->
         )
     offsets = {zone: _offset(zone) for zone in set(zones)}
     clocks -= np.array([offsets[zone] for zone in zones])
+    day = ""
     if days[0]:
         numbers = _numbered(days, where, lines[0], name)
         whole = DAY * np.array([numbers[day] - numbers[days[0]] for day in days], dtype=np.float64) + clocks
+        day = _first_day(days, numbers)
     else:  # half a day back is midnight
         whole = clocks + DAY * np.cumsum(np.diff(clocks, prepend=clocks[0]) < -DAY / 2)
     seconds = (whole - whole[0]) + (parts - parts[0])
     note = f"{where}: time counts from the first stamp in column {name!r}, {cells[0]}"
     if (row := _check(seconds, cells, lines, where, name)) and not zones[0]:
         note += f"; in line {lines[row]} the clock goes on by an hour, as where summer time begins"
-    return Stamps(seconds, note)
+    return Stamps(seconds, note, day)
+
+
+def _first_day(days: Sequence[str], numbers: Mapping[str, int]) -> str:
+    """The first date, ISO 8601; "" where it alone does not show the order of its parts."""
+    if len(numbers) > 1:
+        return date.fromordinal(numbers[days[0]]).isoformat()
+    possible = set()
+    for order in _orders(days[0]):
+        with suppress(ValueError, KeyError):
+            possible.add(order(*re.split("[-/.]", days[0])))
+    return possible.pop().isoformat() if len(possible) == 1 else ""
 
 
 def _hour(match: re.Match[str]) -> int | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from feedsim.identify import Identified, friction_file
 from feedsim.identify.friction_file import FRICTION_FILE
+from feedsim.identify.read import recording_day
 from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.report.formatting import counted
 from feedsim.report.identify import stribeck_plots as quantities
@@ -34,6 +35,7 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
         "advice": list(identification.advice),
         "axis": identification.axis,
         "date": identified.date,
+        "recorded": recording_day(identified.sources),
         "lead": quantity(identification.I_P, "m/rad"),
         "parameters": {
             name: _estimate(estimate, identification.I_P) for name, estimate in identification.estimates.items()

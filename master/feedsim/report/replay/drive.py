@@ -14,6 +14,7 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note, Wrong
 from feedsim.identify import AxisLimits, Provenance
 from feedsim.identify.friction_file import interval_text, value_text
+from feedsim.identify.read import recording_day
 from feedsim.identify.result import Estimate
 from feedsim.replay.compare import Comparison
 from feedsim.replay.drive import DriveFound
@@ -397,6 +398,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
     return {
         "kind": "drive",
         "answer": answers(report),
+        "recorded": recording_day(report.sources),
         "settings": dict(report.settings),
         "axes": {
             axis: {

@@ -9,6 +9,7 @@ from typing import Any
 
 from feedsim.analysis import Figure
 from feedsim.identify import Provenance
+from feedsim.identify.read import recording_day
 from feedsim.replay.compare import Comparison
 from feedsim.report.changes import change_lines, changes_part, changes_section
 from feedsim.report.content import Report, Section, Table, Tile, code, tile_value, typed
@@ -131,6 +132,7 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     return {
         "kind": "replay",
         "answer": answers(replayed),
+        "recorded": recording_day(replayed.sources),
         "machine": machine_part(replayed.subject.machine),
         "settings": dict(replayed.settings),
         "window": [quantity(float(time[0]), "s"), quantity(float(time[-1]), "s")],

@@ -153,9 +153,9 @@ def facts(text: str) -> dict[str, list[str]]:
             add(f"peak {peak[1]}", value)
         elif "circular deviation G" in label:
             add("G", value)
-    for value in re.findall(r"circular deviation G (\S+) µm", said):
+    for value in re.findall(r"G = (\S+) µm", said):
         add("G", value)
-    for axis, value in re.findall(r"(\w) (?:stays behind|jumps ahead) for a moment where it reverses, (\S+) µm", said):
+    for axis, value in re.findall(r"reversal peaks of (\w) \((\S+) µm", said):
         add(f"peak {axis}", value)
     for axis, value in re.findall(r'"text":"([XYZ])[+−]: (\S+) µm"', text):
         add(f"peak {axis}", value)

@@ -14,9 +14,11 @@ from feedsim import units
 from feedsim.analysis.circularity import Turn
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.files.columns import Columns
 from feedsim.files.regular import json_file
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
+from feedsim.trace.recording import mapped
 
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
@@ -72,12 +74,15 @@ class Source:
         return list(dict.fromkeys(name.partition(".")[0] for name in self.signals))
 
 
-def read_sources(paths: Sequence[Path]) -> list[Source]:
-    """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such."""
+def read_sources(paths: Sequence[Path], mappings: Sequence[Columns] = ()) -> list[Source]:
+    """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such.
+
+    mappings: which columns of the files, those of feedsim aside, are what.
+    """
     sources, problems = [], []
     for path, name in zip(paths, named_apart(paths), strict=True):
         try:
-            sources.append(_read(path, name))
+            sources.append(_read(path, name, mappings))
         except InputError as error:
             problems += list(error.problems)
     if problems:
@@ -95,7 +100,7 @@ def named_apart(paths: Sequence[Path]) -> list[str]:
     return [f"{path} ({k})" for k, path in enumerate(paths, 1)]
 
 
-def _read(path: Path, name: str) -> Source:
+def _read(path: Path, name: str, mappings: Sequence[Columns]) -> Source:
     curves = path / RESULT if path.is_dir() else path
     if path.is_dir() and not curves.is_file():
         raise InputError(
@@ -103,6 +108,8 @@ def _read(path: Path, name: str) -> Source:
             "(FOLDER:17, FOLDER:max=FIGURE) is needed"
         )
     recording = read_recording(curves)
+    if curves.name != RESULT:
+        recording = mapped(recording, mappings)
     if (clock := recording.clock()) is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
     column, factor = clock

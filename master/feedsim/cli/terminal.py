@@ -215,7 +215,8 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         if options.json is True:
             print(json_of(result, out))
         elif not options.quiet:
-            wrong = [WRONG + finding for finding in findings[:1] if severity(finding) == "wrong"]
+            both = sys.stdout is not None and sys.stdout.isatty() and sys.stderr.isatty()  # it stands there already
+            wrong = [WRONG + finding for finding in findings[:1] if severity(finding) == "wrong" and not both]
             for line in (*(painted(text, "red", sys.stdout) for text in wrong), *_lines(result, options.verbose, out)):
                 print(line)
         if sys.stdout is not None:
@@ -234,7 +235,18 @@ def _lines(result: Any, verbose: bool, out: Any) -> Iterator[str]:
     own = isinstance(result, Result)
     yield from map(visible, result.lines_shown(verbose) if own else result.answers)
     if (place := getattr(result, "place", None) or out) is not None:
+        if own and (step := _next_step(Path(place))):
+            yield from map(visible, (f"Next: {step['words']}:", f"  {step['command']}"))
         yield visible(f"-> {Path(place) / result.main_file if own else place}")
+
+
+def _next_step(folder: Path) -> dict[str, str]:
+    """What the summary of a result says to do next; {} where it says nothing."""
+    try:
+        content = json.loads((folder / "summary.json").read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return content.get("next", {}) if isinstance(content, dict) else {}
 
 
 def _plain_lines(result: Any) -> list[str]:

@@ -15,7 +15,7 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note
 from feedsim.modal.rational import MOTOR, AxisModes
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, tile_value
+from feedsim.report.content import FOLDER, Paragraph, Report, Section, Step, Table, Text, Tile, tile_value
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
@@ -144,6 +144,10 @@ def report_of(report: ModesReport) -> Report:
                                       hashed(_files(report))),
         footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES_FILE}.",
                               "docs/replay.md"),
+        next_step=Step("See the drive on this structure", "frf",
+                       {"subject": report.subject.file, "axes": axis_modes.axis, "measure": False,
+                        "set": [*report.subject.overrides, "machine.structure=null",
+                                f"machine.modes={FOLDER}/{MODES_FILE}"]}),
     )  # fmt: skip
 
 

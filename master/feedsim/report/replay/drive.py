@@ -24,7 +24,7 @@ from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.replay.moving_lines import in_words
 from feedsim.replay.rivals import ERROR_RATE
 from feedsim.replay.tuning import OtherCycle, decision
-from feedsim.report.content import FOLDER, Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import FOLDER, Paragraph, Report, Section, Step, Table, Text, Tile, code, tile_value
 from feedsim.report.control import asked, control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
@@ -274,7 +274,11 @@ def report_of(report: DriveReport) -> Report:
         warnings=report.warnings,
         notes=report.notes,
         answer=answers(report),
-        next_step=("Hold it against another record:\n", code(f"feedsim replay OTHER_RECORD --machine {FOLDER}")),
+        next_step=Step(
+            "Replay the record on it; another record in its place shows how far it holds",
+            "replay",
+            {"machine": FOLDER, "axes": ",".join(drives), "set": None},
+        ),
         tiles=[
             Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()

@@ -12,7 +12,7 @@ from feedsim.identify import Provenance
 from feedsim.identify.read import recording_day
 from feedsim.replay.compare import Comparison
 from feedsim.report.changes import change_lines, changes_part, changes_section
-from feedsim.report.content import Report, Section, Table, Tile, code, tile_value, typed
+from feedsim.report.content import Report, Section, Step, Table, Tile, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
@@ -84,10 +84,7 @@ def report_of(replayed: Replayed) -> Report:
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
         answer=answers(replayed),
         tiles=list(_tiles(replayed.figures)),
-        next_step=(
-            "Identify the drives from the record:\n",
-            code(f"feedsim identify drive {typed(replayed.sources[0].file)} --machine {typed(replayed.subject.file)}"),
-        ),
+        next_step=Step("Identify the drives from the record", "identify drive"),
         main=[
             *pictures,
             figures_section(replayed.figures),

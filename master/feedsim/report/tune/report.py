@@ -14,11 +14,12 @@ from feedsim.control import Name, names_of
 from feedsim.findings import Note, Wrong
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
-from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import Paragraph, Report, Section, Step, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.style import AFTER, BEFORE, NARROW, remarked
+from feedsim.report.tune.drive import new_values
 from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, Judged, amplitude
@@ -236,6 +237,7 @@ def report_of(judged: Judged) -> Report:
         ],
         provenance=sections.provenance_section(rows_, input_files(judged.scenario)),
         footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
+        next_step=Step("Run with these values", "run", new_values(judged.scenario)) if judged.found.values else None,
     )
 
 

@@ -266,10 +266,25 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
         sections = [text for text in rest if not text.startswith("Command line:")]
         at = next((i for i, text in enumerate(sections) if text.startswith(("Raises", ">>>"))), len(sections))
         sections.insert(at, "Args:\n" + "\n".join(lines))
+        # Options belong to the command line: help() and editors show types alone.
+        plain = [
+            entry.replace(annotation=_Shown(read_annotation(str(entry.annotation))[0].replace("File", "str | Path")))
+            for entry in signature.parameters.values()
+        ]
+        called.__signature__ = signature.replace(  # type: ignore[attr-defined]
+            parameters=plain, return_annotation=_Shown(signature.return_annotation)
+        )
         called.__doc__ = function.__doc__ = "\n\n".join([summary, *sections])
         return called  # type: ignore[return-value]
 
     return documented
+
+
+class _Shown(str):
+    """A type as text, which signatures show without quotation marks."""
+
+    def __repr__(self) -> str:
+        return str(self)
 
 
 def _parameters(signature: inspect.Signature) -> list[Parameter]:

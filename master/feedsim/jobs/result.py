@@ -120,11 +120,14 @@ class Result(ABC):
         """All pictures of the report."""
         return tuple(self.report().pictures)
 
-    def plot(self) -> Picture:
-        """The main picture of the report. A notebook shows it; ``.save("circle.png")`` writes it. Raises InputError."""
+    def plot(self, *, ax: Any = None) -> Any:
+        """The main picture of the report. A notebook shows it; ``.save("circle.png")`` writes it. Raises InputError.
+
+        ax: axes of matplotlib, one or several, that it is drawn on, a panel on each; then they are returned.
+        """
         if not self.pictures:
             raise InputError(f"a result of kind {self.kind} has no picture")
-        return self.pictures[0]
+        return self.pictures[0] if ax is None else self.pictures[0].on(ax)
 
     def save(
         self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""

@@ -37,7 +37,6 @@ from feedsim.report import run as report
 from feedsim.report.content import Report
 from feedsim.report.formatting import shown, typeset
 from feedsim.report.partial import Partial
-from feedsim.report.picture import Picture
 from feedsim.report.results import Content
 from feedsim.report.run.files import summary
 from feedsim.report.run.report import HEADER, is_leading, leading
@@ -156,14 +155,15 @@ class RunResult(JudgedRun, Result):
         """A recorded signal in SI units, such as ``result["Z.x_a"]``."""
         return self.trace[name]
 
-    def plot(self, *signals: str) -> Picture:
+    def plot(self, *signals: str, ax: Any = None) -> Any:
         """The main picture of the report, or signals over time: ``result.plot("Z.x_a", "Z.M_fr")``, also "Z.*".
 
-        A notebook shows it; ``.save("circle.png")`` or ``.save("circle.svg")`` writes it.
+        A notebook shows it; ``.save("circle.png")`` or ``.save("circle.svg")`` writes it. ax: axes of matplotlib, one
+        or several, that it is drawn on, a panel on each; then they are returned.
         """
-        if signals:
-            return signals_picture(self.trace.select(signals), self.scenario.name)
-        return self.pictures[0] if self.pictures else signals_picture(self.trace.select(["*.x_a"]), self.scenario.name)
+        asked = signals or (() if self.pictures else ("*.x_a",))
+        shown = signals_picture(self.trace.select(asked), self.scenario.name) if asked else self.pictures[0]
+        return shown if ax is None else shown.on(ax)
 
     def to_pandas(self) -> pandas.DataFrame:
         """All recorded signals over time [s]; their units are in ``.attrs["units"]``. Needs the package pandas."""

@@ -253,7 +253,7 @@ def _moved(sizes: Mapping[str, float]) -> list[str]:
 
 
 FORMAT = 1
-MOST_DIFFERING = 3  # parameters that are named outside of the table
+MOST_DIFFERING, MOST_LISTED = 3, 20  # parameters that are named in the answer, and by the command
 LEAST_CHANGE = 0.05  # [%] of a figure, below which it has not changed
 BAND = 1e-6  # [m] about the target, within which an axis has settled
 # Figures whose change comes first, by what stands behind the last dot, with their names in words.
@@ -285,9 +285,9 @@ def lines(sources: Sequence[Source]) -> list[str]:
     """What the command says: what has changed, parameters that differ, how all was aligned."""
     rows = differing(sources)
     said = _changes(sources)
-    said += [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:MOST_DIFFERING]]
-    if len(rows) > MOST_DIFFERING:
-        said.append(f"and {len(rows) - MOST_DIFFERING} parameters more, in the report")
+    said += [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:MOST_LISTED]]
+    if len(rows) > MOST_LISTED:
+        said.append(f"and {len(rows) - MOST_LISTED} parameters more, in the report")
     said += [
         f"{source.name} is aligned {source.aligned}" for source in sources if source.aligned and not source.figures
     ]

@@ -100,12 +100,18 @@ def test_a_link_opens_what_it_leads_to(browser: Any, kinds: Kinds) -> None:
     page.close()
 
 
-def test_paper_has_all_of_it(browser: Any, kinds: Kinds, tmp_path: Path) -> None:
+def test_paper_has_the_first_screen_and_what_is_unfolded(browser: Any, kinds: Kinds) -> None:
     page = opened(browser, kinds.page("circle"), 1200, 900)
-    page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert page.locator("details:not([open])").count() == 0
-    page.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert page.locator("details.fold[open]").count() == 0
+    unfolded = page.locator("details.fold[open] h2").all_inner_texts()
+    assert unfolded == ["What to change"]
+    folded = page.locator("details.fold:not([open])")
+    assert folded.count() > 4
+    page.emulate_media(media="print")
+    assert not any(folded.nth(k).is_visible() for k in range(folded.count()))
+    assert page.locator("p.answer").first.is_visible()
+    folded.first.evaluate("each => { each.open = true; }")
+    assert page.locator("details.fold[open]").count() == 2
+    assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4"))) <= 3
     page.close()
 
 

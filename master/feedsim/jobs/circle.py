@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from feedsim.analysis import Diagnosis, Figure, Named
 from feedsim.analysis.circle import diagnose, further
-from feedsim.analysis.circle.changed import Change, changed
+from feedsim.analysis.circle.changed import Change
 from feedsim.analysis.circle.records import SAME_FEED, RecordedCircle, read_circle
 from feedsim.analysis.circularity import axis_letters
 from feedsim.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
@@ -58,7 +58,7 @@ class CircleResult(Result):
     @property
     def changes(self) -> Sequence[Change]:
         """What the records after a change show of every cause; none without them."""
-        return [] if self.after is None else changed(self.diagnosis, self.after.diagnosis)
+        return [] if self.after is None else page.changes_of(self._taken, self.after._taken)
 
     @property
     def findings(self) -> Sequence[str]:
@@ -104,7 +104,7 @@ class CircleResult(Result):
         content = page.summary(self.recorded, self.diagnosis, self.figures, self.inputs, names)
         if self.after is None:
             return content
-        changes = page.changes_part(self.diagnosis, self.after.diagnosis)
+        changes = page.changes_part(self._taken, self.after._taken)
         return {**content, "answer": list(self.answers), "changed": changes}
 
 
@@ -199,14 +199,14 @@ def circle(
         result = taken(files, r)
         if later:
             own = result.recorded.circle  # its radius counts for both: files of positions do not have it
-            other = taken(later, own.radius)
-            if abs(other.recorded.circle.speed / own.speed - 1) > SAME_FEED:
+            second = taken(later, own.radius)
+            if abs(second.recorded.circle.speed / own.speed - 1) > SAME_FEED:
                 raise InputError(
-                    f"{spelt('after')}: the feed is {6e4 * other.recorded.circle.speed:.4g} mm/min, that of the "
+                    f"{spelt('after')}: the feed is {6e4 * second.recorded.circle.speed:.4g} mm/min, that of the "
                     f"records before {6e4 * own.speed:.4g} mm/min; allowed: {100 * SAME_FEED:g} % apart, as peaks and "
                     "lags grow with it"
                 )
-            result = replace(result, after=other)
+            result = replace(result, after=second)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result

@@ -45,7 +45,7 @@ def changes_section(
     ]
     heads = ("Cause", "Axis", "Parameter", "Present", "Proposed", "In the control", "Why", "Margins")
     further = _further(proposals, typed(scenario)) if scenario is not None and scenario.suffix != ".ssp" else None
-    return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes")
+    return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes", unfolded=True)
 
 
 def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:

@@ -137,11 +137,13 @@ class Animation:
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Parts under a title; a section inside another one is a step lower. anchor: the title's id, for links."""
+    """Parts under a title; a section inside another one is a step lower. anchor: the title's id, for links. unfolded:
+    whether the page shows it open at first."""
 
     title: str
     parts: Sequence[Part | None]
     anchor: str = ""
+    unfolded: bool = False
 
 
 Part = Paragraph | Bullets | Table | Picture | Animation | Section

@@ -278,7 +278,7 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
                 if mapping.pitch is None:
                     raise InputError(f"{mapping.where(role)}: is in {own}; for {unit} the mapping needs the pitch")
                 per_turn = mapping.pitch / (2 * np.pi)
-                values = values * per_turn if own.startswith("rad") else values / per_turn
+                values = np.asarray(values * (per_turn if own.startswith("rad") else 1 / per_turn), dtype=np.float64)
             columns[name.format(mapping.axis)] = values
             known[name.format(mapping.axis)] = unit
     if "time" in columns:

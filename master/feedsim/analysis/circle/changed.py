@@ -6,11 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scipy.stats import norm
+import numpy as np
+from scipy.stats import norm, t
 
 from feedsim.analysis.circle.diagnosis import Diagnosis, Term
+from feedsim.analysis.circle.geometry import TurnedPath
+from feedsim.analysis.figures import Array
 
 SET_UP = ("offset", "drift", "centres", "radii")  # they are of the measurement, and differ from record to record
+BIN, NEAR = 10.0, 20.0  # [deg] of a mean; from an axis, within which peaks stand
 LEVEL = 0.95  # at which no cause of the circle is named that has not changed
 
 
@@ -34,12 +38,17 @@ class Change:
         return self.after.value - self.before.value
 
 
-def changed(before: Diagnosis, after: Diagnosis) -> list[Change]:
+def changed(
+    before: Diagnosis, after: Diagnosis, turns: Sequence[TurnedPath] = (), later: Sequence[TurnedPath] = ()
+) -> list[Change]:
     """Every cause that both records determine, those first that have changed beyond doubt, by what they make of G.
 
-    The interval of a difference of two records is that of two independent estimates. Of m causes each is held to
-    1 - (1 - 0.95)/m (C. E. Bonferroni, 1936), so that in 95 of 100 pairs none is named that has not changed.
+    turns, later: the turns of both records. What the fits leave of both alike, errors of the machine that no cause
+    makes, is no doubt about a difference: intervals are those of two estimates, times the share of what is left that
+    differs (:func:`differing_share`). Of m causes each is held to 1 - (1 - 0.95)/m (C. E. Bonferroni, 1936), so that in
+    95 of 100 pairs none is named that has not changed.
     """
+    share = differing_share(before, after, turns, later)
     terms = {(term.key, term.axis, term.order): term for term in after.terms}
     pairs: list[tuple[Term, Term]] = [
         (term, terms[key])
@@ -50,9 +59,47 @@ def changed(before: Diagnosis, after: Diagnosis) -> list[Change]:
     wider = norm.ppf(1 - (1 - LEVEL) / (2 * max(len(pairs), 1))) / norm.ppf(0.5 + LEVEL / 2)
     changes = []
     for one, other in pairs:
-        half = math.hypot(one.half, other.half)
+        half = share * math.hypot(one.half, other.half)
         changes.append(Change(one, other, half, bool(abs(other.value - one.value) > wider * half)))
     return sorted(changes, key=lambda change: (not change.sure, -abs(change.after.size - change.before.size)))
+
+
+def differing_share(
+    before: Diagnosis, after: Diagnosis, turns: Sequence[TurnedPath], later: Sequence[TurnedPath]
+) -> float:
+    """What is left of the difference of two records over what is left of both, from 0 to 1; 1 where it is not known.
+
+    Means over BIN degrees stand for what acts on causes, which are slow; those about the reversals, where peaks stand
+    over the rest, are left out. Student's quantile stands in for how well so few means know it.
+    """
+    means = {}
+    for which, diagnosis, paths in (("before", before, turns), ("after", after, later)):
+        rest = dict(zip(diagnosis.senses, diagnosis.rest, strict=True))
+        means[which] = {path.sense: _means(path, *rest[path.sense]) for path in paths if path.sense in rest}
+    senses = [sense for sense in means["before"] if sense in means["after"]]
+    if not senses:
+        return 1.0
+    one, other = (np.concatenate([means[which][sense] for sense in senses]) for which in ("before", "after"))
+    known = np.isfinite(one) & np.isfinite(other)
+    free = int(known.sum()) - 1
+    both = float(np.var(one[known]) + np.var(other[known])) if free > 4 else 0.0
+    if both <= 0:
+        return 1.0
+    share = math.sqrt(float(np.var((other - one)[known])) / both)
+    return min(1.0, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))
+
+
+def _means(path: TurnedPath, angle: Array, rest: Array) -> Array:
+    """Means over BIN degrees of what the fit leaves of a turn [m]; NaN near the axes, and where nothing is recorded."""
+    about = np.argsort(angle % (2 * math.pi))
+    own = path.angle % (2 * math.pi)
+    left = path.deviation - np.interp(own, (angle % (2 * math.pi))[about], rest[about], period=2 * math.pi)
+    degrees = np.degrees(own)
+    far = np.abs((degrees + 45) % 90 - 45) > NEAR
+    bins = (degrees / BIN).astype(int) % round(360 / BIN)
+    count = np.bincount(bins[far], minlength=round(360 / BIN))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(count > 0, np.bincount(bins[far], left[far], minlength=round(360 / BIN)) / count, math.nan)
 
 
 def named(changes: Sequence[Change]) -> list[Change]:

@@ -197,11 +197,17 @@ class Taken:
     files: Sequence[Path]
 
 
+def changes_of(before: Taken, after: Taken) -> list[Change]:
+    """Every cause before and after, those first that have changed beyond doubt."""
+    turns, later = ([turn.path for turn in taken.recorded.turns] for taken in (before, after))
+    return changed(before.diagnosis, after.diagnosis, turns, later)
+
+
 def answers_of_both(before: Taken, after: Taken) -> list[str]:
     """What has changed beyond doubt, and why the circle is not round now."""
     one, other = before.diagnosis, after.diagnosis
     prefix = axis_letters(one.circle.axes)
-    sure = named(changed(one, other))
+    sure = named(changes_of(before, after))
     said = f"changed beyond doubt: {'; '.join(map(_change_words, sure))}" if sure else NOTHING_CHANGED
     G = f"G = {two(1e6 * one.G)} um before, {two(1e6 * other.G)} um after"
     return [f"{prefix}: {G}; {said}.", f"After: {answer(other)}"]
@@ -216,7 +222,7 @@ def lines_of_both(before: Taken, after: Taken) -> list[str]:
 def report_of_both(before: Taken, after: Taken) -> Report:
     """Content of the report of records before and after a change."""
     prefix = axis_letters(before.recorded.circle.axes)
-    changes = changed(before.diagnosis, after.diagnosis)
+    changes = changes_of(before, after)
     files = [*before.files, *after.files]
     tiles = [
         Tile(f"{two(1e6 * before.diagnosis.G)} → {two(1e6 * after.diagnosis.G)} µm", TILES["G"], "of all turns"),
@@ -335,7 +341,7 @@ def _facts(recorded: RecordedCircle) -> list[tuple[str, str]]:
     ]
 
 
-def changes_part(before: Diagnosis, after: Diagnosis) -> list[dict[str, Any]]:
+def changes_part(before: Taken, after: Taken) -> list[dict[str, Any]]:
     """What has changed, as summary.json has it, in SI."""
     return [
         {
@@ -345,7 +351,7 @@ def changes_part(before: Diagnosis, after: Diagnosis) -> list[dict[str, Any]]:
             "half_interval": finite(change.half),
             "beyond_doubt": change.sure,
         }
-        for change in changed(before, after)
+        for change in changes_of(before, after)
     ]
 
 

@@ -226,8 +226,8 @@ def report_of(judged: Judged) -> Report:
         notes=notes,
         tiles=tiles,
         main=[
-            *pictures,
             _values(judged),
+            *pictures,
             _effects(judged, figures),
             _errors(
                 "Circles not used for tuning", judged.held_out, judged.held_errors, judged, judged.held_frictionless
@@ -249,7 +249,8 @@ def _values(judged: Judged) -> Section | None:
     if not lines:
         return None
     heads = ("Axis", "Number", "Name in the control", "Old", "New", "Unit", "Unit confirmed", "Parameter")
-    return Section("Values to type", [Table("lllrrlll", heads, lines), Paragraph(LIMITS_UNKNOWN + ".", "muted")])
+    table = Table("lllrrlll", heads, lines)
+    return Section("Values to type", [table, Paragraph(LIMITS_UNKNOWN + ".", "muted")], unfolded=True)
 
 
 def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:

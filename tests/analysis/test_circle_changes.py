@@ -48,7 +48,7 @@ def test_changes_of_ten_percent_are_named_where_they_are_beyond_doubt_and_only_t
         draw = rng.uniform
         before = Causes(
             delay=(draw(0.2e-3, 1e-3), 0.0), squareness=draw(20e-6, 80e-6), scale=(draw(20e-6, 80e-6), 0.0),
-            lost=(draw(2e-6, 6e-6), draw(1e-6, 4e-6)), noise=draw(0.1e-6, 1e-6),
+            lost=(draw(2e-6, 6e-6), draw(1e-6, 4e-6)), noise=draw(0.05e-6, 0.4e-6),
         )  # fmt: skip
         after = change(before, 1.1 if k % 2 else 0.9)
         waves = np.column_stack([draw(0, 0.3e-6, 4), draw(0, 6, 4)])
@@ -67,4 +67,4 @@ def test_changes_of_ten_percent_are_named_where_they_are_beyond_doubt_and_only_t
     assert held >= 0.95 * asked
     assert false_pairs <= 0.05 * PAIRS
     assert told == clear
-    assert clear > 0.3 * PAIRS
+    assert clear > 0.2 * PAIRS

@@ -64,7 +64,7 @@ def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     assert (process.returncode, process.stderr) == (0, "")
     first, of_axis, trust, last = process.stdout.splitlines()
     assert ": The control loops are stable; least gain margin " in first
-    assert first.endswith("At least the usual 6 dB and 30 deg: while the axes move, no gain need be lowered.")
+    assert first.endswith("All loops meet 6 dB and 30 deg. No gain needs to be reduced.")
     assert "without friction" in trust
     assert "Measured against closed form" in trust
     assert last == f"-> {Path('out') / 'report.html'}"

@@ -80,6 +80,9 @@ def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, 
     folds = page.locator("details.fold")
     assert folds.count() > 3
     for fold in folds.all():
+        if fold.locator("h2").first.inner_text() == "What to change":
+            assert fold.evaluate("each => each.open")  # what to do is not folded
+            continue
         assert fold.evaluate("each => !each.open")
         fold.locator("summary").first.focus()
         page.keyboard.press("Enter")
@@ -177,7 +180,7 @@ def test_a_fact_has_one_value(name: str, kinds: Kinds) -> None:
     found = facts(kinds.page(name).read_text(encoding="utf-8"))
     assert {"G", "peak X", "peak Z"} <= set(found)
     for fact, values in found.items():
-        assert len(values) >= 3, fact
+        assert len(values) >= 2, fact
         for value in values[1:]:
             assert agree(values[0], value.rstrip(",")), (fact, values)
 

@@ -14,6 +14,8 @@ from feedsim.analysis.circle.geometry import TurnedPath
 from feedsim.analysis.figures import Array
 
 SET_UP = ("offset", "drift", "centres", "radii")  # they are of the measurement, and differ from record to record
+# A peak that stands out of one record and not of the other moves what else is fitted, which means do not show.
+LEAST_SHARE = 0.5
 BIN, NEAR = 10.0, 20.0  # [deg] of a mean; from an axis, within which peaks stand
 LEVEL = 0.95  # at which no cause of the circle is named that has not changed
 
@@ -48,7 +50,7 @@ def changed(
     differs (:func:`differing_share`). Of m causes each is held to 1 - (1 - 0.95)/m (C. E. Bonferroni, 1936), so that in
     95 of 100 pairs none is named that has not changed.
     """
-    share = differing_share(before, after, turns, later)
+    share, free = differing_share(before, after, turns, later)
     terms = {(term.key, term.axis, term.order): term for term in after.terms}
     pairs: list[tuple[Term, Term]] = [
         (term, terms[key])
@@ -56,7 +58,7 @@ def changed(
         if (key := (term.key, term.axis, term.order)) in terms and term.key not in ("rest", "offset")
         and term.determined and terms[key].determined
     ]  # fmt: skip
-    wider = norm.ppf(1 - (1 - LEVEL) / (2 * max(len(pairs), 1))) / norm.ppf(0.5 + LEVEL / 2)
+    wider = t.ppf(1 - (1 - LEVEL) / (2 * max(len(pairs), 1)), free) / t.ppf(0.5 + LEVEL / 2, free)
     changes = []
     for one, other in pairs:
         half = share * math.hypot(one.half, other.half)
@@ -66,11 +68,12 @@ def changed(
 
 def differing_share(
     before: Diagnosis, after: Diagnosis, turns: Sequence[TurnedPath], later: Sequence[TurnedPath]
-) -> float:
-    """What is left of the difference of two records over what is left of both, from 0 to 1; 1 where it is not known.
+) -> tuple[float, float]:
+    """What is left of the difference of two records over what is left of both, from 0 to 1, and its degrees of freedom.
 
-    Means over BIN degrees stand for what acts on causes, which are slow; those about the reversals, where peaks stand
-    over the rest, are left out. Student's quantile stands in for how well so few means know it.
+    1 and infinity where it is not known. Means over BIN degrees stand for what acts on causes, which are slow; those
+    about the reversals, where peaks stand over the rest, are left out. Student's quantile stands in for how well so few
+    means, of which the causes have been fitted, know it.
     """
     means = {}
     for which, diagnosis, paths in (("before", before, turns), ("after", after, later)):
@@ -78,15 +81,15 @@ def differing_share(
         means[which] = {path.sense: _means(path, *rest[path.sense]) for path in paths if path.sense in rest}
     senses = [sense for sense in means["before"] if sense in means["after"]]
     if not senses:
-        return 1.0
+        return 1.0, math.inf
     one, other = (np.concatenate([means[which][sense] for sense in senses]) for which in ("before", "after"))
     known = np.isfinite(one) & np.isfinite(other)
-    free = int(known.sum()) - 1
+    free = int(known.sum()) - len(before.terms)
     both = float(np.var(one[known]) + np.var(other[known])) if free > 4 else 0.0
     if both <= 0:
-        return 1.0
+        return 1.0, math.inf
     share = math.sqrt(float(np.var((other - one)[known])) / both)
-    return min(1.0, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))
+    return min(1.0, max(LEAST_SHARE, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))), float(free)
 
 
 def _means(path: TurnedPath, angle: Array, rest: Array) -> Array:

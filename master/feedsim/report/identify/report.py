@@ -306,6 +306,10 @@ def _next(identified: Identified) -> Step:
     )
 
 
+def _residual(percent: float) -> str:
+    return "<0.001 %" if percent < 1e-3 else f"{percent:.2g} %"
+
+
 def answers(identification: Identification) -> list[str]:
     """How well friction is known, what the records leave open, and what to do next."""
     lines = []
@@ -313,7 +317,7 @@ def answers(identification: Identification) -> list[str]:
         alone = "" if identification.prior else " by stage 1 alone"
         lines.append(
             f"Friction over speed is known to +-{100 * quantities.curve_error(stage):.2g} % (95 %){alone}; "
-            f"no plateau is further from the curve than {100 * stage.worst_curve:.2g} %."
+            f"largest residual of a plateau: {_residual(100 * stage.worst_curve)}."
         )
     if identification.dynamic is not None:
         lines.append(f"The model leaves {identification.dynamic.rms:.3g} N.m rms of the recorded friction torque.")

@@ -141,6 +141,9 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     }
 
 
+SAME = 1e-6  # [um] of a position, below which records show nothing but rounding
+
+
 def answers(replayed: Replayed) -> list[str]:
     """What is left, a line per axis."""
     lines = []
@@ -152,8 +155,11 @@ def answers(replayed: Replayed) -> list[str]:
                 f"{own['position_rms']} rms, {own['position_largest']} at most"
             )
             continue
-        text = f"{comparison.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
-        text += f" ({own['share_of_lag']} of the lag)"
+        if own["position_largest"].value < SAME:
+            text = f"{comparison.axis}: position the same to the last digit"
+        else:
+            text = f"{comparison.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
+            text += f" ({own['share_of_lag']} of the lag)"
         text += f"; torque {own['torque_rms']} rms" if "torque_rms" in own else "; no torque is recorded"
         if "speed_setpoint_rms" in own:
             text += f"; speed setpoint {own['speed_setpoint_rms']} rms"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -126,13 +127,19 @@ def answers(judged: Judged) -> list[str]:
     """What the compensation does to circles that it was not found on."""
     figures = figures_of(judged)
     where = f"{judged.plane[0]}-{judged.plane[1]}"
+    median, worst, of_friction, worst_of_it = (
+        _percent(figures[f"held_out.{name}"]) for name in ("median", "worst", "friction_median", "friction_worst")
+    )
     return [
-        f"{where}: {WORDS[judged.found.kind]} of {', '.join(judged.axes)} takes off {figures['held_out.median']} of "
-        f"the error at the reversals (median of {len(judged.held_out)} other circles), at least "
-        f"{figures['held_out.worst']}; of the part that friction makes {figures['held_out.friction_median']}, at least "
-        f"{figures['held_out.friction_worst']}.",
+        f"{where}: reversal errors fall by {median} (median of {len(judged.held_out)} test circles; worst {worst}) "
+        f"with {WORDS[judged.found.kind]} of {', '.join(judged.axes)}. The part that friction makes "
+        f"falls by {of_friction} (worst {worst_of_it}).",
         *_drawn_answer(judged),
     ]
+
+
+def _percent(figure: Figure) -> str:
+    return f"{figure.value:.2g} %" if math.isfinite(figure.value) else "an unknown share"
 
 
 def _drawn_answer(judged: Judged) -> list[str]:

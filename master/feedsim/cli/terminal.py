@@ -288,11 +288,12 @@ See it work
   feedsim run xz_circle.yaml                   a circle, why it is not round, and a report
 
 Find out why a measured circle is not round
-  feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
+  feedsim example ballbar log                  copies sample records, synthetic ones
+  feedsim circle records/ballbar/before_ccw.csv records/ballbar/before_cw.csv --axes X,Y
 
 Rebuild a machine from its records
-  feedsim identify drive capture.json --axes X,Y --out results/my_machine
-  feedsim replay capture.json --machine results/my_machine
+  feedsim identify drive records/log/log.csv --columns records/log/columns.yaml --axes Z --out results/my_machine
+  feedsim replay records/log/log.csv --columns records/log/columns.yaml --axes Z --machine results/my_machine
 
 Try a change before it is made
   feedsim run xz_circle.yaml --set machine.axes.X.drive.K_v="5 (m/min)/mm" --out results/faster

@@ -20,7 +20,7 @@ from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
 from feedsim.trace.recording import mapped
 
-SHOWN = 12  # digits of a digest
+DIGEST_DIGITS = 12  # digits of a digest
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
 COMPARED_SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
@@ -170,7 +170,7 @@ def _flat(name: str, value: Any) -> dict[str, str]:
         if set(value) == {"value", "unit"}:
             return {name: f"{value['value']:.9g} {value['unit']}" if value["value"] is not None else "none"}
         return {key: text for part, entry in value.items() for key, text in _flat(f"{name}.{part}", entry).items()}
-    return {name: str(value)[:SHOWN] if name.endswith(".sha256") else str(value)}
+    return {name: str(value)[:DIGEST_DIGITS] if name.endswith(".sha256") else str(value)}
 
 
 def differing(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:

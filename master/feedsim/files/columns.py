@@ -41,7 +41,7 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
     "feedforward": ("rad/s", "m/s"),
 }
 # The same of records of circles alone: angle and radius of a ballbar, or what its radius deviates by.
-OF_CIRCLES: dict[str, tuple[str, ...]] = {"angle": ("rad",), "radius": ("m",), "radial_deviation": ("m",)}
+CIRCLE_DIMENSIONS: dict[str, tuple[str, ...]] = {"angle": ("rad",), "radius": ("m",), "radial_deviation": ("m",)}
 DRIVING = ("torque", "current", "force")
 
 
@@ -53,7 +53,7 @@ def resulting(unit: str, factor_unit: str) -> units.Unit:
 
 def target_of(role: str, given: units.Unit) -> str:
     """SI unit that a role's values in unit `given` are converted to. InputError: it is no unit of that role."""
-    known = (DIMENSIONS | OF_CIRCLES)[role]
+    known = (DIMENSIONS | CIRCLE_DIMENSIONS)[role]
     for target in known:
         if units.unit(target).dimension == given.dimension:
             return target
@@ -246,7 +246,7 @@ def contradictions(columns: Columns) -> Iterator[tuple[Place, str]]:
         yield ("mass",), "stands beside inertia; give one of the two"
     if columns.torque_constant is not None and columns.current is None and given:
         yield ("torque_constant",), f"is of no use: the trace's {given[0]} is taken, not a current"
-    for role in DIMENSIONS | OF_CIRCLES:
+    for role in DIMENSIONS | CIRCLE_DIMENSIONS:
         yield from _of_signal(role, clock if role == "time" else columns.signal(role))
 
 
@@ -264,7 +264,9 @@ def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place
         text = f"{signal.unit} times {factor}: " if signal.factor is not None else f"{signal.unit}: "
         hint = ""
         if units.unit(spelled(signal.unit)).dimension == units.unit("1").dimension:
-            hint = f"; give the factor of one unit, for example factor: 0.001 {(DIMENSIONS | OF_CIRCLES)[role][0]}"
+            hint = (
+                f"; give the factor of one unit, for example factor: 0.001 {(DIMENSIONS | CIRCLE_DIMENSIONS)[role][0]}"
+            )
         yield (role, "unit"), f"{text}{error}{hint}"
         return
     if getattr(signal, "at", None) == "scale" and target.startswith("rad"):

@@ -379,7 +379,7 @@ def declared(command: str) -> Declaration:
 
 
 # What belongs to the call itself: a further one writes elsewhere, and says for itself what it leaves.
-OWN = ("out", "figures", "force", "page", "uncertain", "kind", "name", "note", "report", "junit")
+OWN_ARGUMENTS = ("out", "figures", "force", "page", "uncertain", "kind", "name", "note", "report", "junit")
 
 
 def command_line(call: Call, command: str, arguments: Mapping[str, Any]) -> str:
@@ -387,7 +387,7 @@ def command_line(call: Call, command: str, arguments: Mapping[str, Any]) -> str:
 
     "" where an argument cannot be typed: a result at a prompt, in place of its folder.
     """
-    given = {key: value for key, value in call.arguments.items() if key not in OWN and key not in arguments}
+    given = {key: value for key, value in call.arguments.items() if key not in OWN_ARGUMENTS and key not in arguments}
     plan = given.get("scenario", given.get("subject"))
     if plan is not None and hasattr(plan, "overrides"):  # a scenario that is loaded
         given |= {"set": plan.overrides, "scenario": plan.file}

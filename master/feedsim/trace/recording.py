@@ -261,11 +261,11 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
         clock = mapping.time
         if clock.interval is not None:
             first = next(name for role in MAPPED_NAMES if (one := mapping.signal(role)) for name in [one.column])
-            columns["time"] = clock.interval * np.arange(len(recording.read([first])[first]))
+            columns["time"] = clock.interval * np.arange(len(recording.read([first])[first]), dtype=np.float64)
         elif clock.column is not None:
             columns["time"] = _scaled(recording, "time", clock.column, clock.unit, clock.factor)
-        elif (found := recording.clock()) is not None:
-            columns["time"] = recording.read([found[0]])[found[0]] * found[1]
+        elif (known_clock := recording.clock()) is not None:
+            columns["time"] = recording.read([known_clock[0]])[known_clock[0]] * known_clock[1]
         for role, (name, unit) in MAPPED_NAMES.items():
             signal = mapping.signal(role)
             if signal is None:

@@ -97,7 +97,7 @@ NEUTRAL_SHARE, NEUTRAL = 0.02, 20e-6
 FITS = 0.1
 # Margins that a proposed gain keeps.
 GAIN_MARGIN, PHASE_MARGIN = 8.0, 40.0  # [dB], [deg]
-SHORTEST, AS_SHORT = "shortest with", "as short as"  # how reasons begin that hold for any drive
+SHORTEST_REASON, SHORT_REASON = "shortest with", "as short as"  # how reasons begin that hold for any drive
 OUT_OF_LINE = 1.25  # a value that differs more from those of the other axes is taken for one that is off
 MIN_RESET_TIME = 1e-3  # T_n [s] below which none is proposed
 USUAL_RESET_RATIO = 2.0  # T_n over J/K_p that usual margins allow: the integral part takes 27 degrees at the crossover
@@ -105,7 +105,7 @@ RESET_HALVINGS = 6  # of halving the range of T_n on a logarithmic scale: 3 % of
 
 
 COMPENSATION = "drive.friction_pulse"  # stands for a friction compensation of any kind
-WORDS = {
+PARAMETER_WORDS = {
     COMPENSATION: "friction compensation", "path.jerk": "jerk of the path",
     "drive.backlash_compensation.value": "backlash compensation",
 }  # fmt: skip
@@ -144,7 +144,7 @@ class Proposal:
     @property
     def what(self) -> str:
         """Parameter and axis in words: "T_sym of Z"."""
-        name = WORDS.get(self.parameter, self.parameter.removeprefix("drive."))
+        name = PARAMETER_WORDS.get(self.parameter, self.parameter.removeprefix("drive."))
         return f"{name} of {self.axis}" if self.axis else name
 
     @property
@@ -200,7 +200,7 @@ def _modelled(machine: Machine, modes: Modes, axis: str, cause: str) -> Iterator
 def _rank(proposal: Proposal) -> int:
     if proposal.parameter == COMPENSATION:
         return 1
-    return 2 if proposal.reason.startswith((SHORTEST, AS_SHORT)) else 0
+    return 2 if proposal.reason.startswith((SHORTEST_REASON, SHORT_REASON)) else 0
 
 
 def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -> list[Proposal]:
@@ -477,22 +477,24 @@ def _out_of_line(machine: Machine, modes: Modes, axis: str, drive: Drive, cause:
     ]  # fmt: skip
     if not others or drive.K_v <= 0 or drive.K_p <= 0:
         return
-    found = []
+    proposals = []
     usual = max(ratio(name, own) for name, own in others)
     if drive.T_n is not None and ratio(axis, drive) > OUT_OF_LINE * usual:
         T_n = drive.T_n * usual / ratio(axis, drive)
         reason = "as long beside J/K_p as those of the other axes"
-        found.append(Proposal(cause, axis, "drive.T_n", drive.T_n, T_n, "s", reason, "lower"))
+        proposals.append(Proposal(cause, axis, "drive.T_n", drive.T_n, T_n, "s", reason, "lower"))
     K_v = min(own.K_v for _, own in others)
     if K_v > OUT_OF_LINE * drive.K_v:
-        found.append(Proposal(cause, axis, "drive.K_v", drive.K_v, K_v, "1/s", "as the other axes have it", "higher"))
-    before = least_margins(judge(machine, modes), axis) if found else (math.inf, math.inf)
+        proposals.append(
+            Proposal(cause, axis, "drive.K_v", drive.K_v, K_v, "1/s", "as the other axes have it", "higher")
+        )
+    before = least_margins(judge(machine, modes), axis) if proposals else (math.inf, math.inf)
 
     def response(proposal: Proposal) -> float:
         name = proposal.parameter.removeprefix("drive.")
         return torque_response(drive.model_copy(update={name: proposal.proposed}))
 
-    for proposal in sorted(found, key=response):
+    for proposal in sorted(proposals, key=response):
         value = {proposal.parameter.removeprefix("drive."): proposal.proposed}
         after = least_margins(judge(changed(machine, axis, value), modes), axis)  # type: ignore[arg-type]
         if after[0] >= GAIN_MARGIN and after[1] >= PHASE_MARGIN:
@@ -511,10 +513,10 @@ def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
     """A shorter T_n: the integral part answers friction sooner, as far as margins allow."""
     if not drive.speed_integrator or drive.T_n is None or drive.T_n <= MIN_RESET_TIME:
         return
-    reason = f"{SHORTEST} {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
+    reason = f"{SHORTEST_REASON} {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
     if not searched:
         margins = f"{GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg"
-        reason = f"{AS_SHORT} margins of {margins} allow; feedsim tune proposals finds the value"
+        reason = f"{SHORT_REASON} margins of {margins} allow; feedsim tune proposals finds the value"
         yield Proposal(cause, axis, "drive.T_n", drive.T_n, None, "s", reason, "lower")
         return
     before = least_margins(judge(machine, modes), axis)

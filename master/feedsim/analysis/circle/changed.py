@@ -15,8 +15,8 @@ from feedsim.analysis.figures import Array
 
 SET_UP = ("offset", "drift", "centres", "radii")  # they are of the measurement, and differ from record to record
 # A peak that stands out of one record and not of the other moves what else is fitted, which means do not show.
-LEAST_SHARE = 0.5
-BIN, NEAR = 10.0, 20.0  # [deg] of a mean; from an axis, within which peaks stand
+LEAST_DIFFERING_SHARE = 0.5
+BIN_WIDTH, PEAK_REACH = 10.0, 20.0  # [deg] of a mean; from an axis, within which peaks stand
 LEVEL = 0.95  # at which no cause of the circle is named that has not changed
 
 
@@ -71,7 +71,7 @@ def differing_share(
 ) -> tuple[float, float]:
     """What is left of the difference of two records over what is left of both, from 0 to 1, and its degrees of freedom.
 
-    1 and infinity where it is not known. Means over BIN degrees stand for what acts on causes, which are slow; those
+    1 and infinity where it is not known. Means over BIN_WIDTH stand for what acts on causes, which are slow; those
     about the reversals, where peaks stand over the rest, are left out. Student's quantile stands in for how well so few
     means, of which the causes have been fitted, know it.
     """
@@ -89,20 +89,21 @@ def differing_share(
     if both <= 0:
         return 1.0, math.inf
     share = math.sqrt(float(np.var((other - one)[known])) / both)
-    return min(1.0, max(LEAST_SHARE, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))), float(free)
+    return min(1.0, max(LEAST_DIFFERING_SHARE, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))), float(free)
 
 
 def _means(path: TurnedPath, angle: Array, rest: Array) -> Array:
-    """Means over BIN degrees of what the fit leaves of a turn [m]; NaN near the axes, and where nothing is recorded."""
+    """Means over BIN_WIDTH of what the fit leaves of a turn [m]; NaN near the axes, and where nothing is recorded."""
     about = np.argsort(angle % (2 * math.pi))
     own = path.angle % (2 * math.pi)
-    left = path.deviation - np.interp(own, (angle % (2 * math.pi))[about], rest[about], period=2 * math.pi)
+    remainder = path.deviation - np.interp(own, (angle % (2 * math.pi))[about], rest[about], period=2 * math.pi)
     degrees = np.degrees(own)
-    far = np.abs((degrees + 45) % 90 - 45) > NEAR
-    bins = (degrees / BIN).astype(int) % round(360 / BIN)
-    count = np.bincount(bins[far], minlength=round(360 / BIN))
+    far = np.abs((degrees + 45) % 90 - 45) > PEAK_REACH
+    bins = (degrees / BIN_WIDTH).astype(int) % round(360 / BIN_WIDTH)
+    count = np.bincount(bins[far], minlength=round(360 / BIN_WIDTH))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(count > 0, np.bincount(bins[far], left[far], minlength=round(360 / BIN)) / count, math.nan)
+        means = np.bincount(bins[far], remainder[far], minlength=round(360 / BIN_WIDTH)) / count
+        return np.asarray(np.where(count > 0, means, math.nan), dtype=np.float64)
 
 
 def named(changes: Sequence[Change]) -> list[Change]:

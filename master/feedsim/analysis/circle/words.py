@@ -112,7 +112,7 @@ def described(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
                 f"an ellipse along {'+' if value > 0 else '-'}45 deg of {_um(amount)} amplitude: servo mismatch "
                 f"({late} lags {early} by {_two(delay)} ms) or squareness "
                 f"({_digits(2 * amount / diagnosis.circle.radius * 1e6)} um/m)"
-            ), "record the other direction, which tells the two apart"
+            ), "record the other direction; it separates the two"
         case "lost_motion" if value > 0:
             return f"lost motion of {axis} ({_um(amount)}), caused by backlash or wind-up", "backlash compensation"
         case "lost_motion":

@@ -55,7 +55,7 @@ function described(diagnosis, term) {
     case "squareness_or_servo": {
       const delay = 2 * amount / diagnosis.circle.speed * 1e3, [late, early] = diagnosis.senses[0] * value > 0 ? [first, second] : [second, first];
       return [`an ellipse along ${value > 0 ? "+" : "-"}45 deg of ${in_um(amount)} amplitude: servo mismatch (${late} lags ${early} by ${two(delay)} ms) or squareness `
-        + `(${three(2 * amount / diagnosis.circle.radius * 1e6)} um/m)`, "record the other direction, which tells the two apart"];
+        + `(${three(2 * amount / diagnosis.circle.radius * 1e6)} um/m)`, "record the other direction; it separates the two"];
     }
     case "lost_motion": return value > 0 ? [`lost motion of ${axis} (${in_um(amount)}), caused by backlash or wind-up`, "backlash compensation"]
       : [`${axis} gains ${in_um(amount)} where it reverses, caused by too much backlash compensation, or friction at rest`, "less backlash compensation"];

@@ -225,9 +225,9 @@ def _interval(sigma: float) -> str:
 def answers(report: ModesReport) -> list[str]:
     """What was found, and how near it is."""
     axis_modes = report.found
-    found = [f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} % damping)" for m in axis_modes.fit.modes]
-    count = {0: "no mode", 1: "one mode", 2: "two modes", 3: "three modes"}.get(len(found), f"{len(found)} modes")
-    modes = f"{count}{': ' if found else ''}{' and '.join(filter(None, [', '.join(found[:-1]), *found[-1:]]))}"
+    words = [f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} % damping)" for m in axis_modes.fit.modes]
+    count = {0: "no mode", 1: "one mode", 2: "two modes", 3: "three modes"}.get(len(words), f"{len(words)} modes")
+    modes = f"{count}{': ' if words else ''}{' and '.join(filter(None, [', '.join(words[:-1]), *words[-1:]]))}"
     remaining, scatter = (
         "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} deg" for name, (db, deg) in of.items())
         for of in (axis_modes.deviations, axis_modes.scatter)

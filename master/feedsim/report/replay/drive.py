@@ -284,7 +284,7 @@ def report_of(report: DriveReport) -> Report:
             *(
                 Tile(_value(one.estimates[name]), f"{axis}: {name}, ± {_half(one.estimates[name])}", typeset(what))
                 for axis, one in drives.items()
-                for name, what in SHOWN.items()
+                for name, what in LEADING_PARAMETERS.items()
                 if name in one.estimates and one.estimates[name].status == "estimated"
             ),
         ]
@@ -468,7 +468,7 @@ def _limits_part(limits: AxisLimits | None) -> dict[str, Any] | None:
 
 
 # What is named first of a drive, as far as a record determines it.
-SHOWN = {
+LEADING_PARAMETERS = {
     "K_v": "gain of the position loop", "T_sym": "symmetry filter", "F_C": "Coulomb friction", "J": "inertia",
 }  # fmt: skip
 
@@ -492,7 +492,7 @@ def answers(report: DriveReport) -> list[str]:
         one = report.found.drives[comparison.axis]
         own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
         torque = f", its torque to {own['torque_rms']}" if "torque_rms" in own else ""
-        known = [one.estimates[name] for name in SHOWN if name in one.estimates]
+        known = [one.estimates[name] for name in LEADING_PARAMETERS if name in one.estimates]
         known = [estimate for estimate in known if estimate.status == "estimated"]
         values = ", ".join(f"{estimate.name} {_value(estimate)} +-{_half(estimate)}" for estimate in known)
         count = sum(estimate.status == "estimated" for estimate in one.estimates.values())

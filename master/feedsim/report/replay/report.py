@@ -141,7 +141,7 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     }
 
 
-SAME = 1e-6  # [um] of a position, below which records show nothing but rounding
+SAME_POSITION = 1e-6  # [um] of a position, below which records show nothing but rounding
 
 
 def answers(replayed: Replayed) -> list[str]:
@@ -155,7 +155,7 @@ def answers(replayed: Replayed) -> list[str]:
                 f"{own['position_rms']} rms, {own['position_largest']} at most"
             )
             continue
-        if own["position_largest"].value < SAME:
+        if own["position_largest"].value < SAME_POSITION:
             text = f"{comparison.axis}: position the same to the last digit"
         else:
             text = f"{comparison.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from command_helpers import feedsim
 from feedsim.analysis import evaluate
+from feedsim.arguments import Call, calling
 from feedsim.jobs.identify import IdentifyResult
+from feedsim.jobs.parameters import command_line
 from feedsim.report import run as report
 from identification_helpers import identified
 from report_helpers import circle_run, positioning_run
@@ -72,10 +74,12 @@ class Kinds:
         if (place / "report.html").exists():
             return place
         if kind == "identify":
-            IdentifyResult(identified()).save(place)
+            with calling(Call({}, command_line)):
+                IdentifyResult(identified()).save(place)
         elif kind in ("circle", "stop"):
             run = circle_run() if kind == "circle" else positioning_run()
-            report.write(run, evaluate(run), place)
+            with calling(Call({"scenario": run.scenario}, command_line)):
+                report.write(run, evaluate(run), place)
         else:
             needs, words = COMMANDS[kind]
             for each in needs:

@@ -83,6 +83,11 @@ def test_every_extra_brings_its_modules(extra: str) -> None:
     assert set(packages(extra)) == set(extras.EXTRAS[extra])
 
 
+def test_the_wheel_alone_runs_scenarios() -> None:
+    plain = {re.split(r"[\[>=]", text)[0] for text in PROJECT["dependencies"]}
+    assert set(extras.EXTRAS["run"]) <= plain
+
+
 def test_all_brings_what_commands_need() -> None:
     needed = {module for command in LEAVES.values() for extra in command.needs for module in extras.EXTRAS[extra]}
     assert needed | {"pyuff", "xlsxwriter", "h5py"} == set(packages("all"))

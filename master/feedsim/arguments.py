@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,6 +45,39 @@ def spelt(name: str) -> str:
     return f"--{name.replace('_', '-')}" if _AS_OPTIONS.get() else name
 
 
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A call of a job.
+
+    Attributes:
+        arguments: by their names, as they were given.
+        typed: of a command and arguments that differ, the command line that takes the others along.
+        units: argument -> unit of the numbers that it was read as.
+    """
+
+    arguments: Mapping[str, Any]
+    typed: Callable[[Call, str, Mapping[str, Any]], str]
+    units: dict[str, str] = field(default_factory=dict)
+
+
+_CALL: ContextVar[Call | None] = ContextVar("call", default=None)
+
+
+def call() -> Call | None:
+    """The call of a job that is going on; None outside of jobs."""
+    return _CALL.get()
+
+
+@contextmanager
+def calling(of: Call | None) -> Iterator[None]:
+    """A block that belongs to a call."""
+    before = _CALL.set(of)
+    try:
+        yield
+    finally:
+        _CALL.reset(before)
+
+
 @contextmanager
 def given(name: str, value: object) -> Iterator[None]:
     """Put argument and value in front of the message of an InputError that the block raises: "--delay 3 kg: ..."."""
@@ -55,6 +89,8 @@ def given(name: str, value: object) -> Iterator[None]:
 
 def quantity(name: str, value: Value, unit: str, example: str = "", *, positive: bool = False) -> float:
     """The value of an argument in `unit`; a number has that unit already. positive: above 0. Raises InputError."""
+    if (present := call()) is not None:
+        present.units[name] = unit
     with given(name, value):
         return amount(value, unit, example, positive=positive)
 
@@ -101,6 +137,8 @@ def by_name(name: str, values: Mapping[str, V], read: Callable[[str, V], T]) -> 
 
 def lengths(name: str, values: Mapping[str, Value], example: str, *, positive: bool = False) -> dict[str, float]:
     """Axis -> length [m]. Raises InputError as :func:`by_name`."""
+    if (present := call()) is not None:
+        present.units[name] = "m"
     return by_name(name, values, lambda _, value: amount(value, "m", example, positive=positive))
 
 

@@ -47,6 +47,23 @@ class InputError(FeedsimError):
         return cls("\n  ".join((f"{what}: {len(result)} problems", *result)), result)
 
 
+class UnknownName(InputError, KeyError):
+    """A figure or a signal that there is not; the message names the nearest one.
+
+    >>> import feedsim as fs
+    >>> result = fs.run("z_positioning.yaml")
+    >>> for names, wrong in ((result.figures, "Z.overshot"), (result, "Z.x_b")):
+    ...     try:
+    ...         names[wrong]
+    ...     except fs.InputError as error:
+    ...         print(type(error).__name__, error)
+    UnknownName no figure 'Z.overshot'; did you mean 'Z.overshoot'?
+    UnknownName no column 'Z.x_b'; did you mean 'Z.x_s'?
+    """
+
+    __str__ = Exception.__str__  # a KeyError would show its message in quotation marks
+
+
 class SimulationError(FeedsimError):
     """A simulation unit failed or the coupled run is not usable.
 

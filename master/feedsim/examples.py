@@ -1,4 +1,4 @@
-"""Scenarios, studies, machines, structures, histories and notebooks that come along, and copies for the user to change.
+"""Scenarios, studies, machines, structures, histories, records and notebooks that come along, and copies to change.
 
 May use: files, installation, signals, errors. Start reading at copy().
 """
@@ -26,8 +26,10 @@ _KINDS = {
     "machine": "machines/*/machine.yaml",
     "structure": "structures/*/structure.yaml",
     "history": "histories/*.csv",
+    "record": "records/*/columns.yaml",
     "notebook": "notebooks/*.ipynb",
 }
+_IN_FOLDERS = ("machine", "structure", "record")
 _FOR_EDITORS = re.compile(r"# yaml-language-server: \$schema=(\S+)\n")  # a first line
 
 
@@ -37,7 +39,7 @@ class Example:
 
     Attributes:
         name: by which it is asked for.
-        kind: "scenario", "study", "machine", "structure", "history" or "notebook".
+        kind: "scenario", "study", "machine", "structure", "history", "record" or "notebook".
         file: what stands for it.
         about: its first sentence.
     """
@@ -56,7 +58,7 @@ def examples() -> list[Example]:
     """
     root = shipped("scenarios")
     result = [
-        Example(file.parent.name if kind in ("machine", "structure") else file.stem, kind, file, _about(file))
+        Example(file.parent.name if kind in _IN_FOLDERS else file.stem, kind, file, _about(file))
         for kind, pattern in _KINDS.items()
         for file in sorted(root.glob(pattern))
     ]
@@ -152,7 +154,7 @@ def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
         if file in result:
             continue
         result[file] = None
-        if file.name in ("machine.yaml", "structure.yaml"):
+        if file.name in ("machine.yaml", "structure.yaml") or file.match(_KINDS["record"]):
             waiting += [other for other in file.parent.iterdir() if other.is_file()]
         if file.suffix == ".yaml":
             waiting += _schema(file)

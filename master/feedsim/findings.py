@@ -9,7 +9,12 @@ from collections.abc import Iterable
 
 
 class Wrong(str):
-    """A figure, a file or a verdict is wrong, or worse than none: nobody may read the result without this."""
+    """A figure, a file or a verdict is wrong, or worse than none: nobody may read the result without this.
+
+    setting: KEY=VALUE, as behind ``--set``, with which it would be right; "": not known.
+    """
+
+    setting = ""
 
 
 class Note(str):

@@ -39,8 +39,9 @@ def scenario_file(tmp_path: Path) -> Path:
 def test_run_writes_results_and_one_line(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
     done = feedsim_process("run", scenario_file, "--out", tmp_path / "out", fmus=fmus, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    first, last = done.stdout.splitlines()
+    first, _, command, last = done.stdout.splitlines()
     assert first.startswith("short move: ")
+    assert command.startswith("  feedsim ")
     assert last == f"-> {tmp_path / 'out' / 'report.html'}"
     assert {"result.csv", "summary.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
     header = (tmp_path / "out" / "result.csv").read_text(encoding="utf-8").splitlines()[0]

@@ -56,8 +56,9 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Pa
 def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
-    second, last = process.stdout.splitlines()
+    second, _, command, last = process.stdout.splitlines()
     assert last == f"-> {Path('out') / 'report.html'}"
+    assert command.startswith("  feedsim tune compensation ")
     assert second.startswith("  G 8.19 -> 0.8")
     numbers = re.findall(r"-> (\S+) um", second)
     assert len(numbers) == 3

@@ -22,7 +22,7 @@ def test_python_and_the_command_line_have_the_same_words(command: Command) -> No
     """The signature as Python reads it is the declaration that the command line read from the source."""
     if command.name not in OF_THE_TERMINAL:
         assert command.job().__name__ in fs.__all__
-    signature = inspect.signature(command.job()).parameters.values()
+    signature = inspect.signature(inspect.unwrap(command.job())).parameters.values()
     options = {entry.name: read_annotation(str(entry.annotation))[1] for entry in signature}
     assert {p.name: p.option for p in command.options} == {k: v for k, v in options.items() if v is not None}
     assert not {p.name for p in command.options} & set(COMMON)

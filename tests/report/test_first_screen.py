@@ -80,6 +80,9 @@ def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, 
     folds = page.locator("details.fold")
     assert folds.count() > 3
     for fold in folds.all():
+        if fold.locator("h2").first.inner_text() == "What to change":
+            assert fold.evaluate("each => each.open")  # what to do is not folded
+            continue
         assert fold.evaluate("each => !each.open")
         fold.locator("summary").first.focus()
         page.keyboard.press("Enter")
@@ -100,12 +103,18 @@ def test_a_link_opens_what_it_leads_to(browser: Any, kinds: Kinds) -> None:
     page.close()
 
 
-def test_paper_has_all_of_it(browser: Any, kinds: Kinds, tmp_path: Path) -> None:
+def test_paper_has_the_first_screen_and_what_is_unfolded(browser: Any, kinds: Kinds) -> None:
     page = opened(browser, kinds.page("circle"), 1200, 900)
-    page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert page.locator("details:not([open])").count() == 0
-    page.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert page.locator("details.fold[open]").count() == 0
+    unfolded = page.locator("details.fold[open] h2").all_inner_texts()
+    assert unfolded == ["What to change"]
+    folded = page.locator("details.fold:not([open])")
+    assert folded.count() > 4
+    page.emulate_media(media="print")
+    assert not any(folded.nth(k).is_visible() for k in range(folded.count()))
+    assert page.locator("p.answer").first.is_visible()
+    folded.first.evaluate("each => { each.open = true; }")
+    assert page.locator("details.fold[open]").count() == 2
+    assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4"))) <= 3
     page.close()
 
 
@@ -153,9 +162,9 @@ def facts(text: str) -> dict[str, list[str]]:
             add(f"peak {peak[1]}", value)
         elif "circular deviation G" in label:
             add("G", value)
-    for value in re.findall(r"circular deviation G (\S+) µm", said):
+    for value in re.findall(r"G = (\S+) µm", said):
         add("G", value)
-    for axis, value in re.findall(r"(\w) (?:stays behind|jumps ahead) for a moment where it reverses, (\S+) µm", said):
+    for axis, value in re.findall(r"reversal peaks of (\w) \((\S+) µm", said):
         add(f"peak {axis}", value)
     for axis, value in re.findall(r'"text":"([XYZ])[+−]: (\S+) µm"', text):
         add(f"peak {axis}", value)
@@ -171,7 +180,7 @@ def test_a_fact_has_one_value(name: str, kinds: Kinds) -> None:
     found = facts(kinds.page(name).read_text(encoding="utf-8"))
     assert {"G", "peak X", "peak Z"} <= set(found)
     for fact, values in found.items():
-        assert len(values) >= 3, fact
+        assert len(values) >= 2, fact
         for value in values[1:]:
             assert agree(values[0], value.rstrip(",")), (fact, values)
 

@@ -16,17 +16,18 @@ def figures(**values: float) -> dict[str, Figure]:
 
 def test_a_stop_is_told_with_what_it_waits_for() -> None:
     told = stop_words(figures(overshoot=3.131, settling_time=99.02, ringing_frequency=20.75), 1e-6)
-    assert told == (
-        "3.13 um past its target, within +-1 um for good 99.0 ms after the end of the NC motion; "
-        "until then it rings at 20.8 Hz, which less jerk would excite less."
-    )
+    assert told == ("overshoots by 3.1 um and settles within +-1 um in 99 ms. It rings at 20.8 Hz; lower the jerk.")
+    off = stop_words(figures(overshoot=19.04, settling_time=97.96, ringing_frequency=20.9), 1e-6, "T_sym of Z")
+    assert off.endswith("It rings at 20.9 Hz. Remedy: T_sym of Z.")
+    short = stop_words(figures(overshoot=0.82, settling_time=1.6, ringing_frequency=20.9), 1e-6)
+    assert short == "overshoots by 0.82 um and settles within +-1 um in 1.6 ms."
     at_once = stop_words(figures(overshoot=0.2, settling_time=0.0, ringing_frequency=20.75), 1e-6)
-    assert at_once == "0.20 um past its target, within +-1 um from the end of the NC motion on."
+    assert at_once == "overshoots by 0.20 um and is settled within +-1 um at the end of the motion."
     never = stop_words(figures(overshoot=107.26, settling_time=math.nan, ringing_frequency=72.41), 1e-6)
     assert (
-        never == "not yet at rest within +-1 um at the end: it oscillates at 72.4 Hz, up to 107.26 um past its target."
+        never == "is not yet at rest within +-1 um at the end: it oscillates at 72.4 Hz, up to 107 um past its target."
     )
-    assert "add a dwell" in stop_words(figures(overshoot=math.nan, settling_time=math.nan), 1e-6)
+    assert "Add a dwell" in stop_words(figures(overshoot=math.nan, settling_time=math.nan), 1e-6)
 
 
 @pytest.mark.parametrize(

@@ -153,9 +153,8 @@ def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str
                 (term for term in diagnosis.terms if term.key not in ("peaks", "rest")), key=lambda term: term.size
             )
             result.append(
-                f"glitch_{axis}, {old}, is the largest deviation in the quadrant whatever its cause; what stands out "
-                f"where {axis} reverses is peak_{axis}, {peak.value * 1e6:.3g} um. The rest is form, most of it "
-                f"{name(largest)}"
+                f"glitch_{axis}, {old}, is the largest deviation of the quadrant, most of it {name(largest)}; the "
+                f"reversal peak of {axis} itself is {peak.value * 1e6:.3g} um"
             )
     return result
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, UnknownName
 from feedsim.trace import Trace
 from feedsim.trace.trace import suggest
 
@@ -48,15 +48,15 @@ Figures = Mapping[str, Figure]
 
 
 class Named(dict[str, Figure]):
-    """Figures by name; a name that is none raises a KeyError that says which is the nearest.
+    """Figures by name; a name that is none raises UnknownName, which says which is the nearest.
 
     >>> Named({"Z.overshoot": Figure(3.1, "um", "")})["Z.overshot"]
     Traceback (most recent call last):
-    KeyError: "no figure 'Z.overshot'; did you mean 'Z.overshoot'?"
+    feedsim.errors.UnknownName: no figure 'Z.overshot'; did you mean 'Z.overshoot'?
     """
 
     def __missing__(self, name: str) -> Figure:
-        raise KeyError(f"no figure {name!r}{suggest(name, self)}")
+        raise UnknownName(f"no figure {name!r}{suggest(name, self)}")
 
 
 def column(trace: Trace, name: str, purpose: str) -> Array:

@@ -14,10 +14,13 @@ from feedsim import units
 from feedsim.analysis.circularity import Turn
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.files.columns import Columns
 from feedsim.files.regular import json_file
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
+from feedsim.trace.recording import mapped
 
+DIGEST_DIGITS = 12  # digits of a digest
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
 COMPARED_SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
@@ -72,12 +75,15 @@ class Source:
         return list(dict.fromkeys(name.partition(".")[0] for name in self.signals))
 
 
-def read_sources(paths: Sequence[Path]) -> list[Source]:
-    """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such."""
+def read_sources(paths: Sequence[Path], mappings: Sequence[Columns] = ()) -> list[Source]:
+    """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such.
+
+    mappings: which columns of the files, those of feedsim aside, are what.
+    """
     sources, problems = [], []
     for path, name in zip(paths, named_apart(paths), strict=True):
         try:
-            sources.append(_read(path, name))
+            sources.append(_read(path, name, mappings))
         except InputError as error:
             problems += list(error.problems)
     if problems:
@@ -95,7 +101,7 @@ def named_apart(paths: Sequence[Path]) -> list[str]:
     return [f"{path} ({k})" for k, path in enumerate(paths, 1)]
 
 
-def _read(path: Path, name: str) -> Source:
+def _read(path: Path, name: str, mappings: Sequence[Columns]) -> Source:
     curves = path / RESULT if path.is_dir() else path
     if path.is_dir() and not curves.is_file():
         raise InputError(
@@ -103,6 +109,8 @@ def _read(path: Path, name: str) -> Source:
             "(FOLDER:17, FOLDER:max=FIGURE) is needed"
         )
     recording = read_recording(curves)
+    if curves.name != RESULT:
+        recording = mapped(recording, mappings)
     if (clock := recording.clock()) is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
     column, factor = clock
@@ -152,7 +160,9 @@ def _parameters(summary: Mapping[str, Any]) -> dict[str, str]:
     result = {"scenario.motions": "; ".join(entry["description"] for entry in summary["scenario"]["motions"])}
     for group in ("coupling", "recording_interval"):
         result |= _flat(f"scenario.{group}", summary["scenario"][group])
-    return result | _flat("machine", {key: summary["machine"][key] for key in ("name", "pose", "axes")})
+    # Results of earlier versions lack some.
+    known = ("name", "pose", "cycles", "path", "modes", "structure", "plant", "errors", "axes")
+    return result | _flat("machine", {key: summary["machine"][key] for key in known if key in summary["machine"]})
 
 
 def _flat(name: str, value: Any) -> dict[str, str]:
@@ -160,7 +170,7 @@ def _flat(name: str, value: Any) -> dict[str, str]:
         if set(value) == {"value", "unit"}:
             return {name: f"{value['value']:.9g} {value['unit']}" if value["value"] is not None else "none"}
         return {key: text for part, entry in value.items() for key, text in _flat(f"{name}.{part}", entry).items()}
-    return {name: str(value)}
+    return {name: str(value)[:DIGEST_DIGITS] if name.endswith(".sha256") else str(value)}
 
 
 def differing(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:

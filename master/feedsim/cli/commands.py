@@ -1,7 +1,7 @@
 """Which commands there are, and the parser that follows from the declarations of their jobs.
 
-May use: jobs/parameters, errors. Start reading at COMMANDS, then at add_options(), which makes the options of a command
-from the signature of its job.
+May use: jobs/parameters, whose COMMANDS lists them, errors. Start reading at add_options(), which makes the options of
+a command from the signature of its job.
 """
 
 from __future__ import annotations
@@ -17,39 +17,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from feedsim.errors import InputError, nearest, no_such_file
-from feedsim.jobs.parameters import Argument, Declaration, Option, Parameter, declaration
+from feedsim.jobs.parameters import COMMANDS, Argument, Declaration, Option, Parameter, declared
 
-PACKAGE = Path(__file__).resolve().parents[1]
-# What stands behind "feedsim" -> the function that does it, in the order of --help.
-COMMANDS = {
-    "example": "jobs.tools:example",
-    "run": "jobs.run:run",
-    "check": "jobs.check:check",
-    "circle": "jobs.circle:circle",
-    "identify friction": "jobs.identify:identify_friction",
-    "identify drive": "jobs.identify_drive:identify_drive",
-    "identify modes": "jobs.identify_modes:identify_modes",
-    "replay": "jobs.replay:replay",
-    "frf": "jobs.frf:frf",
-    "tune drive": "jobs.tune_drive:tune_drive",
-    "tune compensation": "jobs.tune_compensation:tune_compensation",
-    "tune feedforward": "jobs.tune_feedforward:tune_feedforward",
-    "tune proposals": "jobs.tune_proposals:tune_proposals",
-    "diff": "jobs.diff:diff",
-    "history": "jobs.history:history",
-    "compare": "jobs.compare:compare",
-    "export": "jobs.export:export",
-    "sweep": "jobs.sweep:sweep",
-    "machine build": "jobs.machine:machine_build",
-    "machine info": "jobs.machine:machine_info",
-    "machine view": "jobs.machine:machine_view",
-    "machine import": "jobs.machine_import:machine_import",
-    "machine export": "jobs.machine_export:machine_export",
-    "docs": "jobs.tools:docs",
-    "tools schema": "jobs.tools:schema",
-    "tools convert": "jobs.tools:convert",
-    "tools completion": "jobs.tools:completion",
-}
 GROUPS = {
     "identify": "friction, drives or modes from records",
     "tune": "values of a drive, or of a friction compensation",
@@ -93,8 +62,7 @@ class Command:
     @cached_property
     def declared(self) -> Declaration:
         """The job as its source declares it."""
-        module, _, function = self.home.partition(":")
-        return declaration(PACKAGE / f"{module.replace('.', '/')}.py", function)
+        return declared(self.name)
 
     @property
     def options(self) -> list[Parameter]:

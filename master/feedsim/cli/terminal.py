@@ -215,7 +215,8 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         if options.json is True:
             print(json_of(result, out))
         elif not options.quiet:
-            wrong = [WRONG + finding for finding in findings[:1] if severity(finding) == "wrong"]
+            both = sys.stdout is not None and sys.stdout.isatty() and sys.stderr.isatty()  # it stands there already
+            wrong = [WRONG + finding for finding in findings[:1] if severity(finding) == "wrong" and not both]
             for line in (*(painted(text, "red", sys.stdout) for text in wrong), *_lines(result, options.verbose, out)):
                 print(line)
         if sys.stdout is not None:
@@ -234,7 +235,18 @@ def _lines(result: Any, verbose: bool, out: Any) -> Iterator[str]:
     own = isinstance(result, Result)
     yield from map(visible, result.lines_shown(verbose) if own else result.answers)
     if (place := getattr(result, "place", None) or out) is not None:
+        if own and (step := _next_step(Path(place))):
+            yield from map(visible, (f"Next: {step['words']}:", f"  {step['command']}"))
         yield visible(f"-> {Path(place) / result.main_file if own else place}")
+
+
+def _next_step(folder: Path) -> dict[str, str]:
+    """What the summary of a result says to do next; {} where it says nothing."""
+    try:
+        content = json.loads((folder / "summary.json").read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return content.get("next", {}) if isinstance(content, dict) else {}
 
 
 def _plain_lines(result: Any) -> list[str]:
@@ -276,11 +288,12 @@ See it work
   feedsim run xz_circle.yaml                   a circle, why it is not round, and a report
 
 Find out why a measured circle is not round
-  feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
+  feedsim example ballbar log                  copies sample records, synthetic ones
+  feedsim circle records/ballbar/before_ccw.csv records/ballbar/before_cw.csv --axes X,Y
 
 Rebuild a machine from its records
-  feedsim identify drive capture.json --axes X,Y --out results/my_machine
-  feedsim replay capture.json --machine results/my_machine
+  feedsim identify drive records/log/log.csv --columns records/log/columns.yaml --axes Z --out results/my_machine
+  feedsim replay records/log/log.csv --columns records/log/columns.yaml --axes Z --machine results/my_machine
 
 Try a change before it is made
   feedsim run xz_circle.yaml --set machine.axes.X.drive.K_v="5 (m/min)/mm" --out results/faster

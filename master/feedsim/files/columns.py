@@ -40,6 +40,8 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
     "speed_setpoint": ("rad/s", "m/s"),
     "feedforward": ("rad/s", "m/s"),
 }
+# The same of records of circles alone: angle and radius of a ballbar, or what its radius deviates by.
+CIRCLE_DIMENSIONS: dict[str, tuple[str, ...]] = {"angle": ("rad",), "radius": ("m",), "radial_deviation": ("m",)}
 DRIVING = ("torque", "current", "force")
 
 
@@ -51,13 +53,13 @@ def resulting(unit: str, factor_unit: str) -> units.Unit:
 
 def target_of(role: str, given: units.Unit) -> str:
     """SI unit that a role's values in unit `given` are converted to. InputError: it is no unit of that role."""
-    for target in DIMENSIONS[role]:
+    known = (DIMENSIONS | CIRCLE_DIMENSIONS)[role]
+    for target in known:
         if units.unit(target).dimension == given.dimension:
             return target
-    kinds = " or ".join(units.article(units.unit(text).kind) for text in DIMENSIONS[role])
+    kinds = " or ".join(units.article(units.unit(text).kind) for text in known)
     raise InputError(
-        f"the values are {units.article(given.kind)}; {kinds} is expected here, in {' or '.join(DIMENSIONS[role])} "
-        "for example"
+        f"the values are {units.article(given.kind)}; {kinds} is expected here, in {' or '.join(known)} for example"
     )
 
 
@@ -178,6 +180,9 @@ class Columns(Model):
     )
     speed_setpoint: MotionSignal | None = Field(default=None, description="Speed setpoint of the position controller")
     feedforward: MotionSignal | None = Field(default=None, description="Speed feedforward of the control")
+    angle: Signal | None = Field(default=None, description="Of a ballbar: angle from the first axis of the plane")
+    radius: Signal | None = Field(default=None, description="Of a ballbar: distance from the centre")
+    radial_deviation: Signal | None = Field(default=None, description="Of a ballbar: radius less the programmed one")
     pitch: Annotated[float, Quantity("m", minimum=1e-8, example="20 mm")] | None = Field(
         default=None, description="Travel per motor turn"
     )
@@ -235,13 +240,13 @@ def contradictions(columns: Columns) -> Iterator[tuple[Place, str]]:
     given = [role for role in DRIVING if columns.signal(role) is not None]
     for role in given[1:]:
         yield (role,), f"stands beside {given[0]}; one of the two is enough, and they could contradict one another"
-    if columns.position is None and columns.speed is None:
+    if columns.position is None and columns.speed is None and columns.angle is None:
         yield (), "missing: position or speed, for example position: {column: x, unit: mm}"
     if columns.mass is not None and columns.inertia is not None:
         yield ("mass",), "stands beside inertia; give one of the two"
     if columns.torque_constant is not None and columns.current is None and given:
         yield ("torque_constant",), f"is of no use: the trace's {given[0]} is taken, not a current"
-    for role in DIMENSIONS:
+    for role in DIMENSIONS | CIRCLE_DIMENSIONS:
         yield from _of_signal(role, clock if role == "time" else columns.signal(role))
 
 
@@ -259,7 +264,9 @@ def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place
         text = f"{signal.unit} times {factor}: " if signal.factor is not None else f"{signal.unit}: "
         hint = ""
         if units.unit(spelled(signal.unit)).dimension == units.unit("1").dimension:
-            hint = f"; give the factor of one unit, for example factor: 0.001 {DIMENSIONS[role][0]}"
+            hint = (
+                f"; give the factor of one unit, for example factor: 0.001 {(DIMENSIONS | CIRCLE_DIMENSIONS)[role][0]}"
+            )
         yield (role, "unit"), f"{text}{error}{hint}"
         return
     if getattr(signal, "at", None) == "scale" and target.startswith("rad"):

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Diagnosis, Figure, Named
 from feedsim.analysis.circle import diagnose, further
-from feedsim.analysis.circle.records import RecordedCircle, read_circle
+from feedsim.analysis.circle.changed import Change
+from feedsim.analysis.circle.records import SAME_FEED, RecordedCircle, read_circle
+from feedsim.analysis.circularity import axis_letters
 from feedsim.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
 from feedsim.errors import InputError
+from feedsim.files.columns import load_columns
 from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
 from feedsim.jobs.result import Result, kept
 from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.report import circle as page
+from feedsim.report.circle import report as page
 from feedsim.report.content import Report
+from feedsim.report.page import sheet_html
+from feedsim.report.results import Content
+from feedsim.report.run import sheet
 
 LENGTH_NEEDED = "AXIS=LENGTH is needed, e.g. X=10mm"
 
@@ -27,47 +33,79 @@ class CircleResult(Result):
     """A recorded circle taken apart.
 
     recorded: turns, axes, radius [m], speed [m/s]. diagnosis: the causes, each with interval and share of G. records:
-    the files.
+    the files. after: records of the circle after a change, taken apart; None without.
     """
 
     recorded: RecordedCircle
     diagnosis: Diagnosis
     records: Sequence[Path]
+    after: CircleResult | None = None
 
     kind = "circle"
+    may_write = (sheet.HTML, sheet.CSV)
 
     @property
     def inputs(self) -> Sequence[Path]:
         """The records."""
-        return self.records
+        return [*self.records, *(self.after.records if self.after is not None else ())]
 
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
-        """As of a run: "XY.G", "XY.squareness", ..."""
-        return Named(page.figures_of(self.recorded, self.diagnosis))
+        """As of a run: "XY.G", "XY.squareness", ...; of records after a change "after.XY.G", ..."""
+        later = {} if self.after is None else {f"after.{name}": one for name, one in self.after.figures.items()}
+        return Named({**page.figures_of(self.recorded, self.diagnosis), **later})
+
+    @property
+    def changes(self) -> Sequence[Change]:
+        """What the records after a change show of every cause; none without them."""
+        return [] if self.after is None else page.changes_of(self._taken, self.after._taken)
 
     @property
     def findings(self) -> Sequence[str]:
         """What is the matter with the records."""
-        return self.recorded.doubts
+        return [*self.recorded.doubts, *(self.after.recorded.doubts if self.after is not None else ())]
 
     @property
     def answers(self) -> Sequence[str]:
-        """Why the circle is not round."""
+        """Why the circle is not round; with records after a change what has changed."""
+        if self.after is not None:
+            return page.answers_of_both(self._taken, self.after._taken)
         return page.answers(self.diagnosis)
 
     @property
     def lines(self) -> Sequence[str]:
-        """The answer, and how the files were read."""
-        return [*self.answers, *further(self.diagnosis), *(f"  {note}" for note in self.recorded.notes)]
+        """The answer, what to type, and how the files were read."""
+        if self.after is not None:
+            return page.lines_of_both(self._taken, self.after._taken)
+        action = page.first_action(self.diagnosis)
+        notes = (f"  {note}" for note in self.recorded.notes)
+        return [*self.answers, *filter(None, [action]), *further(self.diagnosis), *notes]
+
+    @property
+    def _taken(self) -> page.Taken:
+        return page.Taken(self.recorded, self.diagnosis, self.figures, self.records)
 
     def report(self) -> Report:
         """Content of report.html."""
+        if self.after is not None:
+            return page.report_of_both(self._taken, self.after._taken)
         return page.report_of(self.recorded, self.diagnosis, self.figures, self.records)
+
+    def files(self) -> Mapping[str, Content]:
+        """Of records before and after a change the acceptance sheet of both."""
+        if self.after is None:
+            return {}
+        sheets = page.sheets_of_both(self._taken, self.after._taken)
+        title = f"Circle {axis_letters(self.recorded.circle.axes)}, before and after"
+        return {sheet.HTML: sheet_html(title, sheets, ""), sheet.CSV: sheet.table(sheets)}
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
-        return page.summary(self.recorded, self.diagnosis, self.figures, self.records, names)
+        content = page.summary(self.recorded, self.diagnosis, self.figures, self.inputs, names)
+        if self.after is None:
+            return content
+        changes = page.changes_part(self._taken, self.after._taken)
+        return {**content, "answer": list(self.answers), "changed": changes}
 
 
 @job("why a recorded circle is not round")
@@ -84,6 +122,14 @@ def circle(
     feed: Annotated[Value | None, Option("SPEED", "path speed; needed where the file has no time")] = None,
     centre: Annotated[Pairs[Value], Option("AXIS=POSITION", "programmed centre (default: fitted)", many=True)] = None,
     pitch: Annotated[Pairs[Value], Option("AXIS=LENGTH", "look for an error that repeats with it", many=True)] = None,
+    after: Annotated[
+        File | Sequence[File],
+        Option("FILE", "records of the circle after a change: what has changed beyond doubt", several=True),
+    ] = (),
+    columns: Annotated[
+        File | Sequence[File],
+        Option("MAPPING.yaml", "which columns of the records are what; one for each axis (docs/traces.md)", many=True),
+    ] = (),
     out: Annotated[File | None, out("circle_{records}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
@@ -98,6 +144,7 @@ def circle(
 
     Command line:
         feedsim circle ballbar_ccw.csv ballbar_cw.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
+        feedsim circle ccw.csv cw.csv --radius "150 mm" --feed "1 m/min" --after ccw_after.csv cw_after.csv
         feedsim circle scales.csv --axes X,Z --pitch X="10 mm" --pitch Z="10 mm"
         feedsim circle results/xz_circle/result.csv --axes X,Z --radius "15 mm" --centre X="785 mm" --centre Z="100 mm"
 
@@ -131,17 +178,35 @@ def circle(
         )
     r = None if radius is None else quantity("radius", radius, "m", "150 mm", positive=True)
     v = None if feed is None else quantity("feed", feed, "m/s", "1000 mm/min", positive=True)
-    with kept(out, CircleResult.check_place, watch, files, force=force):
+    later, mappings = (
+        [Path(file) for file in ([given] if isinstance(given, str | Path) else given)] for given in (after, columns)
+    )
+
+    def taken(from_files: Sequence[Path], radius: float | None) -> CircleResult:
         recorded = read_circle(
-            files,
+            from_files,
             (plane[0], plane[1]),
-            radius=r,
+            radius=radius,
             feed=v,
             centre=(about[plane[0]], about[plane[1]]) if about else None,
             pitch=pitches,
+            mappings=[load_columns(file) for file in mappings],
         )
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
-        result = CircleResult(recorded, diagnosis, files)
+        return CircleResult(recorded, diagnosis, from_files)
+
+    with kept(out, CircleResult.check_place, watch, [*files, *later, *mappings], force=force):
+        result = taken(files, r)
+        if later:
+            own = result.recorded.circle  # its radius counts for both: files of positions do not have it
+            second = taken(later, own.radius)
+            if abs(second.recorded.circle.speed / own.speed - 1) > SAME_FEED:
+                raise InputError(
+                    f"{spelt('after')}: the feed is {6e4 * second.recorded.circle.speed:.4g} mm/min, that of the "
+                    f"records before {6e4 * own.speed:.4g} mm/min; allowed: {100 * SAME_FEED:g} % apart, as peaks and "
+                    "lags grow with it"
+                )
+            result = replace(result, after=second)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result

@@ -14,7 +14,8 @@ from feedsim.analysis import Figure, Named
 from feedsim.analysis.alignment import aligned
 from feedsim.analysis.side_by_side import Source, differing, named_apart, read_sources
 from feedsim.errors import InputError
-from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, job, out
+from feedsim.files.columns import Columns, load_columns
+from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
 from feedsim.jobs.result import Result, kept
 from feedsim.jobs.run import RunResult
 from feedsim.jobs.watch import NO_WATCH, Watch
@@ -41,8 +42,11 @@ class Overlay(Result):
 
     kind = "diff"
 
-    def __init__(self, results: Mapping[str, Shown]) -> None:
-        """results: name -> a result, its folder, or a CSV file. Raises InputError: nothing, or what is no result."""
+    def __init__(self, results: Mapping[str, Shown], mappings: Sequence[Columns] = ()) -> None:
+        """results: name -> a result, its folder, or a CSV file. mappings: which columns of records are what.
+
+        Raises InputError: nothing, or what is no result.
+        """
         if not results:
             raise InputError("nothing can be shown: no result is given")
         self.place: Path | None = None  # where it was written
@@ -50,7 +54,7 @@ class Overlay(Result):
         # The report reads results from where they are written; those of a prompt are written for as long as this lives.
         self._folder = TemporaryFolder()
         paths = [_at(value, self._folder.path / str(k)) for k, value in enumerate(results.values())]
-        result = zip(self.names, read_sources(paths), strict=True)
+        result = zip(self.names, read_sources(paths, mappings), strict=True)
         self._sources = aligned([replace(source, name=name) for name, source in result])
 
     @cached_property
@@ -107,6 +111,10 @@ def diff(
     *results: Annotated[
         Shown, Argument("RESULT", "folder of feedsim run, CSV file with a column of time, or run of a study", many=True)
     ],
+    columns: Annotated[
+        File | Sequence[File],
+        Option("MAPPING.yaml", "which columns of the records are what; one for each axis (docs/traces.md)", many=True),
+    ] = (),
     out: Annotated[File | None, out("diff")] = None,
     figures: FigureKinds = (),
     force: Force = False,
@@ -155,7 +163,8 @@ def diff(
         if name in given:
             raise InputError(f"two results are called {name!r}; give one of them another name")
         given[name] = run_result
-    over = Overlay(given)
+    mappings = [columns] if isinstance(columns, str | Path) else columns
+    over = Overlay(given, [load_columns(file) for file in mappings])
     if out is not None:
         with kept(out, Overlay.check_place, watch, over.inputs, force=force):
             over.save(out, figures=figures, force=force, control=control)

@@ -79,6 +79,10 @@ class FrfResult(Result, Mapping[str, Complexes]):
         """(F,) frequencies of the closed form [Hz]."""
         return self.response.frequency
 
+    def to_control(self, name: str) -> Any:
+        """A response of the closed form as `control.FRD` of python-control, over [rad/s]. Needs that package."""
+        return self.response.to_control(name)
+
     def unit(self, name: str) -> str:
         """Unit of a response."""
         return self.response.unit(name)

@@ -11,14 +11,15 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+import shlex
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from feedsim.arguments import Changes, Pairs, Value
+from feedsim.arguments import Call, Changes, Pairs, Value, calling, settings
 
 F = TypeVar("F", bound=Callable[..., Any])
 File = str | Path
@@ -94,6 +95,37 @@ class Declaration:
 Names = Pairs[str]  # axis of the machine -> that of the control, or texts X1 and X=X1
 Positions = Pairs[Value]  # axis -> position [m] or a text with a unit, or texts AXIS=POSITION
 
+PACKAGE = Path(__file__).resolve().parents[1]
+# What stands behind "feedsim" -> the function that does it, in the order of --help of the program.
+COMMANDS = {
+    "example": "jobs.tools:example",
+    "run": "jobs.run:run",
+    "check": "jobs.check:check",
+    "circle": "jobs.circle:circle",
+    "identify friction": "jobs.identify:identify_friction",
+    "identify drive": "jobs.identify_drive:identify_drive",
+    "identify modes": "jobs.identify_modes:identify_modes",
+    "replay": "jobs.replay:replay",
+    "frf": "jobs.frf:frf",
+    "tune drive": "jobs.tune_drive:tune_drive",
+    "tune compensation": "jobs.tune_compensation:tune_compensation",
+    "tune feedforward": "jobs.tune_feedforward:tune_feedforward",
+    "tune proposals": "jobs.tune_proposals:tune_proposals",
+    "diff": "jobs.diff:diff",
+    "history": "jobs.history:history",
+    "compare": "jobs.compare:compare",
+    "export": "jobs.export:export",
+    "sweep": "jobs.sweep:sweep",
+    "machine build": "jobs.machine:machine_build",
+    "machine info": "jobs.machine:machine_info",
+    "machine view": "jobs.machine:machine_view",
+    "machine import": "jobs.machine_import:machine_import",
+    "machine export": "jobs.machine_export:machine_export",
+    "docs": "jobs.tools:docs",
+    "tools schema": "jobs.tools:schema",
+    "tools convert": "jobs.tools:convert",
+    "tools completion": "jobs.tools:completion",
+}
 Archives = Annotated[
     File | None,
     Option("DIR", "folder of the units' archives (default: $FEEDSIM_FMUS, else those that come along)"),
@@ -218,15 +250,41 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
     """
 
     def documented(function: F) -> F:
+        signature = inspect.signature(function)
+
+        @wraps(function)
+        def called(*given: Any, **named: Any) -> Any:
+            try:
+                arguments = signature.bind(*given, **named).arguments
+            except TypeError:  # the function says itself what it was not given
+                return function(*given, **named)
+            with calling(Call({key: value for key, value in arguments.items() if key != "watch"}, command_line)):
+                return function(*given, **named)
+
         lines = [_argument_line(entry) for entry in _parameters(inspect.signature(function))]
         summary, *rest = inspect.cleandoc(function.__doc__ or "").split("\n\n")
         sections = [text for text in rest if not text.startswith("Command line:")]
         at = next((i for i, text in enumerate(sections) if text.startswith(("Raises", ">>>"))), len(sections))
         sections.insert(at, "Args:\n" + "\n".join(lines))
-        function.__doc__ = "\n\n".join([summary, *sections])
-        return function
+        # Options belong to the command line: help() and editors show types alone.
+        plain = [
+            entry.replace(annotation=_Shown(read_annotation(str(entry.annotation))[0].replace("File", "str | Path")))
+            for entry in signature.parameters.values()
+        ]
+        called.__signature__ = signature.replace(  # type: ignore[attr-defined]
+            parameters=plain, return_annotation=_Shown(signature.return_annotation)
+        )
+        called.__doc__ = function.__doc__ = "\n\n".join([summary, *sections])
+        return called  # type: ignore[return-value]
 
     return documented
+
+
+class _Shown(str):
+    """A type as text, which signatures show without quotation marks."""
+
+    def __repr__(self) -> str:
+        return str(self)
 
 
 def _parameters(signature: inspect.Signature) -> list[Parameter]:
@@ -309,3 +367,76 @@ def declaration(file: Path, name: str) -> Declaration:
         textwrap.dedent(examples.partition("\n")[2]),
         parameters,
     )
+
+
+def declared(command: str) -> Declaration:
+    """The job of a command, such as "machine info"."""
+    module, _, function = COMMANDS[command].partition(":")
+    return declaration(PACKAGE / f"{module.replace('.', '/')}.py", function)
+
+
+# --- The command line that goes on from a call ------------------------------------------------------------------------
+
+
+# What belongs to the call itself: a further one writes elsewhere, and says for itself what it leaves.
+OWN_ARGUMENTS = ("out", "figures", "force", "page", "uncertain", "kind", "name", "note", "report", "junit")
+
+
+def command_line(call: Call, command: str, arguments: Mapping[str, Any]) -> str:
+    """A command as it is typed, with the arguments of a call that it has, too, and with those that are its own.
+
+    "" where an argument cannot be typed: a result at a prompt, in place of its folder.
+    """
+    given = {key: value for key, value in call.arguments.items() if key not in OWN_ARGUMENTS and key not in arguments}
+    plan = given.get("scenario", given.get("subject"))
+    if plan is not None and hasattr(plan, "overrides"):  # a scenario that is loaded
+        given |= {"set": plan.overrides, "scenario": plan.file}
+    given |= arguments
+    places: list[str] = []
+    options: list[str] = []
+    for parameter in declared(command).parameters:
+        value = given.get(parameter.name)
+        if parameter.option is None or value is None:
+            continue
+        words = [*_words(parameter, parameter.option, value, call.units.get(parameter.name, ""))]
+        if None in words:
+            return ""
+        (places if isinstance(parameter.option, Argument) else options).extend(map(str, words))
+    return " ".join(["feedsim", *command.split(), *map(shlex.quote, [*places, *options])])
+
+
+def _words(parameter: Parameter, option: Option, value: Any, unit: str) -> Iterator[str | None]:
+    """An argument as words of a command line; None in place of what cannot be typed."""
+    if isinstance(value, bool):
+        if value != (parameter.default == "True"):
+            yield parameter.typed if value else parameter.typed.replace("--", "--no-", 1)
+        return
+    if parameter.name == "set":
+        value = settings(value)
+    values: list[str | None]
+    if isinstance(value, Mapping):
+        values = [f"{key}={_word(entry, unit)}" for key, entry in value.items()]
+    elif isinstance(value, str | Path) or not isinstance(value, Sequence):
+        values = [_word(value, unit)]
+    else:
+        values = [_word(entry, unit) for entry in value]
+    if not values:
+        return
+    if isinstance(option, Argument):
+        yield from values
+    elif option.several:
+        yield from (parameter.typed, *values)
+    elif option.many:
+        for text in values:
+            yield from (parameter.typed, text)
+    else:
+        yield from (parameter.typed, None if None in values else ",".join(map(str, values)))
+
+
+def _word(value: Any, unit: str) -> str | None:
+    if isinstance(value, Path):
+        inside = value.is_absolute() and value.is_relative_to(Path.cwd())
+        return (value.relative_to(Path.cwd()) if inside else value).as_posix()
+    if isinstance(value, int | float):
+        return f"{value!r} {unit}".strip()
+    return value if isinstance(value, str) else None

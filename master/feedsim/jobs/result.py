@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from feedsim.arguments import Call, call, calling
 from feedsim.errors import InputError, OutputError
 from feedsim.findings import severity
 from feedsim.jobs.parameters import File
@@ -43,6 +44,13 @@ class Result(ABC):
     main_file: ClassVar[str] = REPORT  # of its files, the one that the command names
     own: ClassVar[Sequence[str]] = ()  # names of files that only results of this kind have
     may_write: ClassVar[Sequence[str]] = ()  # names of files that one may have besides report.html and summary.json
+
+    call: Call | None  # of the job that has made it; None of one made otherwise
+
+    def __new__(cls, *_: object, **__: object) -> Self:
+        made = super().__new__(cls)
+        object.__setattr__(made, "call", call())
+        return made
 
     @property
     def keeps(self) -> Sequence[str]:
@@ -112,11 +120,14 @@ class Result(ABC):
         """All pictures of the report."""
         return tuple(self.report().pictures)
 
-    def plot(self) -> Picture:
-        """The main picture of the report. A notebook shows it; ``.save("circle.png")`` writes it. Raises InputError."""
+    def plot(self, *, ax: Any = None) -> Any:
+        """The main picture of the report. A notebook shows it; ``.save("circle.png")`` writes it. Raises InputError.
+
+        ax: axes of matplotlib, one or several, that it is drawn on, a panel on each; then they are returned.
+        """
         if not self.pictures:
             raise InputError(f"a result of kind {self.kind} has no picture")
-        return self.pictures[0]
+        return self.pictures[0] if ax is None else self.pictures[0].on(ax)
 
     def save(
         self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
@@ -127,7 +138,7 @@ class Result(ABC):
         did not write may be replaced. control: parameters in the names and units of a control, "sinumerik", too. All is
         written or nothing. Raises OutputError.
         """
-        with replacing(force or forced()), in_words_of(control):
+        with replacing(force or forced()), in_words_of(control), calling(self.call):
             self.check_writable(Path(folder), self.inputs)
             return write_report(
                 folder,
@@ -146,7 +157,8 @@ class Result(ABC):
         return "; ".join([f"Result of {self.kind}: {', '.join(self.answers[:1]) or 'no answer'}", *said])
 
     def _repr_html_(self) -> str:
-        page = escape(html(self.report(), self.kind), quote=True)
+        with calling(self.call):
+            page = escape(html(self.report(), self.kind), quote=True)
         return f"<iframe style='width:100%;height:{NOTEBOOK_HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from feedsim import analysis, cosim
 from feedsim.analysis import Figure
+from feedsim.arguments import calling
 from feedsim.findings import ranked, severity
 from feedsim.jobs.parameters import (
     Archives,
@@ -36,7 +37,6 @@ from feedsim.report import run as report
 from feedsim.report.content import Report
 from feedsim.report.formatting import shown, typeset
 from feedsim.report.partial import Partial
-from feedsim.report.picture import Picture
 from feedsim.report.results import Content
 from feedsim.report.run.files import summary
 from feedsim.report.run.report import HEADER, is_leading, leading
@@ -44,6 +44,7 @@ from feedsim.report.run.signals import signals_picture
 from feedsim.report.uncertainty import answers
 from feedsim.scenario import Scenario
 from feedsim.trace import Array
+from feedsim.tune import Proposal
 
 if TYPE_CHECKING:
     import pandas
@@ -88,6 +89,11 @@ class RunResult(JudgedRun, Result):
         return analysis.diagnoses(self, self._tasks)
 
     @cached_property
+    def changes(self) -> Sequence[Proposal]:
+        """What to change, from what to what, the first one first; none of a run that is wrong."""
+        return report.changes(self, self.figures, self.causes)
+
+    @cached_property
     def _tasks(self) -> Sequence[analysis.Task]:
         return analysis.tasks(self.scenario, self.program)
 
@@ -104,13 +110,16 @@ class RunResult(JudgedRun, Result):
     @property
     def answers(self) -> Sequence[str]:
         """What circles, stops and positioning cycles are, why, and what to do."""
-        return report.answers(self, self.figures, self.causes)
+        return report.answers(self, self.figures, self.causes, self.changes)
 
     @property
     def lines(self) -> Sequence[str]:
         """The answers, and the leading figures."""
         said = answers(self.uncertainty, self.figures, leading(self.figures)) if self.uncertainty is not None else []
-        return [*self.answers, *said, f"{self.scenario.name}: {report.summary_line(self, self.figures)}"]
+        first, *others = [*self.answers, *said] or [""]
+        action = report.action(report.first_proposals(self.changes, self.causes), self.scenario.machine)
+        line = f"{self.scenario.name}: {report.summary_line(self, self.figures)}"
+        return [*filter(None, (first, action)), *others, line]
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -119,7 +128,14 @@ class RunResult(JudgedRun, Result):
 
     def report(self) -> Report:
         """Content of report.html."""
-        return report.page_of(self, self.figures, self.causes, page=bool(self.page), uncertainty=self.uncertainty)
+        return report.page_of(
+            self,
+            self.figures,
+            self.causes,
+            page=bool(self.page),
+            uncertainty=self.uncertainty,
+            proposals=self.changes,
+        )
 
     def files(self) -> Mapping[str, Content]:
         """result.csv, log.csv where there is a log, machine.html where the page was asked for."""
@@ -127,7 +143,9 @@ class RunResult(JudgedRun, Result):
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
-        return summary(self, self.figures, names, causes=self.causes, uncertainty=self.uncertainty)
+        return summary(
+            self, self.figures, names, causes=self.causes, uncertainty=self.uncertainty, proposals=self.changes
+        )
 
     def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """Raise OutputError unless the result can be written to `folder`."""
@@ -137,14 +155,15 @@ class RunResult(JudgedRun, Result):
         """A recorded signal in SI units, such as ``result["Z.x_a"]``."""
         return self.trace[name]
 
-    def plot(self, *signals: str) -> Picture:
+    def plot(self, *signals: str, ax: Any = None) -> Any:
         """The main picture of the report, or signals over time: ``result.plot("Z.x_a", "Z.M_fr")``, also "Z.*".
 
-        A notebook shows it; ``.save("circle.png")`` or ``.save("circle.svg")`` writes it.
+        A notebook shows it; ``.save("circle.png")`` or ``.save("circle.svg")`` writes it. ax: axes of matplotlib, one
+        or several, that it is drawn on, a panel on each; then they are returned.
         """
-        if signals:
-            return signals_picture(self.trace.select(signals), self.scenario.name)
-        return self.pictures[0] if self.pictures else signals_picture(self.trace.select(["*.x_a"]), self.scenario.name)
+        asked = signals or (() if self.pictures else ("*.x_a",))
+        shown = signals_picture(self.trace.select(asked), self.scenario.name) if asked else self.pictures[0]
+        return shown if ax is None else shown.on(ax)
 
     def to_pandas(self) -> pandas.DataFrame:
         """All recorded signals over time [s]; their units are in ``.attrs["units"]``. Needs the package pandas."""
@@ -163,7 +182,7 @@ class RunResult(JudgedRun, Result):
 
         figures, force, control: as of :meth:`Result.save`. recorded: the rows, where they are in that folder already.
         """
-        with replacing(force or forced()), in_words_of(control):
+        with replacing(force or forced()), in_words_of(control), calling(self.call):
             report.check_writable(Path(folder), self.inputs)
             return report.write(
                 self,
@@ -174,6 +193,7 @@ class RunResult(JudgedRun, Result):
                 drawn=figures,
                 page=self.page,
                 uncertainty=self.uncertainty,
+                proposals=self.changes,
             )
 
     def __repr__(self) -> str:

@@ -99,7 +99,7 @@ def tune_proposals(
         report.check_writable(folders["tried"])
         Overlay.check_place(folders["overlay"])
     first = run(scenario, set=set, fmus=fmus, out=out, figures=figures, force=force, control=control, watch=watch)
-    proposals = of_run(first, first.causes, searched=True)
+    proposals = of_run(first, first.causes, first.figures, searched=True)
     runs = [first]
     if settings := settings_of(proposals):
         plan = first.scenario

@@ -20,6 +20,9 @@ class Watch:
 
     command: Sequence[str] = ()
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
     def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
         """`done` of `total` steps of `what`; before: steps that an earlier call of the job has done."""
 

@@ -277,11 +277,17 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
             continue
         where = "; ".join(map(_where, states))
         text = (
-            f"axis {axis}: the {kind} loop is unstable with {now}: {where}{better} {usual}. A run shows this "
-            "instability, whatever coupling.substeps are"
+            f"axis {axis}: the {kind} loop is unstable with {now}: {where}{better} {usual}. The instability is "
+            "physical; a smaller step does not remove it"
         )
         met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
-        result.append(Wrong(text) if met else text)
+        if not met:
+            result.append(text)
+            continue
+        wrong = Wrong(text)
+        if nearest:
+            wrong.setting = f"machine.axes.{axis}.drive.{nearest.replace(' = ', '=')}"
+        result.append(wrong)
     if unknown := [name for name, axis in machine.axes.items() if isinstance(axis.drive, ForeignUnit)]:
         others = "; the other axes are judged with its motor free" if loops else ""
         result.append(
@@ -348,16 +354,13 @@ def judged(run: Run, *, keep: bool = True) -> JudgedRun:
     modes = checked_modes(scenario.machine)
     loops = loops_of(scenario.machine, modes) if keep else judge(scenario.machine, modes)
     pose = pose_use(scenario.machine, program, run.grid, run.crossings)
+    foreseen = _foreseen(scenario, modes, program, loops, run.acting)
+    wrong: tuple[str, ...] = tuple(text for text in foreseen if isinstance(text, Wrong))
+    shown = (*energy(run, loops), *_limits(run), *driving(run), *contradicted(run))
+    # What an unstable run shows besides follows from that.
     warnings = (
-        *run.notes,
-        *_foreseen(scenario, modes, program, loops, run.acting),
-        *pose.warnings,
-        *energy(run, loops),
-        *_limits(run),
-        *driving(run),
-        *contradicted(run),
-        *run.executor_notes,
-    )
+        *run.notes, *(wrong or (*foreseen, *pose.warnings, *shown)), *run.executor_notes,
+    )  # fmt: skip
     return JudgedRun(**{field.name: getattr(run, field.name) for field in fields(Run)}, pose=pose, warnings=warnings)
 
 

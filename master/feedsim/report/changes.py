@@ -13,8 +13,7 @@ from feedsim.report.formatting import minus, typeset
 from feedsim.report.provenance import finite
 from feedsim.scenario import Machine
 from feedsim.tune import Proposal
-from feedsim.units import convert
-from feedsim.variables import parameters
+from feedsim.tune.proposals import COMPENSATION
 
 NOTE = (
     "A value follows from the parameters of the machine file in closed form. Margins are the least of the speed and "
@@ -46,7 +45,7 @@ def changes_section(
     ]
     heads = ("Cause", "Axis", "Parameter", "Present", "Proposed", "In the control", "Why", "Margins")
     further = _further(proposals, typed(scenario)) if scenario is not None and scenario.suffix != ".ssp" else None
-    return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes")
+    return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes", unfolded=True)
 
 
 def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
@@ -62,13 +61,36 @@ def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
     return Bullets(result) if result else None
 
 
-def first_change(proposals: Sequence[Proposal]) -> str:
-    """The first proposal that has a value, in a few words: "X.K_v 4 → 4.2 (m/min)/mm"; "" without one."""
-    proposal = next((entry for entry in proposals if entry.proposed is not None), None)
-    if proposal is None:
-        return ""
+def change_words(proposal: Proposal) -> str:
+    """A proposal in a few words: "T_sym of Z from 2.9 to 3.53 ms", "T_dyn of X: +0.40 ms"."""
     present, proposed = _values(proposal)
-    return f"{proposal.axis}.{proposal.parameter.removeprefix('drive.')} {present.split(' ')[0]} → {proposed}"
+    if proposal.proposed is not None:
+        unit = present.partition(" ")[2]
+        start = present.partition(" ")[0] if unit == proposed.partition(" ")[2] else present
+        return f"{proposal.what} from {start} to {proposed}"
+    return f"{proposal.what}: {proposed}" if proposal.parameter != COMPENSATION else proposal.what
+
+
+def action(proposals: Sequence[Proposal], machine: Machine | None = None) -> str:
+    """What to type first, in the control's number and unit where one is asked for or named; "" without proposals."""
+    if not proposals:
+        return ""
+    proposal = proposals[0]
+    control = asked(machine)
+    name = names_of(control).get(proposal.parameter) if control else None
+    text = change_words(proposal)
+    if proposal.parameter == COMPENSATION:
+        return f"Change: {text}: {proposal.direction} (feedsim tune compensation finds its values)."
+    if name is None:
+        return f"Change: {text}."
+    place = f"{name.number} {name.name}" + (f" of {proposal.axis}" if proposal.axis else "")
+    doubt = "" if name.confirmed else "; check the unit at the control"
+    if proposal.proposed is not None and proposal.present is not None:
+        old, new = (f"{name.shown(value):.3g}" for value in (proposal.present, proposal.proposed))
+        return f"Change: {place} from {old} to {new} {name.unit}".rstrip() + f" ({text}{doubt})."
+    if proposal.step is not None:
+        return f"Change: {place} by {name.shown(proposal.step):+#.2g} {name.unit}".rstrip() + f" ({text}{doubt})."
+    return f"Change: {place}: {proposal.direction} ({text})."
 
 
 def change_lines(proposals: Sequence[Proposal]) -> list[str]:
@@ -77,7 +99,9 @@ def change_lines(proposals: Sequence[Proposal]) -> list[str]:
     for proposal in proposals:
         present, proposed = _values(proposal)
         value = f"{present} -> {proposed}" if proposal.proposed is not None else f"{proposed} (now {present})"
-        result.append(f"change: {proposal.axis}.{proposal.parameter.removeprefix('drive.')} {value}: {proposal.cause}")
+        result.append(
+            f"change: {proposal.key.removeprefix('machine.').removeprefix('axes.')} {value}: {proposal.cause}"
+        )
     return result
 
 
@@ -90,6 +114,7 @@ def changes_part(proposals: Sequence[Proposal]) -> list[dict[str, Any]]:
             "parameter": proposal.parameter,
             "present": proposal.present,
             "proposed": proposal.proposed,
+            "step": proposal.step,
             "unit": proposal.unit,
             "direction": proposal.direction,
             "reason": proposal.reason,
@@ -100,14 +125,12 @@ def changes_part(proposals: Sequence[Proposal]) -> list[dict[str, Any]]:
 
 
 def _values(proposal: Proposal) -> tuple[str, str]:
-    present = "–" if proposal.present is None else _value(proposal, proposal.present)
-    return present, proposal.direction if proposal.proposed is None else _value(proposal, proposal.proposed)
-
-
-def _value(proposal: Proposal, value: float) -> str:
-    unit = parameters("controller")[proposal.parameter.removeprefix("drive.")].display_unit
-    number = minus(f"{convert(value, proposal.unit, unit):.4g}")
-    return number if unit == "1" else f"{number} {unit}"
+    present = "–" if proposal.present is None else proposal.shown(proposal.present, 4)
+    if proposal.proposed is not None:
+        return minus(present), minus(proposal.shown(proposal.proposed))
+    if proposal.step is not None:
+        return minus(present), minus("+" * (proposal.step > 0) + proposal.shown(proposal.step, 2, kept=True))
+    return minus(present), proposal.direction
 
 
 def _named(proposal: Proposal, machine: Machine | None) -> str:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from feedsim.arguments import call
 from feedsim.findings import ranked, severity
 from feedsim.report.formatting import minus, shown
 from feedsim.report.picture import Picture
@@ -28,6 +29,44 @@ TILES, ANSWER_WORDS, FINDING_WORDS, LEAD_ROWS = 3, 45, 24, 2
 
 
 FOLDER = "THIS_FOLDER"  # in commands of the next step: the folder that the report is written to
+
+
+@dataclass(frozen=True)
+class Step:
+    """What to do next.
+
+    Attributes:
+        words: what the command does.
+        command: its name, such as "tune drive".
+        arguments: of the command. Those of the call that has made this result, and that the command has, too, go along
+            unless they stand here; None: left out. FOLDER in a value: where the report is written to.
+        before: a command line that has to be typed first.
+    """
+
+    words: str
+    command: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    before: str = ""
+
+    def line(self, folder: Path | None) -> str:
+        """The command line of a result that is written to a folder.
+
+        "" outside of calls of jobs, and where the command needs the folder of a result that has none.
+        """
+        place = "" if folder is None else folder.as_posix()
+        placed = {
+            name: [str(entry).replace(FOLDER, place) for entry in value]
+            if isinstance(value, list)
+            else value.replace(FOLDER, place)
+            if isinstance(value, str)
+            else value
+            for name, value in self.arguments.items()
+        }
+        present = call()
+        if present is None or (folder is None and placed != self.arguments):
+            return ""
+        line = present.typed(present, self.command, placed)
+        return f"{self.before} && {line}" if line and self.before else line
 
 
 @dataclass(frozen=True)
@@ -98,11 +137,13 @@ class Animation:
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Parts under a title; a section inside another one is a step lower. anchor: the title's id, for links."""
+    """Parts under a title; a section inside another one is a step lower. anchor: the title's id, for links. unfolded:
+    whether the page shows it open at first."""
 
     title: str
     parts: Sequence[Part | None]
     anchor: str = ""
+    unfolded: bool = False
 
 
 Part = Paragraph | Bullets | Table | Picture | Animation | Section
@@ -147,6 +188,7 @@ class Report:
         answer: what the result is and what it means; only what is wrong stands ahead of it.
         warnings: what is wrong first (`feedsim.findings`). notes: what the numbers are worth, each once.
         tiles: leading numbers, the weightiest first: of these TILES stand on the first screen.
+        action: the value to type, right below the answer.
         lead: the picture of the first screen; None: the first one of `main`. next_step: what to do, with a command.
         main: sections, tables and pictures; those with a title are folded.
         provenance: where the numbers come from: the last section, in small print.
@@ -162,7 +204,8 @@ class Report:
     notes: Sequence[str] = ()
     tiles: Sequence[Tile] = ()
     lead: Picture | None = None
-    next_step: Text = ""
+    next_step: Step | None = None
+    action: str = ""
 
     @property
     def first_picture(self) -> Picture | None:
@@ -171,15 +214,6 @@ class Report:
             return self.lead
         first = next((part for part in self.main if isinstance(part, Picture)), None)
         return first and first.first_rows(LEAD_ROWS)
-
-    def in_folder(self, folder: Path) -> Report:
-        """The report as it stands in a folder: commands of the next step name that one."""
-        parts = self.next_step if isinstance(self.next_step, tuple) else (self.next_step,)
-        name = shlex.quote(folder.as_posix())
-        placed = tuple(
-            replace(part, text=part.text.replace(FOLDER, name)) if isinstance(part, Span) else part for part in parts
-        )
-        return replace(self, next_step=placed if isinstance(self.next_step, tuple) else placed[0])
 
     @property
     def charts(self) -> dict[str, Chart]:

@@ -143,6 +143,14 @@ def three(value: float) -> str:
     return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
 
 
+def two(value: float) -> str:
+    """Two digits that count, and all places before the point; a dash where there is no number."""
+    if not np.isfinite(value):
+        return "–"
+    exponent = int(f"{value:.1e}".partition("e")[2])
+    return minus(f"{value:.{min(max(0, 1 - exponent), 3)}f}")
+
+
 def with_interval(value: float, ends: tuple[float, float]) -> str:
     """A value with its interval, both with the digits that the interval leaves."""
     low, high = ends

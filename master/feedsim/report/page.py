@@ -31,8 +31,11 @@ SCRIPTS = ("chart_scale.js", "chart_draw.js", "chart_use.js")
 PATH = re.compile(r"(?<![\w.:/\\])(?:[A-Za-z]:)?(?:[/\\][^/\\:\s'\"]+)*[/\\](?=[^/\\:\s'\"]+\.\w+\b)")
 
 
-def html(report: Report, kind: str = "") -> str:
-    """HTML text; all text of the report is escaped. kind: of the result, which the page names as its generator."""
+def html(report: Report, kind: str = "", folder: Path | None = None) -> str:
+    """HTML text; all text of the report is escaped.
+
+    kind: of the result, which the page names as its generator. folder: that the result is written to.
+    """
     environment = _environment()
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
     environment.filters["typeset"] = typeset
@@ -40,9 +43,10 @@ def html(report: Report, kind: str = "") -> str:
     environment.filters["parted"] = parted
     environment.filters["named"] = lambda text: PATH.sub("", text)
     charts = report.charts
+    step = report.next_step.line(folder) if report.next_step is not None else ""
     return environment.get_template("report.html.j2").render(
         report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",
-        policy=policy(script() if charts else ""), kind=kind, most_tiles=TILES,
+        policy=policy(script() if charts else ""), kind=kind, most_tiles=TILES, next=step,
     )  # fmt: skip
 
 

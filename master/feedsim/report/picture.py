@@ -6,9 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from feedsim.errors import InputError, OutputError
-from feedsim.report.chart import Chart
+from feedsim.report.chart import Chart, Panel
 from feedsim.report.chart.file import png, standalone
 from feedsim.report.chart.svg import svg
 from feedsim.report.style import REMARK
@@ -81,6 +84,36 @@ class Picture:
     def content(self, kind: str) -> bytes:
         """What a file of one of PICTURE_FORMATS holds."""
         return self.png if kind == "png" else self._file.encode()
+
+    def on(self, ax: Any) -> Any:
+        """Draw it on axes of matplotlib, and return them: the first panel on one, a panel on each of several.
+
+        Axes get quantity and unit. A circle is drawn over its angle. Raises InputError: it is no chart, or has fewer
+        panels.
+        """
+        panels = [part for part in self.chart.panels if isinstance(part, Panel)] if self.chart is not None else []
+        several = list(np.ravel(ax)) if isinstance(ax, list | tuple | np.ndarray) else [ax]
+        if len(panels) < len(several):
+            raise InputError(f"{self.title}: has {len(panels)} panels with axes, {len(several)} are needed")
+        for one, panel in zip(several, panels, strict=False):
+            for curve in panel.curves:
+                style = {"": "-", "dashed": "--", "dotted": ":"}[curve.dash]
+                words = {"color": curve.colour, "linewidth": curve.width, "label": curve.name}
+                one.plot(curve.x, curve.y, "." if curve.dots else style, **words)
+            for level in panel.levels:
+                (one.axvline if level.upright else one.axhline)(level.at, color="0.5", linewidth=0.8, linestyle=":")
+            one.set_xscale("log" if panel.x.log else "linear")
+            one.set_yscale("log" if panel.y.log else "linear")
+            if panel.x.span is not None:
+                one.set_xlim(*panel.x.span)
+            if panel.y.span is not None:
+                one.set_ylim(*panel.y.span)
+            one.set_xlabel(panel.x.title)
+            one.set_ylabel(panel.y.title)
+            one.set_title(panel.title or self.title)
+            if len({curve.name for curve in panel.curves}) > 1:
+                one.legend()
+        return ax
 
     def __repr__(self) -> str:
         return f"Picture {self.stem!r}: {self.title}"

@@ -161,12 +161,26 @@ def figures_part(figures: Mapping[str, Figure]) -> dict[str, Any]:
 
 
 def machine_part(machine: Machine) -> dict[str, Any]:
-    """A machine's pose and the parameters of its axes in SI."""
+    """A machine's pose, cycles, limits, structure and the parameters of its axes in SI."""
+    cycles, path = machine.cycles, machine.path
+    files = {"modes": machine.modes, "structure": machine.structure, "plant": machine.plant}
     return {
         "name": machine.name,
         "note": machine.note,
         "pose": {a: quantity(x, "m") for a, x in machine.pose.items()},
-        "axes": {name: _axis(axis_parameters(axis)) for name, axis in machine.axes.items()},
+        "cycles": {name: quantity(getattr(cycles, name), "s") for name in ("control", "position", "interpolation")},
+        "path": {"jerk": quantity(path.jerk, "m/s^3"), "acceleration": quantity(path.acceleration, "m/s^2")},
+        **{name: {"name": file.name, "sha256": sha256(file)} for name, file in files.items() if file is not None},
+        "errors": machine.errors,
+        "axes": {
+            name: _axis(axis_parameters(axis))
+            | {
+                "travel": {"low": quantity(axis.travel[0], "m"), "high": quantity(axis.travel[1], "m")},
+                "max_speed": quantity(axis.max_speed, "m/s"),
+                "max_acceleration": quantity(axis.max_acceleration, "m/s^2"),
+            }
+            for name, axis in machine.axes.items()
+        },
         "friction_origins": friction_origins(machine),
     }
 

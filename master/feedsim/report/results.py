@@ -151,13 +151,13 @@ def write_report(
     """Write a report of any kind: report.html, summary.json, ``files``, and its pictures as figures/*.
 
     kind, own: as for :func:`check_place`. summary: what summary.json has of this kind, a function of the names of all
-    files; around it stands what all have: kind, version, answer, figures, warnings, findings, files. keeps: those of
-    ``files`` that scenarios and machine files may name; they stay when the next result takes the folder. drawn: kinds
-    of files that the pictures are drawn as; the page holds what they show in any case. Whole or not at all, as
-    :func:`write_results` does it. Returns the paths. Raises OutputError.
+    files; around it stands what all have: kind, version, answer, next, figures, warnings, findings, files.
+    keeps: those of ``files`` that scenarios and machine files may name; they stay when the next result takes the
+    folder. drawn: kinds of files that the pictures are drawn as; the page holds what they show in any case. Whole or
+    not at all, as :func:`write_results` does it. Returns the paths. Raises OutputError.
     """
     grown: dict[str, Path] = {}
-    report = report.in_folder(Path(directory))
+    step = report.next_step.line(Path(directory)) if report.next_step is not None else ""
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
         for name, content in files.items():
@@ -167,8 +167,10 @@ def write_report(
                 (fresh / name).write_bytes(content)
             elif (already := content(fresh / name)) is not None:
                 grown[name] = already
-        write_text(fresh / REPORT, html(report, kind))
+        write_text(fresh / REPORT, html(report, kind, Path(directory)))
         head = {"kind": kind, "version": ENVELOPE, "answer": list(report.answer), "figures": {}}
+        if report.next_step is not None and step:
+            head["next"] = {"words": report.next_step.words, "command": step}
         rest = {**_finding_entries(report), "files": list(names), "keeps": [name for name in keeps if name in files]}
         write_text(fresh / SUMMARY, to_json({**head, **summary(names), "kind": kind, **rest}))
 

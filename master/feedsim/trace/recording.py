@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from feedsim import units
 from feedsim.errors import InputError, few
+from feedsim.files.columns import Columns, Factor, resulting, target_of
 from feedsim.files.spellings import spelled
 from feedsim.trace import capture, sinumerik_xml
 from feedsim.trace.capture_axes import CaptureAxis
@@ -230,6 +231,79 @@ def _read_mat(path: Path) -> Recording:
         path, tuple(mat.columns), mat.units, mat.scalars, notes=notes, unread=mat.others,
         _columns=mat.columns, _spellings=mat.spellings, _rows=rows,
     )  # fmt: skip
+
+
+# Role of a mapping file -> the column of a result that it is, of an axis, and its unit.
+MAPPED_NAMES = {
+    "position": ("{}.x_a", "m"),
+    "setpoint": ("{}.x_s", "m"),
+    "deviation": ("{}.x_e", "m"),
+    "speed": ("{}.n_a", "rad/s"),
+    "torque": ("{}.M_a", "N.m"),
+    "current": ("{}.i_q", "A"),
+    "angle": ("angle", "rad"),
+    "radius": ("radius", "m"),
+    "radial_deviation": ("deviation", "m"),
+}
+
+
+def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
+    """A record with its columns called as those of results are, X.x_a [m], by mapping files, one for each axis.
+
+    Without mapping files it is what it was. Raises InputError: a mapping of positions that names no axis, a column that
+    there is not, a unit that is not known.
+    """
+    if not mappings:
+        return recording
+    columns: dict[str, Array] = {}
+    known: dict[str, str] = {}
+    for mapping in mappings:
+        clock = mapping.time
+        if clock.interval is not None:
+            first = next(name for role in MAPPED_NAMES if (one := mapping.signal(role)) for name in [one.column])
+            columns["time"] = clock.interval * np.arange(len(recording.read([first])[first]), dtype=np.float64)
+        elif clock.column is not None:
+            columns["time"] = _scaled(recording, "time", clock.column, clock.unit, clock.factor)
+        elif (known_clock := recording.clock()) is not None:
+            columns["time"] = recording.read([known_clock[0]])[known_clock[0]] * known_clock[1]
+        for role, (name, unit) in MAPPED_NAMES.items():
+            signal = mapping.signal(role)
+            if signal is None:
+                continue
+            if "{}" in name and mapping.axis is None:
+                raise InputError(f"{mapping.where(role)}: of which axis is not said: add a line such as axis: X")
+            values = signal.sign * _scaled(recording, role, signal.column, signal.unit, signal.factor)
+            own = str(target_of(role, _unit_of(recording, signal.column, signal.unit, signal.factor)))
+            if own != unit:
+                if mapping.pitch is None:
+                    raise InputError(f"{mapping.where(role)}: is in {own}; for {unit} the mapping needs the pitch")
+                per_turn = mapping.pitch / (2 * np.pi)
+                values = np.asarray(values * (per_turn if own.startswith("rad") else 1 / per_turn), dtype=np.float64)
+            columns[name.format(mapping.axis)] = values
+            known[name.format(mapping.axis)] = unit
+    if "time" in columns:
+        known["time"] = "s"
+    note = f"{recording.path}: columns by {', '.join(str(mapping.file or 'a mapping') for mapping in mappings)}"
+    return Recording(
+        recording.path, tuple(columns), known, notes=(*recording.notes, note), remarks=recording.remarks,
+        _columns=columns,
+    )  # fmt: skip
+
+
+def _unit_of(recording: Recording, name: str, unit: str | None, factor: Factor | None) -> units.Unit:
+    if name not in recording.units:
+        raise InputError(f"{recording.header}: no column {name!r}{suggest(name, recording.names)}")
+    return resulting(unit or spelled(recording.units[name]) or "1", factor.unit if factor is not None else "1")
+
+
+def _scaled(recording: Recording, role: str, name: str, unit: str | None, factor: Factor | None) -> Array:
+    """Values of a column in the SI unit of its role."""
+    given = _unit_of(recording, name, unit, factor)
+    target = target_of(role, given)
+    scale = 1.0
+    if factor is not None:
+        scale = factor.value if factor.value is not None else recording.scalar(str(factor.variable))
+    return recording.read([name])[name] * scale * float(given.factor / units.unit(target).factor)
 
 
 def convert(file: str | Path | Recording, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:

@@ -88,6 +88,17 @@ class FrequencyResponse(Columns[Complexes]):
         """Number of frequencies."""
         return int(self.frequency.size)
 
+    def to_control(self, name: str) -> Any:
+        """A response as `control.FRD` of python-control, over the angular frequency [rad/s]. Needs that package.
+
+        As arrays a response is ``response.frequency`` [Hz] and ``response[name]``.
+        """
+        try:
+            from control import FRD
+        except ImportError:
+            raise InputError("python-control is needed: pip install control") from None
+        return FRD(np.asarray(self[name]), 2 * np.pi * np.asarray(self.frequency))
+
     def phase(self, name: str) -> Array:
         """Phase [deg], from -180 to 180."""
         return np.degrees(np.angle(self[name]))

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.errors import InputError, OutputError, few, nearest
+from feedsim.errors import InputError, OutputError, UnknownName, few, nearest
 from feedsim.extras import need
 
 if TYPE_CHECKING:
@@ -148,11 +148,11 @@ class Columns(Generic[Values]):
     kind: ClassVar[str] = "column"
 
     def __getitem__(self, name: str) -> Values:
-        """Values of a column; InputError with a suggestion if there is none of that name."""
+        """Values of a column; UnknownName with a suggestion if there is none of that name."""
         try:
             return self.columns[name]
         except KeyError:
-            raise InputError(f"no {self.kind} {name!r}{suggest(name, self.columns)}") from None
+            raise UnknownName(f"no {self.kind} {name!r}{suggest(name, self.columns)}") from None
 
     def __contains__(self, name: object) -> bool:
         return name in self.columns

@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from feedsim.analysis import Diagnosis, PositioningTask, tasks
+import numpy as np
+
+from feedsim.analysis import Diagnosis, Figure, PositioningTask, tasks
 from feedsim.analysis.circle import Term
+from feedsim.analysis.circle import name as name_of_term
 from feedsim.analysis.circle.words import worth_telling
 from feedsim.cosim import Run
 from feedsim.errors import FeedsimError, InputError
 from feedsim.linear.judgement import Loop, judge
 from feedsim.scenario import Cycles, Drive, Machine
 from feedsim.structure import Modes, checked_modes
+from feedsim.units import convert
+from feedsim.variables import parameters
 
 # --- Closed forms of a drive that proposals rest on: lags of slow motions, neutral T_sym, gain of the reference model -
 # With H(s) from the position setpoint to the position, the slope of its phase at 0 Hz is the lag of slow motions
@@ -92,9 +97,19 @@ NEUTRAL_SHARE, NEUTRAL = 0.02, 20e-6
 FITS = 0.1
 # Margins that a proposed gain keeps.
 GAIN_MARGIN, PHASE_MARGIN = 8.0, 40.0  # [dB], [deg]
+SHORTEST_REASON, SHORT_REASON = "shortest with", "as short as"  # how reasons begin that hold for any drive
+OUT_OF_LINE = 1.25  # a value that differs more from those of the other axes is taken for one that is off
 MIN_RESET_TIME = 1e-3  # T_n [s] below which none is proposed
 USUAL_RESET_RATIO = 2.0  # T_n over J/K_p that usual margins allow: the integral part takes 27 degrees at the crossover
 RESET_HALVINGS = 6  # of halving the range of T_n on a logarithmic scale: 3 % of its value
+
+
+COMPENSATION = "drive.friction_pulse"  # stands for a friction compensation of any kind
+PARAMETER_WORDS = {
+    COMPENSATION: "friction compensation", "path.jerk": "jerk of the path",
+    "drive.backlash_compensation.value": "backlash compensation",
+}  # fmt: skip
+WRITTEN = {"m": "um"}  # SI unit -> the unit that a value without a row in the table of the drive is written in
 
 
 @dataclass(frozen=True)
@@ -106,6 +121,7 @@ class Proposal:
         present, proposed: SI; None: only the direction is known. unit: SI unit.
         reason: why this value. direction: "higher" or "lower".
         margins: before and after, of the axis: least gain margin [dB] and phase margin [deg]; None where not asked.
+        step: by how much, where the present value is not known [SI]. of: key and axis of the cause of a circle.
     """
 
     cause: str
@@ -117,16 +133,31 @@ class Proposal:
     reason: str
     direction: str = ""
     margins: tuple[tuple[float, float], tuple[float, float]] | None = None
+    step: float | None = None
+    of: tuple[str, str] = ("", "")
 
     @property
     def key(self) -> str:
         """Of a scenario."""
-        return f"machine.axes.{self.axis}.{self.parameter}"
+        return f"machine.axes.{self.axis}.{self.parameter}" if self.axis else f"machine.{self.parameter}"
+
+    @property
+    def what(self) -> str:
+        """Parameter and axis in words: "T_sym of Z"."""
+        name = PARAMETER_WORDS.get(self.parameter, self.parameter.removeprefix("drive."))
+        return f"{name} of {self.axis}" if self.axis else name
 
     @property
     def setting(self) -> str:
-        """KEY=VALUE, as behind --set; "" where there is no value."""
-        return "" if self.proposed is None else f"{self.key}={self.proposed!r} {self.unit}"
+        """KEY=VALUE, as behind --set, with the digits that are shown; "" where there is no value."""
+        return "" if self.proposed is None else f"{self.key}={self.shown(self.proposed)}"
+
+    def shown(self, value: float, digits: int = 3, *, kept: bool = False) -> str:
+        """A value of the parameter with its unit, as it is typed. kept: with zeros at its end."""
+        own = parameters("controller").get(self.parameter.removeprefix("drive."))
+        unit = own.display_unit if own is not None else WRITTEN.get(self.unit, self.unit)
+        number = f"{convert(value, self.unit, unit):{'#' * kept}.{digits}g}".rstrip(".")
+        return f"{number}{'' if unit == '1' else f' {unit}'}"
 
 
 def of_circle(
@@ -139,15 +170,37 @@ def of_circle(
     """
     result: dict[str, Proposal] = {}
     terms = list(worth_telling(diagnosis))
-    if machine is not None and modes is not None:
+    if terms and machine is not None and modes is not None:
+        for axis in diagnosis.circle.axes:  # a model that is off makes more than one cause, and is named for the first
+            for proposal in _modelled(machine, modes, axis, name_of_term(terms[0])):
+                result[proposal.key] = replace(proposal, of=(terms[0].key, terms[0].axis))
         terms = _by_gain(terms, machine, modes)
     for term in terms:
         proposals = _unknown(diagnosis, term) if machine is None or modes is None else _of(
             diagnosis, term, machine, modes, searched
         )  # fmt: skip
         for proposal in proposals:
-            result.setdefault(proposal.key, proposal)
-    return list(result.values())
+            result.setdefault(proposal.key, replace(proposal, of=(term.key, term.axis)))
+    # Of all peaks a value of the file that is off comes first, then compensations, then what any drive could do.
+    places = [key for key, proposal in result.items() if proposal.of[0] == "peaks"]
+    ordered = iter(sorted(places, key=lambda key: _rank(result[key])))  # in the order of causes within a rank
+    return [result[next(ordered) if key in places else key] for key in result]
+
+
+def _modelled(machine: Machine, modes: Modes, axis: str, cause: str) -> Iterator[Proposal]:
+    """The parameter of an axis's reference model that is off, if one is."""
+    drive = machine.axes[axis].drive if axis in machine.axes else None
+    if isinstance(drive, Drive):
+        J = modes.J_tot(axis)
+        K_p = model_gain(drive, J)
+        proposal = None if K_p is None or abs(drive.K_p / K_p - 1) <= FITS else _model(machine, axis, drive, J, cause)
+        yield from [] if proposal is None else [proposal]
+
+
+def _rank(proposal: Proposal) -> int:
+    if proposal.parameter == COMPENSATION:
+        return 1
+    return 2 if proposal.reason.startswith((SHORTEST_REASON, SHORT_REASON)) else 0
 
 
 def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -> list[Proposal]:
@@ -155,16 +208,25 @@ def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -
     proposals = []
     for axis in axes:
         drive = machine.axes[axis].drive
-        if isinstance(drive, Drive):
+        if own := [*_modelled(machine, modes, axis, cause)]:
+            proposals += own
+        elif isinstance(drive, Drive):
             proposals += [*_neutral(machine, modes, axis, drive, cause), *_fitting(machine, modes, axis, drive, cause)]
     return proposals
 
 
-def of_run(run: Run, causes: Mapping[str, Diagnosis], *, searched: bool = False) -> list[Proposal]:
+def of_run(
+    run: Run,
+    causes: Mapping[str, Diagnosis],
+    figures: Mapping[str, Figure] | None = None,
+    *,
+    searched: bool = False,
+) -> list[Proposal]:
     """Proposals of a run: for the causes of its circles, and for the axes of its stops.
 
-    causes: prefix of a circle's figures -> why it is not round. searched: as of :func:`of_circle`. Drives of other
-    makers have none, nor have machines whose modes cannot be read any more.
+    causes: prefix of a circle's figures -> why it is not round. figures: of the run, by which stops that ring are
+    known. searched: as of :func:`of_circle`. Drives of other makers have none, nor have machines whose modes cannot be
+    read any more.
     """
     machine = run.scenario.machine
     if machine.foreign_units:
@@ -179,9 +241,36 @@ def of_run(run: Run, causes: Mapping[str, Diagnosis], *, searched: bool = False)
             proposals.setdefault(proposal.key, proposal)
     for task in tasks(run.scenario, run.program):
         if isinstance(task, PositioningTask):
-            for proposal in of_drives(machine, modes, [task.approach.axis], f"stops of {task.approach.axis}"):
+            axis = task.approach.axis
+            own = of_drives(machine, modes, [axis], f"stops of {axis}")
+            for proposal in own or _calmer(run, task, figures or {}):
                 proposals.setdefault(proposal.key, proposal)
     return list(proposals.values())
+
+
+def rings(settling_time: float, frequency: float) -> bool:
+    """Whether ringing [Hz] is what an axis waits for until it has settled [s]: it lasts a period of it or more."""
+    return math.isfinite(settling_time * frequency) and settling_time * frequency >= 1
+
+
+def _calmer(run: Run, task: PositioningTask, figures: Mapping[str, Figure]) -> Iterator[Proposal]:
+    """A jerk whose phases last a period of the ringing, of a stop that waits for it.
+
+    A phase of constant jerk acts on a mode as its mean over that time, which is nothing over whole periods: the zeros
+    of sin(pi f T)/(pi f T).
+    """
+    path, axis = run.scenario.machine.path, task.approach.axis
+    settling, ringing = (figures.get(f"{task.prefix}.{name}") for name in ("settling_time", "ringing_frequency"))
+    if settling is None or ringing is None or not rings(settling.value * 1e-3, ringing.value):
+        return
+    f = ringing.value
+    own = run.scenario.machine.axes[axis]
+    begin, end = np.searchsorted(run.program.time, (task.approach.start, task.approach.end))
+    speed = float(np.abs(run.program.n_ffw[axis][begin : end + 1]).max()) * own.I_P
+    acceleration = min(speed * f, path.acceleration, own.max_acceleration)
+    if (jerk := acceleration * f) < path.jerk:
+        reason = f"a phase of constant jerk then lasts a period of the {f:.3g} Hz that ring"
+        yield Proposal(f"stops of {axis}", "", "path.jerk", path.jerk, jerk, "m/s^3", reason, "lower")
 
 
 def changed(machine: Machine, axis: str, values: Mapping[str, float]) -> Machine:
@@ -228,6 +317,9 @@ def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, search
                 if term.value < 0 or proposal.direction == "higher":
                     yield proposal
             if term.value > 0:
+                yield from _out_of_line(machine, modes, term.axis, drive, cause)
+                reason = "feedsim tune compensation finds its values"
+                yield Proposal(cause, term.axis, COMPENSATION, None, None, "1", reason, "on")
                 yield from _shorter(machine, modes, term.axis, drive, cause, searched)
         case "lost_motion":
             yield from _backlash(machine, term)
@@ -275,7 +367,11 @@ def _servo(axes: tuple[str, str], value: float, machine: Machine, modes: Modes) 
     if off[late] - off[early] > NEUTRAL:
         parts.append((off[late] - off[early], _symmetry(worst, machine.axes[worst].drive, neutral[worst], cause)))  # type: ignore[arg-type]
     loops = L.T_dyn + neutral[late] - E.T_dyn - neutral[early]
-    if loops > NEUTRAL:
+    if loops > NEUTRAL and L.T_dyn >= loops - NEUTRAL:
+        reason = f"{early} then waits as long as {late}"
+        less = Proposal(cause, late, "drive.T_dyn", L.T_dyn, max(L.T_dyn - loops, 0.0), "s", reason, "lower")
+        parts.append((loops, less))
+    elif loops > NEUTRAL:
         parts.append((loops, _matching(early, E, E.T_dyn + loops, late, cause)))
     yield from (proposal for _, proposal in sorted(parts, key=lambda part: -part[0]))
     if axis_lag(L) - axis_lag(E) < 0.5 * abs(value):  # the drives as the file has them do not explain it
@@ -330,7 +426,7 @@ def _neutral(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
 
 def _fitting(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
     K_p = model_gain(drive, modes.J_tot(axis))
-    if K_p is None or abs(drive.K_p / K_p - 1) <= FITS:
+    if K_p is None or abs(drive.K_p / K_p - 1) <= FITS or [*_modelled(machine, modes, axis, cause)]:
         return
     before, after = (
         least_margins(judge(entry, modes), axis) for entry in (machine, changed(machine, axis, {"K_p": K_p}))
@@ -338,6 +434,71 @@ def _fitting(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
     reason = "J omega_0/(2 D), which the reference model stands for"
     direction = "higher" if K_p > drive.K_p else "lower"
     yield Proposal(cause, axis, "drive.K_p", drive.K_p, K_p, "N.m.s/rad", reason, direction, (before, after))
+
+
+def _model(machine: Machine, axis: str, drive: Drive, J: float, cause: str) -> Proposal | None:
+    """The parameter of the reference model with which both K_p and T_sym fit it; None where none is."""
+    assert drive.omega_0 is not None
+    assert drive.D is not None
+    factor = drive.K_p / (model_gain(drive, J) or math.inf)
+    fitting = drive.model_copy(update={"omega_0": drive.omega_0 * factor})
+    neutral = loop_lag(fitting, machine.cycles, J)
+    if drive.k_ffw <= 0 or abs(drive.T_sym - neutral) > max(NEUTRAL, NEUTRAL_SHARE * neutral):
+        return None
+    others = [entry.drive.D for name, entry in machine.axes.items() if name != axis and isinstance(entry.drive, Drive)]
+    usual = [D for D in others if D is not None]
+    reason = "with it both K_p and T_sym fit the reference model"
+    # D/omega_0 alone counts: damping that the other axes do not have is what is off.
+    if (
+        usual
+        and not any(abs(drive.D / D - 1) <= FITS for D in usual)
+        and abs(drive.D / factor / usual[0] - 1) <= 2 * FITS
+    ):
+        direction = "lower" if factor > 1 else "higher"
+        return Proposal(cause, axis, "drive.D", drive.D, drive.D / factor, "1", reason, direction)
+    direction = "higher" if factor > 1 else "lower"
+    return Proposal(cause, axis, "drive.omega_0", drive.omega_0, drive.omega_0 * factor, "rad/s", reason, direction)
+
+
+def _out_of_line(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
+    """A K_v below all of the other axes, and a T_n that is long beside theirs, as times of J/K_p; largest gain first.
+
+    J/K_p is that of the reference model where there is one, so that a K_p that is off does not count twice.
+    """
+
+    def ratio(name: str, own: Drive) -> float:
+        J = modes.J_tot(name)
+        K_p = None if [*_modelled(machine, modes, name, "")] else model_gain(own, J)
+        return own.T_n * (K_p or own.K_p) / J if own.speed_integrator and own.T_n else math.inf
+
+    others = [
+        (name, entry.drive) for name, entry in machine.axes.items()
+        if name != axis and isinstance(entry.drive, Drive) and entry.drive.K_v > 0 and entry.drive.K_p > 0
+    ]  # fmt: skip
+    if not others or drive.K_v <= 0 or drive.K_p <= 0:
+        return
+    proposals = []
+    usual = max(ratio(name, own) for name, own in others)
+    if drive.T_n is not None and ratio(axis, drive) > OUT_OF_LINE * usual:
+        T_n = drive.T_n * usual / ratio(axis, drive)
+        reason = "as long beside J/K_p as those of the other axes"
+        proposals.append(Proposal(cause, axis, "drive.T_n", drive.T_n, T_n, "s", reason, "lower"))
+    K_v = min(own.K_v for _, own in others)
+    if K_v > OUT_OF_LINE * drive.K_v:
+        proposals.append(
+            Proposal(cause, axis, "drive.K_v", drive.K_v, K_v, "1/s", "as the other axes have it", "higher")
+        )
+    before = least_margins(judge(machine, modes), axis) if proposals else (math.inf, math.inf)
+
+    def response(proposal: Proposal) -> float:
+        name = proposal.parameter.removeprefix("drive.")
+        return torque_response(drive.model_copy(update={name: proposal.proposed}))
+
+    for proposal in sorted(proposals, key=response):
+        value = {proposal.parameter.removeprefix("drive."): proposal.proposed}
+        after = least_margins(judge(changed(machine, axis, value), modes), axis)  # type: ignore[arg-type]
+        if after[0] >= GAIN_MARGIN and after[1] >= PHASE_MARGIN:
+            yield replace(proposal, margins=(before, after))
 
 
 def _without_feedforward(machine: Machine, axes: Sequence[str], cause: str) -> Iterator[Proposal]:
@@ -352,10 +513,10 @@ def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
     """A shorter T_n: the integral part answers friction sooner, as far as margins allow."""
     if not drive.speed_integrator or drive.T_n is None or drive.T_n <= MIN_RESET_TIME:
         return
-    reason = f"shortest with {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
+    reason = f"{SHORTEST_REASON} {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
     if not searched:
         margins = f"{GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg"
-        reason = f"as short as margins of {margins} allow; feedsim tune proposals finds the value"
+        reason = f"{SHORT_REASON} margins of {margins} allow; feedsim tune proposals finds the value"
         yield Proposal(cause, axis, "drive.T_n", drive.T_n, None, "s", reason, "lower")
         return
     before = least_margins(judge(machine, modes), axis)
@@ -391,18 +552,20 @@ def _unknown(diagnosis: Diagnosis, term: Term) -> Iterator[Proposal]:
     if term.key == "servo":
         late, early = (first, second) if term.value > 0 else (second, first)
         cause = f"servo mismatch: {late} is {abs(term.value) * 1e3:.3g} ms later than {early}"
-        reason = f"a higher K_v or more feedforward makes {late} sooner"
-        yield Proposal(cause, late, "drive.K_v", None, None, "1/s", reason, "higher")
         yield Proposal(
             cause, early, "drive.T_dyn", None, None, "s",
-            f"or {early} waits: {abs(term.value) * 1e3:.3g} ms more", "higher",
+            f"{early} then waits for {late}", "higher", step=abs(term.value),
         )  # fmt: skip
+        reason = f"or a higher K_v or more feedforward: {late} is sooner"
+        yield Proposal(cause, late, "drive.K_v", None, None, "1/s", reason, "higher")
     elif term.key == "peaks" and term.value > 0:
-        reason = "the integral part answers friction sooner; or friction compensation"
-        yield Proposal(f"reversal peaks of {term.axis}", term.axis, "drive.T_n", None, None, "s", reason, "lower")
+        cause = f"reversal peaks of {term.axis}"
+        yield Proposal(cause, term.axis, COMPENSATION, None, None, "1", "takes the peak away", "on")
+        reason = "as short as margins allow: the integral part answers friction sooner"
+        yield Proposal(cause, term.axis, "drive.T_n", None, None, "s", reason, "lower")
     elif term.key == "lost_motion":
         yield Proposal(
             f"lost motion of {term.axis}", term.axis, "drive.backlash_compensation.value", None, None, "m",
             f"{abs(term.value) * 1e6:.3g} um {'more' if term.value > 0 else 'less'}",
-            "higher" if term.value > 0 else "lower",
+            "higher" if term.value > 0 else "lower", step=term.value,
         )  # fmt: skip

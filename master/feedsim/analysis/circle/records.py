@@ -31,9 +31,11 @@ from feedsim.analysis.circle.geometry import CLOSED, CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError, few
+from feedsim.files.columns import Columns
 from feedsim.files.spellings import spelled
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
+from feedsim.trace.recording import mapped
 
 # --- Radius and feed that an instrument writes ahead of the columns of a circle, such as "Radius: 150 mm" -------------
 # Instruments of several makers, and controls, export circles as text; how their own files are built is not public.
@@ -194,11 +196,13 @@ def read_circle(
     feed: float | None = None,
     centre: tuple[float, float] | None = None,
     pitch: dict[str, float] | None = None,
+    mappings: Sequence[Columns] = (),
 ) -> RecordedCircle:
     """Turns of one circle in one file or several.
 
     axes: first and second of its plane. radius [m], feed [m/s], centre [m]: as programmed; where they are not given
-    they are those of the files. Raises InputError: what a file lacks, and what it has.
+    they are those of the files. mappings: which columns are what. Raises InputError: what a file lacks, and what it
+    has.
     """
     notes: list[str] = []
     doubts: list[str] = []
@@ -207,7 +211,7 @@ def read_circle(
     radii: list[float] = []
     headers = Told(radius, feed)
     for file in files:
-        recording = read_recording(file)
+        recording = mapped(read_recording(file), mappings)
         headers.add(file, recording.remarks)
         radius = headers.radius
         both = _beside_each_other(recording)
@@ -328,9 +332,14 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
             f"{recording.header}: is a row of units, {has}; needed is one row of names with their units, such as "
             "Angle [deg] and Deviation [um], and no other row between it and the values"
         )
+    lengths = [name for name in recording.names if _is(recording, name, "m")]
+    one, other = lengths[:2] if len(lengths) > 1 else ("...", "...")
     raise InputError(
         f"{recording.header}: holds {has}; needed are positions of both axes ({axes[0]} [mm], {axes[1]} [mm]; --axes "
-        "says which two), or angle [deg] with deviation [um] or radius [mm]"
+        "says which two), or angle [deg] with deviation [um] or radius [mm]. Or a mapping file for each axis says "
+        f'which columns are what: write "axis: {axes[0]}" and "position: {{column: {one}, unit: mm}}" to '
+        f"{axes[0]}.yaml, the same of {axes[1]} with {other} to {axes[1]}.yaml, and give --columns {axes[0]}.yaml "
+        f"--columns {axes[1]}.yaml"
     )
 
 

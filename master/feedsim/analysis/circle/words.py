@@ -22,10 +22,13 @@ MIN_CERTAINTY = 2.0
 CONTRADICT = 0.5
 
 
-def answer(diagnosis: Diagnosis) -> str:
-    """Why the circle is not round, in a sentence or two: what it means, whether it can be trusted, what to do next."""
+def answer(diagnosis: Diagnosis, remedy: str = "") -> str:
+    """Why the circle is not round: quantity and value, the main cause with its size, the remedy.
+
+    remedy: of the main cause, where more is known of the machine than the circle shows.
+    """
     terms = worth_telling(diagnosis)
-    G = f"circular deviation G {_um(diagnosis.G)}"
+    G = f"G = {_um(diagnosis.G)}"
     if diagnosis.arc is not None:
         G = f"on {_arc(diagnosis)} the radial deviation ranges over {_um(diagnosis.G)}"
     if diagnosis.apart > CONTRADICT * diagnosis.G:
@@ -35,10 +38,15 @@ def answer(diagnosis: Diagnosis) -> str:
             "counterclockwise, angles that fall as clockwise. Reverse the rows of that turn, or give each by itself."
         )
     if not terms:
-        return f"{G}: no single cause stands out; what remains is {_um(_rest(diagnosis).size)}."
-    first = f"{G}, {'mostly: ' if terms[0].share > 0.5 else 'first: '}{sentence(diagnosis, terms[0])}"
-    more = [f"Then {sentence(diagnosis, term)}" for term in terms[1:3]]
-    return ". ".join([first, *more]) + "." + _trust(diagnosis)
+        return f"{G}. No single cause stands out; {_um(_rest(diagnosis).size)} remain unexplained."
+    what, own_remedy = described(diagnosis, terms[0])
+    remedy = remedy or own_remedy
+    said = [
+        f"{'Main' if terms[0].share > 0.5 else 'Largest'} cause: {what}",
+        *([f"Remedy: {remedy}"] if remedy else []),
+    ]
+    others = [described(diagnosis, term)[0] for term in terms[1:3]]
+    return ". ".join([G, *said, *(f"Also: {what}" for what in others)]) + "." + _trust(diagnosis)
 
 
 def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
@@ -62,84 +70,96 @@ def worth_telling(diagnosis: Diagnosis) -> list[Term]:
 
 def sentence(diagnosis: Diagnosis, term: Term) -> str:
     """A cause in words, with its amount and where to look."""
+    what, remedy = described(diagnosis, term)
+    return f"{what}; remedy: {remedy}" if remedy else what
+
+
+def described(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
+    """A cause with its amount, and the remedy; "" where the cause says it, or none is known."""
     first, second = diagnosis.circle.axes
     value, axis = term.value, term.axis
     amount = abs(value)
     if not term.determined:
         reverses = term.key == "peaks" or (term.key == "lost_motion" and not diagnosis.reverses(axis))
-        return f"{name(term)}: not determined{f', as {axis} does not reverse on the arc' if reverses else ''}"
+        return f"{name(term)}: not determined{f', as {axis} does not reverse on the arc' if reverses else ''}", ""
     if not term.shows and term.key not in ("rest", "peaks"):
-        return f"{name(term)}: cannot be distinguished from zero"
+        return f"{name(term)}: cannot be distinguished from zero", ""
     match term.key:
         case "offset":
-            return f"the centre lies {_um(amount)} off: set-up of the measurement, or drift since the centre was set"
+            return f"the centre lies {_um(amount)} off", "set up the measurement again, or look for drift"
         case "radius":
-            return f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: {_lag(diagnosis, value)}"
+            return f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: {_lag(diagnosis, value)}", ""
         case "scale":
             more, less = (first, second) if value > 0 else (second, first)
-            return f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: {_unlike(diagnosis, value)}"
+            return f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: {_unlike(diagnosis, value)}", ""
         case "squareness":
             return (
-                f"the angle between {first}+ and {second}+ is {_digits(amount * 1e6)} um/m "
-                f"{'less' if value > 0 else 'more'} than 90 deg: squareness of the guideways, or its compensation"
-            )
+                f"squareness: the angle between {first}+ and {second}+ is {_two(amount * 1e6)} um/m "
+                f"{'less' if value > 0 else 'more'} than 90 deg"
+            ), "align the guideways, or change their squareness compensation"
         case "servo":
             late, early = (first, second) if value > 0 else (second, first)
-            return f"{late} answers {_digits(amount * 1e3)} ms later than {early}: K_v, speed feedforward or T_dyn"
+            time = f"{_two(amount * 1e3)} ms"
+            return (
+                f"servo mismatch: {late} lags {early} by {time}",
+                f"raise K_v or feedforward of {late}, or delay {early} by {time} (T_dyn)",
+            )
         case "squareness_or_servo":
             sense = diagnosis.senses[0]
             delay = 2 * amount / diagnosis.circle.speed * 1e3
             late, early = (first, second) if sense * value > 0 else (second, first)
             return (
                 f"an ellipse along {'+' if value > 0 else '-'}45 deg of {_um(amount)} amplitude: servo mismatch "
-                f"({late} answers {_digits(delay)} ms later than {early}) or squareness "
-                f"({_digits(2 * amount / diagnosis.circle.radius * 1e6)} um/m); one direction cannot tell which, "
-                "the other one will"
-            )
+                f"({late} lags {early} by {_two(delay)} ms) or squareness "
+                f"({_digits(2 * amount / diagnosis.circle.radius * 1e6)} um/m)"
+            ), "record the other direction; it separates the two"
+        case "lost_motion" if value > 0:
+            return f"lost motion of {axis} ({_um(amount)}), caused by backlash or wind-up", "backlash compensation"
         case "lost_motion":
-            what = (
-                "backlash or wind-up, which backlash compensation takes away"
-                if value > 0
-                else "too much backlash compensation, or friction at rest"
-            )
-            return f"{axis} {'loses' if value > 0 else 'gains'} {_um(amount)} where it reverses: {what}"
+            return (
+                f"{axis} gains {_um(amount)} where it reverses, caused by too much backlash compensation, or friction "
+                "at rest"
+            ), "less backlash compensation"
         case "peaks":
             return _peaks(diagnosis, term)
         case "pitch":
-            return f"{axis} errs by {_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder"
+            return (
+                f"pitch error of {axis} ({_um(amount)} amplitude)",
+                "check screw and motor encoder, or compensate the pitch",
+            )
         case "cogging":
             return (
-                f"the torque of {axis} swings by {_digits(amount)} N.m (amplitude), {term.order} times in a turn of "
-                "the motor: cogging, or torque that repeats with the screw; cogging compensation takes it away"
-            )
+                f"cogging of {axis} ({_two(amount)} N.m amplitude, {term.order} times in a turn of the motor), or "
+                "torque that repeats with the screw"
+            ), "cogging compensation"
         case "straightness":
             other = second if axis == first else first
             return (
                 f"the guide of {axis} is bent by {_um(amount)} towards {other}{'+' if value > 0 else '-'} at the edges "
                 f"of the circle: straightness, or an error of {other}'s position that grows with its square"
-            )
+            ), ""
         case "third":
             return (
                 f"guides are bent in third order by {_um(amount)} at the edges of the circle, {first}'s less "
                 f"{second}'s: straightness"
-            )
+            ), ""
         case "drift":
-            return f"the centre moves by {_um(amount)} in a turn: temperature, or a set-up that is not firm"
+            return f"the centre moves by {_um(amount)} in a turn: temperature, or a set-up that is not firm", ""
         case "centres":
             return (
                 f"the centres of {'both directions' if diagnosis.both else 'two turns'} lie {_um(amount)} apart: an "
                 "eccentric pivot or probe, or drift between the turns"
-            )
+            ), ""
         case "radii" if diagnosis.both:
             return (
                 f"the mean radius of counterclockwise turns is {_um(amount)} {'larger' if value > 0 else 'smaller'} "
                 "than that of clockwise ones: feeds that differ, or an instrument that drifts or gives way between "
                 "the turns"
-            )
+            ), ""
         case "radii":
-            return f"the mean radii of two turns differ by {_um(amount)}: temperature, of machine or instrument"
+            return f"the mean radii of two turns differ by {_um(amount)}: temperature, of machine or instrument", ""
     form = ", ".join(f"order {n}: {_um(a)}" for n, a in diagnosis.form.items())
-    return f"what no cause explains: {_um(term.size)} from peak to valley{f' ({form})' if form else ''}"
+    return f"what no cause explains: {_um(term.size)} from peak to valley{f' ({form})' if form else ''}", ""
 
 
 def further(diagnosis: Diagnosis) -> list[str]:
@@ -210,8 +230,8 @@ def _lag(diagnosis: Diagnosis, change: float) -> str:
         )
     rest = change - diagnosis.lag
     return (
-        f"path lag makes {_um(diagnosis.lag)} by the response of the position loops (K_v, speed feedforward, T_sym), "
-        f"friction or a scale {_um(rest)}"
+        f"path lag makes {_digits(diagnosis.lag * 1e6)} um by the response of the position loops (K_v, speed "
+        f"feedforward, T_sym), friction or a scale {_digits(rest * 1e6)} um"
     )
 
 
@@ -226,17 +246,19 @@ def _unlike(diagnosis: Diagnosis, value: float) -> str:
     )
 
 
-def _peaks(diagnosis: Diagnosis, term: Term) -> str:
+def _peaks(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
     own = [peak for peak in diagnosis.peaks if peak.axis == term.axis]
     largest = max(own, key=lambda peak: abs(peak.height))
     if largest.height == 0:
         limit = max((peak.half for peak in own if math.isfinite(peak.half)), default=math.nan)
-        return f"where {term.axis} reverses nothing stands out" + (f" (above {_um(limit)})" if limit > 1e-8 else "")
-    where = "stays behind for a moment" if largest.height > 0 else "jumps ahead for a moment"
-    wide = f", {largest.width * 1e3:.3g} ms wide" if math.isfinite(largest.width) else ""
-    behind, ahead = "friction, which friction compensation takes away", "too much friction compensation"
-    remedy = behind if largest.height > 0 else ahead
-    return f"{term.axis} {where} where it reverses, {_um(abs(largest.height))}{wide}: {remedy}"
+        above = f" (above {_um(limit)})" if limit > 1e-8 else ""
+        return f"where {term.axis} reverses nothing stands out{above}", ""
+    wide = f", {_two(largest.width * 1e3)} ms wide" if math.isfinite(largest.width) else ""
+    if largest.height > 0:
+        size = f"{_um(largest.height)} high{wide}"
+        return f"reversal peaks of {term.axis} ({size}), caused by friction", "friction compensation"
+    size = f"{_um(-largest.height)} ahead{wide}"
+    return f"reversal peaks of {term.axis} ({size}), caused by too much friction compensation", "less of it"
 
 
 def swinging(diagnosis: Diagnosis) -> str:
@@ -280,7 +302,13 @@ def name(term: Term) -> str:
 
 
 def _um(value: float) -> str:
-    return f"{_digits(value * 1e6)} um"
+    return f"{_two(value * 1e6)} um"
+
+
+def _two(value: float) -> str:
+    """Two digits that matter, no place before the point left out, and none after the third place behind it."""
+    exponent = int(f"{value:.1e}".partition("e")[2])
+    return f"{value:.{min(max(0, 1 - exponent), 3)}f}"
 
 
 def _digits(value: float) -> str:

@@ -9,9 +9,10 @@ function general(value, digits) {
   return trimmed(value.toFixed(Math.max(digits - 1 - at, 0)));
 }
 
-// Three digits that matter, and none after the third place behind the point.
+// Three digits that matter, or two, and none after the third place behind the point.
 const three = value => value.toFixed(Math.min(Math.max(0, 2 - Number(value.toExponential(2).split("e")[1])), 3));
-const in_um = value => `${three(value * 1e6)} um`;
+const two = value => value.toFixed(Math.min(Math.max(0, 1 - Number(value.toExponential(1).split("e")[1])), 3));
+const in_um = value => `${two(value * 1e6)} um`;
 const term_of = (diagnosis, key) => diagnosis.terms.find(term => term.key === key);
 
 function named_terms({ terms, G }) {
@@ -20,41 +21,48 @@ function named_terms({ terms, G }) {
   return [...result.sort((a, b) => b.gain - a.gain || b.share - a.share), ...besides.sort((a, b) => b.size - a.size)];
 }
 
-// Why the circle is not round, in a sentence or two.
+// Why the circle is not round: quantity and value, the main cause with its size, the remedy.
 function answer_of(diagnosis) {
-  const named = named_terms(diagnosis), G = `circular deviation G ${in_um(diagnosis.G)}`, rest = term_of(diagnosis, "rest");
-  if (!named.length) return `${G}: no single cause stands out; what remains is ${in_um(rest.size)}.`;
-  const said = [`${G}, ${named[0].share > 0.5 ? "mostly: " : "first: "}${sentence_of(diagnosis, named[0])}`, ...named.slice(1, 3).map(term => `Then ${sentence_of(diagnosis, term)}`)];
+  const named = named_terms(diagnosis), G = `G = ${in_um(diagnosis.G)}`, rest = term_of(diagnosis, "rest");
+  if (!named.length) return `${G}. No single cause stands out; ${in_um(rest.size)} remain unexplained.`;
+  const [what, remedy] = described(diagnosis, named[0]), said = [G, `${named[0].share > 0.5 ? "Main" : "Largest"} cause: ${what}`, ...(remedy ? [`Remedy: ${remedy}`] : []), ...named.slice(1, 3).map(term => `Also: ${described(diagnosis, term)[0]}`)];
   const trust = diagnosis.noise > SAID.NOISY * diagnosis.G ? ` Noise of ${in_um(diagnosis.noise)} hides much: measure again, or more slowly.`
     : Math.max(Math.abs(rest.share), rest.size / diagnosis.G) > 0.5 ? " The model explains less than half of G: look at the picture before acting on it." : "";
   return `${said.join(". ")}.${trust}`;
 }
 
 function sentence_of(diagnosis, term) {
+  const [what, remedy] = described(diagnosis, term);
+  return remedy ? `${what}; remedy: ${remedy}` : what;
+}
+
+// A cause with its amount, and the remedy.
+function described(diagnosis, term) {
   const [first, second] = diagnosis.circle.axes, { value, axis } = term, amount = Math.abs(value);
-  if (!term.certain && term.key !== "rest" && term.key !== "peaks") return `${name_of(term)}: cannot be distinguished from zero`;
+  if (!term.certain && term.key !== "rest" && term.key !== "peaks") return [`${name_of(term)}: cannot be distinguished from zero`, ""];
   switch (term.key) {
-    case "offset": return `the centre lies ${in_um(amount)} off: set-up of the measurement, or drift since the centre was set`;
-    case "radius": return `the radius is ${in_um(amount)} too ${value > 0 ? "large" : "small"}: ${lag_words(diagnosis, value)}`;
+    case "offset": return [`the centre lies ${in_um(amount)} off`, "set up the measurement again, or look for drift"];
+    case "radius": return [`the radius is ${in_um(amount)} too ${value > 0 ? "large" : "small"}: ${lag_words(diagnosis, value)}`, ""];
     case "scale": {
       const [more, less] = value > 0 ? [first, second] : [second, first];
-      return `${more} travels ${three(amount * 1e6)} um/m more than ${less}: ${unlike_words(diagnosis, value)}`;
+      return [`${more} travels ${three(amount * 1e6)} um/m more than ${less}: ${unlike_words(diagnosis, value)}`, ""];
     }
-    case "squareness": return `the angle between ${first}+ and ${second}+ is ${three(amount * 1e6)} um/m ${value > 0 ? "less" : "more"} than 90 deg: squareness of the guideways, or its compensation`;
+    case "squareness": return [`squareness: the angle between ${first}+ and ${second}+ is ${two(amount * 1e6)} um/m ${value > 0 ? "less" : "more"} than 90 deg`, "align the guideways, or change their squareness compensation"];
     case "servo": {
-      const [late, early] = value > 0 ? [first, second] : [second, first];
-      return `${late} answers ${three(amount * 1e3)} ms later than ${early}: K_v, speed feedforward or T_dyn`;
+      const [late, early] = value > 0 ? [first, second] : [second, first], time = `${two(amount * 1e3)} ms`;
+      return [`servo mismatch: ${late} lags ${early} by ${time}`, `raise K_v or feedforward of ${late}, or delay ${early} by ${time} (T_dyn)`];
     }
     case "squareness_or_servo": {
       const delay = 2 * amount / diagnosis.circle.speed * 1e3, [late, early] = diagnosis.senses[0] * value > 0 ? [first, second] : [second, first];
-      return `an ellipse along ${value > 0 ? "+" : "-"}45 deg of ${in_um(amount)} amplitude: servo mismatch (${late} answers ${three(delay)} ms later than ${early}) or squareness `
-        + `(${three(2 * amount / diagnosis.circle.radius * 1e6)} um/m); one direction cannot tell which, the other one will`;
+      return [`an ellipse along ${value > 0 ? "+" : "-"}45 deg of ${in_um(amount)} amplitude: servo mismatch (${late} lags ${early} by ${two(delay)} ms) or squareness `
+        + `(${three(2 * amount / diagnosis.circle.radius * 1e6)} um/m)`, "record the other direction; it separates the two"];
     }
-    case "lost_motion": return `${axis} ${value > 0 ? "loses" : "gains"} ${in_um(amount)} where it reverses: ${value > 0 ? "backlash or wind-up, which backlash compensation takes away" : "too much backlash compensation, or friction at rest"}`;
+    case "lost_motion": return value > 0 ? [`lost motion of ${axis} (${in_um(amount)}), caused by backlash or wind-up`, "backlash compensation"]
+      : [`${axis} gains ${in_um(amount)} where it reverses, caused by too much backlash compensation, or friction at rest`, "less backlash compensation"];
     case "peaks": return peak_words(diagnosis, term);
-    case "pitch": return `${axis} errs by ${in_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder`;
+    case "pitch": return [`pitch error of ${axis} (${in_um(amount)} amplitude)`, "check screw and motor encoder, or compensate the pitch"];
   }
-  return `what no cause explains: ${in_um(term.size)} from peak to valley (${diagnosis.form.map(([n, size]) => `order ${n}: ${in_um(size)}`).join(", ")})`;
+  return [`what no cause explains: ${in_um(term.size)} from peak to valley (${diagnosis.form.map(([n, size]) => `order ${n}: ${in_um(size)}`).join(", ")})`, ""];
 }
 
 function unlike_words({ unlike }, value) {
@@ -65,17 +73,18 @@ function unlike_words({ unlike }, value) {
 
 function lag_words({ lag }, change) {
   if (lag === null) return "path lag without speed feedforward, symmetry filter T_sym, or a scale of both axes; one feed cannot tell which: path lag grows with the square of the feed, a scale does not";
-  return `path lag makes ${in_um(lag)} by the response of the position loops (K_v, speed feedforward, T_sym), friction or a scale ${in_um(change - lag)}`;
+  return `path lag makes ${three(lag * 1e6)} um by the response of the position loops (K_v, speed feedforward, T_sym), friction or a scale ${three(1e6 * (change - lag))} um`;
 }
 
 function peak_words({ peaks }, { axis }) {
-  const largest = largest_peak(peaks, axis);
-  if (largest.height === 0) {
+  const largest = largest_peak(peaks, axis), { height } = largest;
+  if (height === 0) {
     const seen = peaks.filter(peak => peak.axis === axis && Number.isFinite(peak.half)).map(peak => peak.half), limit = seen.length ? Math.max(...seen) : NaN;
-    return `where ${axis} reverses nothing stands out${limit > 1e-8 ? ` (above ${in_um(limit)})` : ""}`;
+    return [`where ${axis} reverses nothing stands out${limit > 1e-8 ? ` (above ${in_um(limit)})` : ""}`, ""];
   }
-  const behind = largest.height > 0, wide = Number.isFinite(largest.width) ? `, ${general(largest.width * 1e3, 3)} ms wide` : "";
-  return `${axis} ${behind ? "stays behind" : "jumps ahead"} for a moment where it reverses, ${in_um(Math.abs(largest.height))}${wide}: ${behind ? "friction, which friction compensation takes away" : "too much friction compensation"}`;
+  const wide = Number.isFinite(largest.width) ? `, ${two(largest.width * 1e3)} ms wide` : "";
+  return height > 0 ? [`reversal peaks of ${axis} (${in_um(height)} high${wide}), caused by friction`, "friction compensation"]
+    : [`reversal peaks of ${axis} (${in_um(-height)} ahead${wide}), caused by too much friction compensation`, "less of it"];
 }
 
 function swinging_words({ vibrations }) {
@@ -94,7 +103,7 @@ function misleading(diagnosis, figures) {
     const { height } = largest_peak(diagnosis.peaks, axis), [old, unit] = figures[`glitch_${axis}`], off = Math.abs(old * 1e-6 - height);
     if (!(off > Math.max(0.2 * Math.abs(height), 1e-6))) continue;
     const form = diagnosis.terms.filter(term => term.key !== "peaks" && term.key !== "rest").reduce((best, term) => term.size > best.size ? term : best);
-    result.push(`glitch_${axis}, ${general(old, 4)} ${unit}, is the largest deviation in the quadrant whatever its cause; what stands out where ${axis} reverses is peak_${axis}, ${general(height * 1e6, 3)} um. The rest is form, most of it ${name_of(form)}`);
+    result.push(`glitch_${axis}, ${general(old, 4)} ${unit}, is the largest deviation of the quadrant, most of it ${name_of(form)}; the reversal peak of ${axis} itself is ${general(height * 1e6, 3)} um`);
   }
   return result;
 }

@@ -179,7 +179,7 @@ function loop_warnings(loops) {
     if (!unstable.length) {
       const margins = thin.map(loop => `gain ${Number.isFinite(loop.gain_margin) ? decibels(loop.gain_margin).toFixed(1) : "inf"} dB, phase ${loop.phase_margin.toFixed(0)} deg ${LOOP_STATE[loop.state]}`).join("; ");
       result.push(`axis ${axis}: the ${kind} loop has thin margins with ${now}: ${margins}${better} ${usual}`);
-    } else result.push(`axis ${axis}: the ${kind} loop is unstable with ${now}: ${states.map(limit_words).join("; ")}${better} ${usual}. A run shows this instability, whatever coupling.substeps are`);
+    } else result.push(`axis ${axis}: the ${kind} loop is unstable with ${now}: ${states.map(limit_words).join("; ")}${better} ${usual}. The instability is physical; a smaller step does not remove it`);
   }
   return result;
 }

@@ -14,7 +14,7 @@ from feedsim.analysis import Contour, Figure, Turn, contour
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.compensation import Compensation, Quality, Variation
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel, spans
-from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code, typed
+from feedsim.report.content import Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hashed, inputs_part, quantity
@@ -184,12 +184,7 @@ def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
         warnings=compensation.warnings,
         notes=(scenario.machine.note, scenario.note),
         tiles=list(_tiles(compensation)),
-        next_step=(
-            "See what becomes of it as the machine wears or warms:\n",
-            code(f"feedsim tune feedforward {typed(scenario.file)} --table"),
-        )
-        if not compensation.table
-        else ("Lay it over another run:\n", code(f"feedsim diff {FOLDER} OTHER_FOLDER")),
+        next_step=Step("Find values of a compensation that controls have", "tune compensation", {"friction": None}),
         main=[
             *pictures,
             _errors(compensation) if compensation.table else None,

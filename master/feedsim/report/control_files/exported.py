@@ -11,7 +11,7 @@ from feedsim.analysis import Figure
 from feedsim.control.archive import Archive
 from feedsim.control.writing import Written
 from feedsim.findings import Note
-from feedsim.report.content import Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.control_files.sources import sources_section
 from feedsim.report.formatting import counted, minus, plain_unit
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
@@ -113,7 +113,11 @@ def report_of(
             Tile(f"{int(figure.value)}", name.partition(".")[2].replace("_", " "), figure.meaning)
             for name, figure in figures.items()
         ],
-        next_step=("See what the control would have:\n", code("feedsim machine import FILE --axes AXES")),
+        next_step=Step(
+            "See what the control would have",
+            "machine import",
+            {"files": [f"{FOLDER}/{archive.name}" for archive in archives], "machine": None},
+        ),
         main=[
             _changes(written, True, "Values that were changed", TOUCHED),
             _changes(written, False, "Values to type", "They are not in the files; the last column says why."),

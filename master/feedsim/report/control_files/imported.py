@@ -13,7 +13,7 @@ from feedsim.analysis import Figure
 from feedsim.control.archive import Archive
 from feedsim.control.reading import Reading, Refused, Taken
 from feedsim.findings import Note
-from feedsim.report.content import FOLDER, Bullets, Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.control_files.sources import sources_section
 from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
@@ -140,7 +140,7 @@ def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inp
                 ("lines.not_understood", "lines not understood"),
             )
         ],
-        next_step=("Look at the machine, then simulate with it:\n", code(f"feedsim machine info {FOLDER}")),
+        next_step=Step("Look at the machine, then simulate with it", "machine info", {"machine": FOLDER}),
         main=[_taken(made), _refused(reading, made), _missing(made), _odd(archives), _sources(reading, made)],
         provenance=provenance_section(
             [("Control", reading.control)], hashed([("file", path) for path in inputs])

@@ -13,10 +13,11 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.analysis.truncation import FULL, Truncation, deviation, structure_responses
+from feedsim.linear.judgement import GAIN_MARGIN
 from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
-from feedsim.report.content import Report, Section, Table, Text, Tile, code, tile_value, typed
+from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.frf.bode import Ordinate
 from feedsim.report.frf.bode_plots import nearest_to_its_limit, pictures_of
@@ -25,10 +26,11 @@ from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.results import Content
 from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, remarked
-from feedsim.scenario import Subject
+from feedsim.scenario import Drive, Subject
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse
 from feedsim.trace.response_files import write_response
+from feedsim.units import convert
 
 # --- The full finite-element model against what was kept of it: responses and deviations in dB ------------------------
 
@@ -169,16 +171,32 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         answer=answers(responses),
         tiles=_tiles(responses),
         lead=nearest_to_its_limit(responses),
-        next_step=(
-            "Change a gain and look again:\n",
-            code(f"feedsim frf {typed(subject.file)} --set machine.axes.{responses.axes[0]}.drive.K_v=VALUE"),
-        ),
+        next_step=_next(subject, responses),
         main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),
         footer=sections.figures_footer(
             f"Values in full precision: summary.json; curves: frf.csv{', frf_measured.csv' * bool(responses.campaign)}."
         ),
     )
+
+
+def _next(subject: Subject, responses: Responses) -> Step | None:
+    """The drive tuned within margins, of a scenario; of a machine another gain of the axis nearest to its limit."""
+    margins = {
+        name.partition(".")[0]: figure.value
+        for name, figure in reversed([*responses.figures.items()])
+        if name.endswith("position.gain_margin")
+    }
+    axis = min(margins, key=lambda name: margins[name]) if margins else responses.axes[0]
+    drive = responses.machine.axes[axis].drive
+    if not isinstance(drive, Drive) or drive.K_v <= 0 or drive.K_p <= 0:
+        return None
+    if subject.scenario is not None:
+        return Step(f"Tune the drive of {axis} within margins", "tune drive", {"scenario": subject.file, "axes": axis})
+    factor = 1.1 if margins.get(axis, math.inf) > GAIN_MARGIN else 0.8
+    gain = f"machine.axes.{axis}.drive.K_v={convert(factor * drive.K_v, '1/s', '(m/min)/mm'):.3g} (m/min)/mm"
+    change = f"{'Raise' if factor > 1 else 'Lower'} K_v of {axis} by {abs(factor - 1):.0%}, and look again"
+    return Step(change, "frf", {"set": [*subject.overrides, gain], "out": f"{FOLDER}_changed"})
 
 
 def _tiles(responses: Responses) -> list[Tile]:

@@ -55,7 +55,7 @@ def verdict(responses: Responses) -> str:
     meaning = (
         f"Less than {MARGIN_WORDS}: motions ring there. Lower that loop's gain, or damp what resonates there."
         if thin
-        else f"At least {MARGIN_WORDS}: while the axes move, no gain need be lowered."
+        else f"All loops meet {MARGIN_WORDS.removeprefix('the usual ')}. No gain needs to be reduced."
     )
     return f"The control loops are stable; {', '.join(results) or 'nothing limits their gains'}. {meaning}"
 

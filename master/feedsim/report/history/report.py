@@ -17,7 +17,7 @@ from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, Crossing, 
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.report import formatting
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
-from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, plain_unit, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import finite, hashed, inputs_part, quantity, software
@@ -541,16 +541,17 @@ def report_of(history: History, figures: Mapping[str, Figure]) -> Report:
     if history.scatters:
         method = FLEET_METHOD
         subtitle = f"{counted(len(history.entries), 'result')} of {len(history.machines)} machines"
-        next_step: Text = (
-            "Use it for a further machine:\n",
-            code(f"feedsim identify friction LOG.csv --prior {FOLDER}/{FLEET}"),
-        )
+        prior = {"traces": ["log.csv"], "prior": f"{FOLDER}/{FLEET}"}
+        next_step = Step("Use it for a further machine, here with its log in log.csv", "identify friction", prior)
     else:
         method = METHOD.format(rate=100 * ERROR_RATE, tested=history.tested)
         subtitle = (
             " to ".join(date_text(edge) for edge in _span(history)) + f", {counted(len(history.entries), 'result')}"
         )
-        next_step = ("Add the next record:\n", code(f"feedsim history {FOLDER}/{VALUES} RESULT@DATE"))
+        values = {"results": [f"{FOLDER}/{VALUES}"], "out": f"{FOLDER}_next"}
+        next_step = Step(
+            "Go on with this history; further results stand behind it, each with its date", "history", values
+        )
     pictures = [_picture(one, history) for one in history.ranked]
     return Report(
         "Scatter between machines" if history.scatters else "History",

@@ -13,7 +13,7 @@ from feedsim.identify import Identified, friction_file
 from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.result import Balance, Correlation, Dynamic, Estimate, Identification, Stretch
 from feedsim.report.chart import Axis, Chart, Curve, Grid, Level, Panel
-from feedsim.report.content import FOLDER, Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Bullets, Paragraph, Part, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
 from feedsim.report.identify import stribeck_plots as quantities
 from feedsim.report.identify.stribeck_plots import (
@@ -273,12 +273,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
         warnings=identified.warnings,
         notes=identified.notes,
         tiles=_tiles(identified),
-        next_step=(
-            "Run the machine with this friction:\n",
-            code(
-                f"feedsim run SCENARIO.yaml --set machine.axes.{identification.axis}.friction={FOLDER}/{FRICTION_FILE}"
-            ),
-        ),
+        next_step=_next(identified),
         main=[
             _use(identification),
             Section("What further moves would determine", [_bullets(identification.advice)])
@@ -297,6 +292,24 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
     )
 
 
+def _next(identified: Identified) -> Step:
+    """A run with this friction: of the scenario that was named, else of the example with one axis."""
+    subject, axis = identified.subject, identified.found.axis
+    if subject is not None and subject.scenario is not None:
+        key = f"machine.axes.{axis}.friction={FOLDER}/{FRICTION_FILE}"
+        return Step("Run the machine with this friction", "run", {"scenario": subject.file, "set": [key]})
+    return Step(
+        "Try the friction in the example with one axis; a machine file takes it as its key friction",
+        "run",
+        {"scenario": "one_axis.yaml", "set": [f"machine.axes.X.friction={FOLDER}/{FRICTION_FILE}"]},
+        "feedsim example one_axis",
+    )
+
+
+def _residual(percent: float) -> str:
+    return "<0.001 %" if percent < 1e-3 else f"{percent:.2g} %"
+
+
 def answers(identification: Identification) -> list[str]:
     """How well friction is known, what the records leave open, and what to do next."""
     lines = []
@@ -304,7 +317,7 @@ def answers(identification: Identification) -> list[str]:
         alone = "" if identification.prior else " by stage 1 alone"
         lines.append(
             f"Friction over speed is known to +-{100 * quantities.curve_error(stage):.2g} % (95 %){alone}; "
-            f"no plateau is further from the curve than {100 * stage.worst_curve:.2g} %."
+            f"largest residual of a plateau: {_residual(100 * stage.worst_curve)}."
         )
     if identification.dynamic is not None:
         lines.append(f"The model leaves {identification.dynamic.rms:.3g} N.m rms of the recorded friction torque.")

@@ -15,7 +15,7 @@ import numpy as np
 from feedsim.report.chart.file import png, standalone
 from feedsim.report.chart.polar import BOLD, circle, fill, line, rectangle, text
 from feedsim.report.chart.svg import WIDTH
-from feedsim.report.content import FOLDER, Animation, Paragraph, Report, Section, Table, Text, Tile, code, typed
+from feedsim.report.content import FOLDER, Animation, Paragraph, Report, Section, Step, Table, Text, Tile
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.machine.model import Model, Motion, extent, model, motion, rotor_disc, solids
 from feedsim.report.machine.projection import FRONT, OBLIQUE, SIDE, TOP, Box, Faces, Field, View, hexadecimal
@@ -435,9 +435,10 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         warnings=info.warnings,
         notes=[info.note],
         tiles=list(_tiles(info)),
-        next_step=(
-            "See how a mode moves:\n",
-            code(f"feedsim machine view {typed(files[0][1])} --mode {_lowest(info)} --animate --out {FOLDER}"),
+        next_step=Step(
+            "See how the lowest mode moves",
+            "machine view",
+            {"mode": [str(_lowest(info))], "animate": True, "out": FOLDER},
         ),
         main=[*pictures, _axes(info), _modes(info)],
         provenance=provenance_section(rows, hashed(list(files))),

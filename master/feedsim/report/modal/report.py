@@ -15,7 +15,7 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note
 from feedsim.modal.rational import MOTOR, AxisModes
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, tile_value
+from feedsim.report.content import FOLDER, Paragraph, Report, Section, Step, Table, Text, Tile, tile_value
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
@@ -135,6 +135,11 @@ def report_of(report: ModesReport) -> Report:
         notes=[note for note in report.subject.notes if note],
         answer=answers(report),
         tiles=[
+            *(
+                Tile(f"{mode.frequency:.4g} Hz", f"mode {k}, {100 * mode.damping:.2g} % damping", "of the fit")
+                for k, mode in enumerate(axis_modes.fit.modes, 1)
+            ),
+        ] + [
             Tile(tile_value(figure), name.partition(".")[2].replace("_", " "), typeset(figure.meaning))
             for name, figure in report.figures.items()
             if name.endswith(("resonance_1", "ratio"))
@@ -144,6 +149,10 @@ def report_of(report: ModesReport) -> Report:
                                       hashed(_files(report))),
         footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES_FILE}.",
                               "docs/replay.md"),
+        next_step=Step("See the drive on this structure", "frf",
+                       {"subject": report.subject.file, "axes": axis_modes.axis, "measure": False,
+                        "set": [*report.subject.overrides, "machine.structure=null",
+                                f"machine.modes={FOLDER}/{MODES_FILE}"]}),
     )  # fmt: skip
 
 
@@ -216,13 +225,15 @@ def _interval(sigma: float) -> str:
 def answers(report: ModesReport) -> list[str]:
     """What was found, and how near it is."""
     axis_modes = report.found
-    modes = ", ".join(f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} %)" for m in axis_modes.fit.modes) or "no mode"
+    words = [f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} % damping)" for m in axis_modes.fit.modes]
+    count = {0: "no mode", 1: "one mode", 2: "two modes", 3: "three modes"}.get(len(words), f"{len(words)} modes")
+    modes = f"{count}{': ' if words else ''}{' and '.join(filter(None, [', '.join(words[:-1]), *words[-1:]]))}"
     remaining, scatter = (
-        "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} degrees" for name, (db, deg) in of.items())
+        "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} deg" for name, (db, deg) in of.items())
         for of in (axis_modes.deviations, axis_modes.scatter)
     )
     return [
-        f"{axis_modes.axis}: rigid body with {modes} of damping. 90 % of the lines are met within {remaining}.",
+        f"{axis_modes.axis} has {modes}. The fit meets 90 % of the lines within {remaining}.",
         f"About their own neighbours 90 % of the lines are within {scatter}: noise and distortion, which no fit meets.",
         f"Estimate: {axis_modes.measured.method}, {len(axis_modes.measured.frequency)} lines.",
         f"{MODES_FILE} is the machine's table with these modes in place of its elastic ones; other axes are rigid in "

@@ -24,9 +24,9 @@ from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.replay.moving_lines import in_words
 from feedsim.replay.rivals import ERROR_RATE
 from feedsim.replay.tuning import OtherCycle, decision
-from feedsim.report.content import FOLDER, Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import FOLDER, Paragraph, Report, Section, Step, Table, Text, Tile, code, tile_value
 from feedsim.report.control import asked, control_section
-from feedsim.report.formatting import display_unit, minus, powers, typeset
+from feedsim.report.formatting import display_unit, minus, powers, three, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
 from feedsim.report.replay.plots import pictures_of
 from feedsim.report.results import REPORT, SUMMARY, check_place
@@ -35,6 +35,7 @@ from feedsim.report.style import remarked
 from feedsim.scenario import Drive, Friction, Machine, Subject
 from feedsim.scenario.parameter_group import ParameterGroup
 from feedsim.trace import Mark
+from feedsim.units import convert
 
 # --- Identified values beside those of the machine file that was given, in the control's words too --------------------
 
@@ -274,8 +275,20 @@ def report_of(report: DriveReport) -> Report:
         warnings=report.warnings,
         notes=report.notes,
         answer=answers(report),
-        next_step=("Hold it against another record:\n", code(f"feedsim replay OTHER_RECORD --machine {FOLDER}")),
+        next_step=Step(
+            "Replay the record on it; another record in its place shows how far it holds",
+            "replay",
+            {"machine": FOLDER, "axes": ",".join(drives), "set": None},
+        ),
         tiles=[
+            *(
+                Tile(_value(one.estimates[name]), f"{axis}: {name}, ± {_half(one.estimates[name])}", typeset(what))
+                for axis, one in drives.items()
+                for name, what in LEADING_PARAMETERS.items()
+                if name in one.estimates and one.estimates[name].status == "estimated"
+            ),
+        ]
+        + [
             Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()
             if (key := name.partition(".")[2]) in LEADING
@@ -454,6 +467,24 @@ def _limits_part(limits: AxisLimits | None) -> dict[str, Any] | None:
     }
 
 
+# What is named first of a drive, as far as a record determines it.
+LEADING_PARAMETERS = {
+    "K_v": "gain of the position loop", "T_sym": "symmetry filter", "F_C": "Coulomb friction", "J": "inertia",
+}  # fmt: skip
+
+
+def _value(estimate: Estimate) -> str:
+    """To three digits, in the unit that people type."""
+    unit = {"1/s": "(m/min)/mm", "s": "ms"}.get(estimate.unit, estimate.unit)
+    return f"{three(convert(estimate.value, estimate.unit, unit))} {unit}"
+
+
+def _half(estimate: Estimate) -> str:
+    """Half of the interval of 95 %, as a share of the value."""
+    share = 100 * NORMAL_95 * estimate.sigma / abs(estimate.value) if estimate.value else float("inf")
+    return "<0.1 %" if share < 0.1 else f"{share:.2g} %"
+
+
 def answers(report: DriveReport) -> list[str]:
     """How near what was found comes to the record, how far it is to be trusted, and what to do next."""
     lines = []
@@ -461,11 +492,14 @@ def answers(report: DriveReport) -> list[str]:
         one = report.found.drives[comparison.axis]
         own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
         torque = f", its torque to {own['torque_rms']}" if "torque_rms" in own else ""
-        reported = [name for name, estimate in one.estimates.items() if estimate.status == "estimated"]
+        known = [one.estimates[name] for name in LEADING_PARAMETERS if name in one.estimates]
+        known = [estimate for estimate in known if estimate.status == "estimated"]
+        values = ", ".join(f"{estimate.name} {_value(estimate)} +-{_half(estimate)}" for estimate in known)
+        count = sum(estimate.status == "estimated" for estimate in one.estimates.values())
         lines.append(
-            f"{comparison.axis}: the position of the record is met to {own['position_rms']} rms ({own['share_of_lag']} "
-            f"of the lag){torque}; of motion that a fit has not seen, to {1e6 * one.predicted[0]:.3g} um. The record "
-            f"determines {', '.join(reported) or 'no parameter'}."
+            f"{comparison.axis}: {values or 'no value of the drive is determined'} (of {count} that the record "
+            f"determines). It meets the position to {own['position_rms']} rms ({own['share_of_lag']} of the lag)"
+            f"{torque}, to {1e6 * one.predicted[0]:.3g} um in cross-validation (4 parts)."
         )
     lines.append("Replay another record on it before trusting it with other motion.")
     return lines
@@ -486,15 +520,15 @@ def summary_lines(report: DriveReport) -> list[str]:
             lines.append(f"    limits of the setpoints: {reached} ({setpoints.words})")
         own = {name.partition(".")[2]: figure for name, figure in comparison.figures.items()}
         torque = f", torque {own['torque_rms']} rms" if "torque_rms" in own else ""
-        lines.append(f"    left: position {own['position_rms']} rms{torque}, while it moves;")
-        torque = f", {one.predicted[1]:.4g} N.m" if torque else ""
+        unseen = f", torque {one.predicted[1]:.3g} N.m" if torque else ""
+        lines.append(
+            f"    residual while it moves: position {own['position_rms']} rms{torque}; in cross-validation (4 parts) "
+            f"position {1e6 * one.predicted[0]:.3g} um{unseen}"
+        )
         lines += [
             f"    mode at {mode.frequency:.4g} Hz (+-{NORMAL_95 * mode.sigma[0]:.2g}), "
             f"damping {100 * mode.damping:.2g} %, motor {mode.motor:.2g}, scale {mode.scale:.2g} of the rigid motion"
             f"{''.join(f', scale of {at_other}' for at_other in _at_others(mode))}"
             for mode in one.modes
         ]
-        lines.append(
-            f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um{torque}"
-        )
     return [*lines, *(beside_lines(report.subject.machine, _beside(report)) if report.subject is not None else ())]

@@ -12,7 +12,7 @@ from feedsim.identify import Provenance
 from feedsim.identify.read import recording_day
 from feedsim.replay.compare import Comparison
 from feedsim.report.changes import change_lines, changes_part, changes_section
-from feedsim.report.content import Report, Section, Table, Tile, code, tile_value, typed
+from feedsim.report.content import Report, Section, Step, Table, Tile, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
@@ -84,10 +84,7 @@ def report_of(replayed: Replayed) -> Report:
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
         answer=answers(replayed),
         tiles=list(_tiles(replayed.figures)),
-        next_step=(
-            "Identify the drives from the record:\n",
-            code(f"feedsim identify drive {typed(replayed.sources[0].file)} --machine {typed(replayed.subject.file)}"),
-        ),
+        next_step=Step("Identify the drives from the record", "identify drive"),
         main=[
             *pictures,
             figures_section(replayed.figures),
@@ -144,6 +141,9 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     }
 
 
+SAME_POSITION = 1e-6  # [um] of a position, below which records show nothing but rounding
+
+
 def answers(replayed: Replayed) -> list[str]:
     """What is left, a line per axis."""
     lines = []
@@ -155,8 +155,11 @@ def answers(replayed: Replayed) -> list[str]:
                 f"{own['position_rms']} rms, {own['position_largest']} at most"
             )
             continue
-        text = f"{comparison.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
-        text += f" ({own['share_of_lag']} of the lag)"
+        if own["position_largest"].value < SAME_POSITION:
+            text = f"{comparison.axis}: position the same to the last digit"
+        else:
+            text = f"{comparison.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
+            text += f" ({own['share_of_lag']} of the lag)"
         text += f"; torque {own['torque_rms']} rms" if "torque_rms" in own else "; no torque is recorded"
         if "speed_setpoint_rms" in own:
             text += f"; speed setpoint {own['speed_setpoint_rms']} rms"

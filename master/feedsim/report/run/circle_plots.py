@@ -8,8 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from feedsim.analysis import Contour, Diagnosis, Glitch, Turn, contour
-from feedsim.analysis.circle import Peak
+from feedsim.analysis import Contour, Diagnosis, Turn, contour
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.formatting import minus
@@ -69,31 +68,35 @@ def contour_picture(
         else "The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, less the "
         "median of the turn."
     )
-    shown = [(glitch, glitch.height) for glitch in by_scale.glitches]
     if diagnosis is not None:
-        shown = _peaks(diagnosis.peaks, seen)
+        places = _peaks(diagnosis, seen)
+    else:
+        places = [(glitch.name, glitch.angle, glitch.deviation, glitch.height) for glitch in by_scale.glitches]
     marks = [
-        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", RESIDUAL_COLOUR)
-        for glitch, height in shown
+        Mark(angle, deviation * 1e6, f"{minus(name)}: {height * 1e6:.2f} µm", RESIDUAL_COLOUR)
+        for name, angle, deviation, height in places
         if height
     ]
-    median = Level(by_scale.median * 1e6, "median (scales)", dash="dotted")
+    medians = [] if diagnosis is not None else [Level(by_scale.median * 1e6, "median (scales)", dash="dotted")]
     sense = turn.sense if back is None else 0
     note = "quadrant glitches\n(less the median)" if diagnosis is None else ""
-    chart = circle_chart(on, curves, marks, (median,), sense, note)
+    chart = circle_chart(on, curves, marks, medians, sense, note)
     return Picture(stem, title, caption, chart)
 
 
-def _peaks(peaks: Sequence[Peak], seen: Mapping[int, Contour]) -> list[tuple[Glitch, float]]:
-    """Where each half axis reverses, the height of its largest peak of the turns ``seen`` (sense -> turn) [m], 0 where
-    none stands out, as figures have it; and the place of it: in the first turn, unless that of the other is higher."""
+def _peaks(diagnosis: Diagnosis, seen: Mapping[int, Contour]) -> list[tuple[str, float, float, float]]:
+    """Name of the half axis, angle [rad], deviation [m] and height [m] of the largest peak where each half axis
+    reverses, 0 where none stands out; the place is in the first turn, unless the peak of the other one is higher."""
     first = next(iter(seen))
     result = []
-    for name in dict.fromkeys(peak.name for peak in peaks):
-        own = [peak for peak in peaks if peak.name == name]
-        place = max(own, key=lambda peak: abs(peak.height) - (0.0 if peak.sense == first else HIGHER))
-        height = max((peak.height for peak in own), key=abs)
-        result += [(glitch, height) for glitch in seen[place.sense].glitches if glitch.name == name]
+    for name in dict.fromkeys(peak.name for peak in diagnosis.peaks):
+        own = [peak for peak in diagnosis.peaks if peak.name == name and peak.sense in seen]
+        if own:
+            place = max(own, key=lambda peak: abs(peak.height) - (0.0 if peak.sense == first else HIGHER))
+            turn = seen[place.sense]
+            k = int(np.argmin(np.abs((turn.angle - place.angle + math.pi) % (2 * math.pi) - math.pi)))
+            height = max((peak.height for peak in own), key=abs)
+            result.append((name, float(turn.angle[k]), float(turn.deviation[k]), height))
     return result
 
 

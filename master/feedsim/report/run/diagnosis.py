@@ -8,8 +8,8 @@ from typing import Any
 from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, separating_radius, swinging
 from feedsim.analysis.evaluate import FIGURE_UNITS
 from feedsim.motions.circular import SENSE_WORDS
-from feedsim.report.content import Section, Table
-from feedsim.report.formatting import minus, number, typeset
+from feedsim.report.content import Section, Table, Tile
+from feedsim.report.formatting import minus, number, three, typeset
 from feedsim.report.provenance import finite, quantity
 
 
@@ -47,6 +47,15 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     if peaks:  # none on an arc without reversals
         tables.append(Table("llrrrr", peak_heads, peaks, peak_note))
     return Section(f"{prefix}: why the circle is not round", tables)
+
+
+def cause_tile(diagnosis: Diagnosis, term: Term) -> Tile:
+    """A cause by its amount: the height of a peak, the time of a mismatch."""
+    own = [peak.height for peak in diagnosis.peaks if term.key == "peaks" and peak.axis == term.axis]
+    factor, unit = FIGURE_UNITS[term.unit]
+    value = 1e6 * max(own, key=abs) if own else factor * abs(term.value)
+    label = f"reversal peak, {term.axis} reverses" if own else name(term)
+    return Tile(f"{three(value)} {typeset(unit)}", label, typeset(sentence(diagnosis, term)))
 
 
 def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:

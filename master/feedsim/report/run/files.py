@@ -20,7 +20,7 @@ from feedsim.analysis import (
 )
 from feedsim.judge import JudgedRun
 from feedsim.motions.circular import SENSE_WORDS
-from feedsim.report.changes import changes_part
+from feedsim.report.changes import action, changes_part
 from feedsim.report.content import Report
 from feedsim.report.page import sheet_html
 from feedsim.report.partial import PARTIAL, Partial
@@ -42,7 +42,9 @@ from feedsim.report.run.report import (
     PAGE,
     RESULT,
     answers,
+    changes,
     draw,
+    first_proposals,
     leading,
     real_time_factor,
     report_of,
@@ -52,7 +54,7 @@ from feedsim.report.run.workbook import workbook
 from feedsim.report.uncertainty import BANDS, bands_csv, summary_part, with_intervals
 from feedsim.scenario import Logging
 from feedsim.trace import Trace, write_csv
-from feedsim.tune import of_run
+from feedsim.tune import Proposal
 
 if TYPE_CHECKING:
     from feedsim.uncertainty import Uncertainty
@@ -89,6 +91,7 @@ def write(
     drawn: Sequence[str] = (),
     page: str = "",
     uncertainty: Uncertainty | None = None,
+    proposals: Sequence[Proposal] | None = None,
 ) -> tuple[Path, ...]:
     """Write result.csv, summary.json, report.html, log.csv, if there is one, and figures; returns their paths.
 
@@ -96,12 +99,13 @@ def write(
     directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
     run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. drawn: kinds of
     files that figures/* are drawn as. page: the machine as a page that computes, which the report links. uncertainty:
-    what identification leaves open. Raises OutputError.
+    what identification leaves open. proposals: what to change, where that is known. Raises OutputError.
     """
     files = files_of(run, page, recorded, uncertainty)
     causes = diagnoses(run) if causes is None else causes
-    report = page_of(run, figures, causes, page=bool(page), uncertainty=uncertainty)
-    content = partial(summary, run, figures, causes=causes, uncertainty=uncertainty)
+    proposals = changes(run, figures, causes) if proposals is None else proposals
+    report = page_of(run, figures, causes, page=bool(page), uncertainty=uncertainty, proposals=proposals)
+    content = partial(summary, run, figures, causes=causes, uncertainty=uncertainty, proposals=proposals)
     return write_report(directory, report, content, files, drawn, kind="run", own=(PARTIAL,))
 
 
@@ -112,9 +116,10 @@ def page_of(
     *,
     page: bool,
     uncertainty: Uncertainty | None,
+    proposals: Sequence[Proposal] | None = None,
 ) -> Report:
     """Content of the report, with the intervals where there are some."""
-    report = report_of(run, figures, draw(run, figures, causes), causes, page=page)
+    report = report_of(run, figures, draw(run, figures, causes), causes, page=page, proposals=proposals)
     return report if uncertainty is None else with_intervals(report, uncertainty, figures, leading(figures))
 
 
@@ -151,17 +156,20 @@ def summary(
     files: Sequence[str],
     causes: Mapping[str, Diagnosis] | None = None,
     uncertainty: Uncertainty | None = None,
+    proposals: Sequence[Proposal] | None = None,
 ) -> dict[str, Any]:
     """Content of summary.json; a figure that could not be determined has the value null."""
     causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
+    proposals = changes(run, figures, causes) if proposals is None else proposals
     return {
         "format": FORMAT,
-        "answer": answers(run, figures, causes),
+        "answer": answers(run, figures, causes, proposals),
+        "action": action(first_proposals(proposals, causes), machine),
         "warnings": [*run.warnings, *doubts(figures, causes)],
         "figures": figures_part(figures),
         **({"uncertain": summary_part(uncertainty, figures)} if uncertainty is not None else {}),
-        "changes": changes_part(of_run(run, causes)),
+        "changes": changes_part(proposals),
         "circles": _circles(run, causes),
         "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},
         "scenario": {

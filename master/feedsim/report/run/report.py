@@ -21,14 +21,15 @@ from feedsim.analysis import (
     tasks,
 )
 from feedsim.analysis.circle import worth_telling
-from feedsim.cosim import Run
+from feedsim.findings import severity
 from feedsim.judge import JudgedRun
 from feedsim.report import sections
-from feedsim.report.changes import changes_section, first_change
+from feedsim.report.changes import action, change_words, changes_section
 from feedsim.report.chart import Chart, Panel
-from feedsim.report.content import FOLDER, Paragraph, Report, Section, Span, Table, Text, Tile, code, tile_value, typed
+from feedsim.report.content import FOLDER, Paragraph, Report, Section, Span, Step, Table, Tile, tile_value
+from feedsim.report.content import TILES as TILES_SHOWN
 from feedsim.report.control import control_section
-from feedsim.report.formatting import counted, duration, number, typeset
+from feedsim.report.formatting import counted, duration, number, two, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import (
     friction_origins,
@@ -38,12 +39,13 @@ from feedsim.report.run import sheet
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import OVERSHOOT_TITLE, overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
-from feedsim.report.run.diagnosis import diagnosis_section
+from feedsim.report.run.diagnosis import cause_tile, diagnosis_section
 from feedsim.report.run.pose import pose_section
 from feedsim.report.style import NARROW, remarked
 from feedsim.scenario import Drive, Level, Logging
 from feedsim.trace import Trace
-from feedsim.tune import of_run
+from feedsim.tune import Proposal, of_run
+from feedsim.tune.proposals import rings
 from feedsim.units import show
 
 # --- What a stop and a positioning cycle come to, in a sentence or two: the answer, its meaning, what to do next ------
@@ -54,28 +56,32 @@ SYSTEMATIC = 0.5
 STIRRED = 0.02  # share of the largest travel, up to which an axis has been stirred rather than moved
 
 
-def stop_words(figures: Figures, band: float) -> str:
-    """Of a motion that ends at rest. figures: without prefix; band: about the target [m]."""
+def stop_words(figures: Figures, band: float, remedy: str = "") -> str:
+    """Of a motion that ends at rest: overshoot, settling time, what rings, and the remedy.
+
+    figures: without prefix; band: about the target [m]. remedy: what the machine file points at, in words.
+    """
     overshoot, settled = figures["overshoot"], figures["settling_time"]
     within = f"+-{band * 1e6:g} um"
     ringing = figures.get("ringing_frequency")
-    rings = ringing is not None and math.isfinite(ringing.value)
-    if math.isfinite(overshoot.value) and not math.isfinite(settled.value) and ringing is not None and rings:
+    frequency = ringing.value if ringing is not None else math.nan
+    advice = f" Remedy: {remedy}." if remedy else ""
+    if math.isfinite(overshoot.value) and not math.isfinite(settled.value) and math.isfinite(frequency):
         return (
-            f"not yet at rest within {within} at the end: it oscillates at {ringing.value:.1f} Hz, up to "
-            f"{overshoot.value:.2f} um past its target."
+            f"is not yet at rest within {within} at the end: it oscillates at {frequency:.3g} Hz, up to "
+            f"{two(overshoot.value)} um past its target.{advice}"
         )
     if not math.isfinite(overshoot.value) or not math.isfinite(settled.value):
-        return f"whether it stays within {within} is not known, too little of the rest is recorded: add a dwell."
-    said = f"{overshoot.value:.2f} um past its target, "
-    said += (
-        f"within {within} for good {settled.value:.1f} ms after the end of the NC motion"
+        return f"may have settled within {within} or not: too little of the rest is recorded. Add a dwell."
+    settles = (
+        f"settles within {within} in {two(settled.value)} ms"
         if settled.value > 0
-        else f"within {within} from the end of the NC motion on"
+        else f"is settled within {within} at the end of the motion"
     )
-    if settled.value > 0 and ringing is not None and rings:
-        said += f"; until then it rings at {ringing.value:.1f} Hz, which less jerk would excite less"
-    return f"{said}."
+    said = f"overshoots by {two(overshoot.value)} um and {settles}."
+    if rings(settled.value * 1e-3, frequency):
+        said += f" It rings at {frequency:.3g} Hz{'.' if remedy else '; lower the jerk.'}"
+    return f"{said}{advice}"
 
 
 def accuracy_words(figures: Figures) -> str:
@@ -91,32 +97,60 @@ def accuracy_words(figures: Figures) -> str:
     return f"{first}: most of it repeats at each target: compensation of the pitch can take it away."
 
 
-def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Text:
-    """What to do with a run, by what it has shown first: a command to copy. change: that is proposed, in words."""
-    file = typed(run.scenario.file)
-    if change:
-        return f"Try {change}:\n", code(f"feedsim tune proposals {file}")
-    first_causes = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
-    if first_causes[:1] == ["peaks"]:
-        return "See what friction compensation takes away:\n", code(f"feedsim tune feedforward {file}")
-    if first_causes[:1] == ["servo"]:
-        return "See how each axis answers:\n", code(f"feedsim frf {file}")
-    for task in tasks(run.scenario, run.program):
+def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequence[Proposal]) -> Step | None:
+    """What to do with a run, by what it has shown first."""
+    scenario = run.scenario
+    if scenario.file.suffix == ".ssp":
+        return None
+    if wrong := wrong_ones(run):
+        setting = getattr(wrong[0], "setting", "")
+        stable = {"scenario": scenario.file, "set": [*scenario.overrides, setting], "out": f"{FOLDER}_stable"}
+        return Step("Run it with a gain that is stable", "run", stable) if setting else None
+    first = next(iter(proposals), None)
+    if first is not None and first.proposed is not None:
+        return Step(f"Try {change_words(first)}", "tune proposals", {"out": FOLDER})
+    named = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
+    if named[:1] == ["peaks"]:
+        return Step("See what friction compensation gains", "tune feedforward")
+    todo = tasks(scenario, run.program)
+    for task in todo:
         axis = task.approach.axis if isinstance(task, PositioningTask) else ""
-        if axis and isinstance(run.scenario.machine.axes[axis].drive, Drive):
-            return "Find drive values with which it stops better:\n", code(f"feedsim tune drive {file} --axes {axis}")
-    return "Lay another run or a record over it:\n", code(f"feedsim diff {FOLDER} OTHER_FOLDER")
+        if axis and isinstance(scenario.machine.axes[axis].drive, Drive):
+            return Step("Find values of the drive with which it stops better", "tune drive", {"axes": axis})
+    for k, entry in enumerate(scenario.evaluate):
+        if getattr(entry, "sheet", "none") is None:
+            sheet_asked = [*scenario.overrides, f"evaluate.{k}.sheet={{}}"]
+            return Step(
+                "Write the acceptance sheet", "run", {"scenario": scenario.file, "set": sheet_asked, "out": FOLDER}
+            )
+    moved = [name for name in travels(run.trace) if run.log is not None and f"{name}.M_a" in run.log]
+    if moved and not todo:
+        logged = {"traces": [f"{FOLDER}/{LOG}"], "machine": scenario.file, "axes": moved[0]}
+        return Step(f"Identify the friction of {moved[0]} from the log", "identify friction", logged)
+    if scenario.machine.foreign_units:
+        return None
+    return Step("See how each axis answers", "frf", {"subject": scenario.file})
+
+
+def wrong_ones(run: JudgedRun) -> list[str]:
+    """Findings with which nobody may read figures of the run."""
+    return [text for text in run.warnings if severity(text) == "wrong"]
+
+
+def travels(trace: Trace) -> dict[str, float]:
+    """Axis -> its travel [m], of those that have been moved rather than stirred; the largest first."""
+    result = {name.partition(".")[0]: float(np.ptp(y)) for name, y in trace.columns.items() if name.endswith(".x_a")}
+    result = {axis: travel for axis, travel in result.items() if travel > STIRRED * max(result.values())}
+    return dict(sorted(result.items(), key=lambda entry: -entry[1]))
 
 
 def moved_words(trace: Trace) -> list[str]:
     """Of a run without figures: how far each axis has moved and was behind, and that nothing is evaluated."""
     result = []
-    travels = {name.partition(".")[0]: float(np.ptp(y)) for name, y in trace.columns.items() if name.endswith(".x_a")}
-    for axis, travel in travels.items():
-        if travel > STIRRED * max(travels.values()):
-            lag = trace.columns.get(f"{axis}.x_e")
-            behind = "" if lag is None else f", following error up to {1e6 * float(np.abs(lag).max()):.3g} um"
-            result.append(f"{axis} moves within {1e3 * travel:.4g} mm{behind}.")
+    for axis, travel in travels(trace).items():
+        lag = trace.columns.get(f"{axis}.x_e")
+        behind = "" if lag is None else f", following error up to {1e6 * float(np.abs(lag).max()):.3g} um"
+        result.append(f"{axis} moves within {1e3 * travel:.4g} mm{behind}.")
     return [*result, "The scenario has nothing that is evaluated (a stop, a circle, a positioning cycle): no figures."]
 
 
@@ -174,32 +208,34 @@ def report_of(
     causes: Mapping[str, Diagnosis] | None = None,
     *,
     page: bool = False,
+    proposals: Sequence[Proposal] | None = None,
 ) -> Report:
-    """Content of the report. causes: prefix of a circle's figures -> why it is not round. page: there is a machine page
-    beside it."""
-    causes = causes or {}
+    """Content of the report.
+
+    causes: prefix of a circle's figures -> why it is not round. page: there is a machine page beside it. proposals:
+    what to change, where that is known already.
+    """
     scenario, machine = run.scenario, run.scenario.machine
-    factor, proposals = real_time_factor(run), of_run(run, causes)
-    speed = f" ({factor:.2g} times real time)" if factor is not None else ""
-    footer = (
-        "Values in full precision: summary.json; time series: result.csv. "
-        f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}."
-    )
+    unstable = bool(wrong_ones(run))
+    causes = {} if unstable else causes or {}
+    proposals = changes(run, figures, causes) if proposals is None else proposals
+    footer = f"Values in full precision: summary.json; time series: result.csv. {speed_line(run).capitalize()}."
     return Report(
         scenario.name,
         f"{machine.name} · {counted(len(scenario.motions), 'motion')}, {run.program.duration:.4g} s",
-        answer=answers(run, figures, causes) or moved_words(run.trace),
-        warnings=(*run.warnings, *doubts(figures, causes)),
+        answer=answers(run, figures, causes, proposals) or ([] if unstable else moved_words(run.trace)),
+        action=action(first_proposals(proposals, causes), machine),
+        warnings=run.warnings if unstable else (*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
-        tiles=tiles(figures, sheet.limits_of(run)),
+        tiles=[] if unstable else [*cause_tiles(causes), *tiles(figures, sheet.limits_of(run), list(causes)[:1])],
         lead=lead(run, pictures),
-        next_step=next_step(run, causes, first_change(proposals)),
+        next_step=next_step(run, causes, proposals),
         main=[
             TRY_IT if page else None,
             sheets_line(run),
+            changes_section(proposals, machine, scenario.file),
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
-            changes_section(proposals, machine, scenario.file),
             *accuracy_sections(run),
             sections.figures_section(figures),
             motions_section(run),
@@ -222,25 +258,63 @@ def accuracy_sections(run: JudgedRun) -> list[Section]:
     ]
 
 
-def answers(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[str]:
-    """What circles, stops and positioning cycles are, why, and what to do: a line each."""
-    result = [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
+def changes(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Proposal]:
+    """What to change; nothing of a run that is wrong, which shows nothing else."""
+    return [] if wrong_ones(run) else of_run(run, causes, figures)
+
+
+def first_proposals(proposals: Sequence[Proposal], causes: Mapping[str, Diagnosis]) -> Sequence[Proposal]:
+    """The proposals where the first one is for the main cause of the first circle, or for a stop; else none."""
+    named = [term.key for diagnosis in list(causes.values())[:1] for term in worth_telling(diagnosis)[:1]]
+    return proposals if [entry.of[0] for entry in proposals[:1] if entry.of[0]] == named else []
+
+
+def answers(
+    run: JudgedRun,
+    figures: Mapping[str, Figure],
+    causes: Mapping[str, Diagnosis],
+    proposals: Sequence[Proposal] | None = None,
+) -> list[str]:
+    """What circles, stops and positioning cycles are, why, and what to do: a line each; none of a run that is wrong."""
+    if wrong_ones(run):
+        return []
+    proposals = changes(run, figures, causes) if proposals is None else proposals
+    first = first_proposals(proposals, causes)
+    remedies = {prefix: first[0].what for prefix in list(causes)[:1] if first}
+    result = [f"{prefix}: {answer(diagnosis, remedies.get(prefix, ''))}" for prefix, diagnosis in causes.items()]
     for task in tasks(run.scenario, run.program):
         own = {
             name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
         }
-        if own and not isinstance(task, CircleTask):
-            words = stop_words(own, task.band) if isinstance(task, PositioningTask) else accuracy_words(own)
-            result.append(f"{task.prefix}: {words}")
+        if own and isinstance(task, PositioningTask):
+            cause = f"stops of {task.approach.axis}"
+            remedy = next((entry.what for entry in proposals if entry.cause == cause), "")
+            result.append(f"{task.prefix.replace('#', ' no. ')} {stop_words(own, task.band, remedy)}")
+        elif own and not isinstance(task, CircleTask):
+            result.append(f"{task.prefix}: {accuracy_words(own)}")
     return [*filter(None, map(sheet.verdict_line, sheet.sheets_of(run))), *result]
 
 
-def tiles(figures: Mapping[str, Figure], limits: Mapping[str, float] | None = None) -> list[Tile]:
+def cause_tiles(causes: Mapping[str, Diagnosis]) -> list[Tile]:
+    """The first three causes of the first circle; none without causes."""
+    first = next(iter(causes.values()), None)
+    return [] if first is None else [cause_tile(first, term) for term in worth_telling(first)[:TILES_SHOWN]]
+
+
+def tiles(
+    figures: Mapping[str, Figure], limits: Mapping[str, float] | None = None, diagnosed: Sequence[str] = ()
+) -> list[Tile]:
     """Leading figures, those first that answer what is asked. limits: of figures by their names [um].
+
+    diagnosed: prefixes of circles whose causes have tiles, peaks among them.
 
     A reversal has one height: over the fitted rest of the circle where that is known, else the quadrant glitch.
     """
-    named = [name for name in figures if is_leading(name, HEADER) and not _has_peak(name, figures)]
+    named = [
+        name for name in figures
+        if is_leading(name, HEADER) and not _has_peak(name, figures)
+        and not (".peak_" in name and name.partition(".")[0] in diagnosed)
+    ]  # fmt: skip
 
     def place(name: str) -> tuple[int, int]:
         key = re.sub("^(peak|glitch)_.*", "peak", name.partition(".")[2])
@@ -383,13 +457,17 @@ def real_time_factor(run: JudgedRun) -> float | None:
     return run.program.duration / run.wall_time if run.wall_time > 0 else None
 
 
+def speed_line(run: JudgedRun) -> str:
+    """How long the simulated time is, and how fast it was: "12 s simulated in 0.095 s (130 times real time)"."""
+    factor = real_time_factor(run)
+    times = "" if factor is None else f" ({float(f'{factor:.2g}'):g} times real time)"
+    return f"{run.program.duration:.4g} s simulated in {run.wall_time:.2g} s{times}"
+
+
 def summary_line(run: JudgedRun, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
-    result = [f"{name} {figures[name]}" for name in leading(figures)]
-    factor = real_time_factor(run)
-    digits = ".0f" if factor is not None and factor >= 10 else ".2g"
-    speed = f" ({factor:{digits}} x real time)" if factor is not None else ""
-    return ", ".join([*result, f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}"])
+    shown = [] if wrong_ones(run) else [f"{name} {figures[name]}" for name in leading(figures)]
+    return ", ".join([*shown, speed_line(run)])
 
 
 def leading(figures: Mapping[str, Figure]) -> list[str]:

@@ -9,6 +9,11 @@ from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import OF_AXES, TIME
 from feedsim.trace import Trace
 
+# SI unit -> what signals in it are.
+QUANTITIES = {
+    "m": "position", "rad/s": "speed", "N.m": "torque", "A": "current", "V": "voltage", "N": "force", "rad": "angle",
+    "m/s": "speed", "m/s^2": "acceleration",
+}  # fmt: skip
 MAX_SIGNALS = 12  # signals in a picture
 
 
@@ -24,6 +29,12 @@ def signals_picture(trace: Trace, title: str) -> Picture:
     for unit in dict.fromkeys(trace.unit(name) for name in trace.names):
         own = [name for name in trace.names if trace.unit(name) == unit]
         panels.append(
-            Panel(", ".join(own), TIME, Axis("value", display_unit(unit)), [curves[name] for name in own], linked="t")
+            Panel(
+                ", ".join(own),
+                TIME,
+                Axis(QUANTITIES.get(unit, "value"), display_unit(unit)),
+                [curves[name] for name in own],
+                linked="t",
+            )
         )
     return Picture("signals", title, ", ".join(trace.names), Chart(panels))

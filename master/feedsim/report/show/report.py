@@ -20,7 +20,7 @@ from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
-from feedsim.report.content import Bullets, Report, Section, Table, Text, Tile, code, typed
+from feedsim.report.content import Bullets, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, display_unit, minus, plain_unit, scale, shown, three
 from feedsim.report.picture import Picture
@@ -253,7 +253,7 @@ def _moved(sizes: Mapping[str, float]) -> list[str]:
 
 
 FORMAT = 1
-MOST_DIFFERING = 3  # parameters that are named outside of the table
+MOST_DIFFERING, MOST_LISTED = 3, 20  # parameters that are named in the answer, and by the command
 LEAST_CHANGE = 0.05  # [%] of a figure, below which it has not changed
 BAND = 1e-6  # [m] about the target, within which an axis has settled
 # Figures whose change comes first, by what stands behind the last dot, with their names in words.
@@ -285,9 +285,9 @@ def lines(sources: Sequence[Source]) -> list[str]:
     """What the command says: what has changed, parameters that differ, how all was aligned."""
     rows = differing(sources)
     said = _changes(sources)
-    said += [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:MOST_DIFFERING]]
-    if len(rows) > MOST_DIFFERING:
-        said.append(f"and {len(rows) - MOST_DIFFERING} parameters more, in the report")
+    said += [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:MOST_LISTED]]
+    if len(rows) > MOST_LISTED:
+        said.append(f"and {len(rows) - MOST_LISTED} parameters more, in the report")
     said += [
         f"{source.name} is aligned {source.aligned}" for source in sources if source.aligned and not source.figures
     ]
@@ -428,12 +428,7 @@ def report_of(sources: Sequence[Source]) -> Report:
         counted(len(sources), "source"),
         answer=answers(sources),
         tiles=_tiles(sources),
-        next_step=(
-            "See whether they are the same within a tolerance:\n",
-            code(_comparison(sources)),
-        )
-        if len(sources) > 1
-        else "",
+        next_step=_next(sources),
         notes=notes,
         main=[
             *pictures,
@@ -451,13 +446,12 @@ def report_of(sources: Sequence[Source]) -> Report:
     )
 
 
-def _comparison(sources: Sequence[Source]) -> str:
-    """The command that compares the first two; results of a prompt are in no folder that stays."""
-    known = all(source.path.name in source.name for source in sources[:2])
-    first, second = (
-        (typed(source.recording.path) for source in sources[:2]) if known else ("REFERENCE.csv", "RESULT.csv")
-    )
-    return f"feedsim compare {second} {first} --tol 1e-6"
+def _next(sources: Sequence[Source]) -> Step | None:
+    """The comparison of the first two; None where there is one source."""
+    if len(sources) < 2:
+        return None
+    first, second = (source.recording.path for source in sources[:2])
+    return Step("List the signals that differ, by how much they do", "compare", {"files": [str(second), str(first)]})
 
 
 def _alignment(sources: Sequence[Source]) -> Section | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.report.chart import Chart, Grid
-from feedsim.report.content import FOLDER, LEAD_ROWS, Paragraph, Part, Report, Section, Table, Text, Tile, code, typed
+from feedsim.report.content import FOLDER, LEAD_ROWS, Paragraph, Part, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.formatting import counted, minus, number, rounded, three, with_interval
 from feedsim.report.picture import Picture
 from feedsim.report.results import write_report
@@ -270,15 +270,17 @@ def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) 
     return first.first_rows(LEAD_ROWS) if first is not None else None
 
 
-def _next(account: Account) -> Text:
+def _next(account: Account) -> Step | None:
     study = account.study
     if (result := account.best) is not None:
-        return "The command that makes this run by itself:\n", code(f"feedsim check {typed(study.file)} --row "
-                                                                    f"{account.runs[result[1]]}")  # fmt: skip
+        row = {"scenario": study.file, "row": account.runs[result[1]]}
+        return Step("See the command that makes this run by itself", "check", row)
     if not (outputs := drawn(account)):
-        return ""
+        return None
     name = study.explain or outputs[0].name
-    return "Lay the two ends over each other:\n", code(f"feedsim diff {FOLDER}:min={name} {FOLDER}:max={name}")
+    return Step(
+        "Lay the two ends over each other", "diff", {"results": [f"{FOLDER}:min={name}", f"{FOLDER}:max={name}"]}
+    )
 
 
 def answers(account: Account) -> list[str]:

@@ -418,10 +418,8 @@ addEventListener("resize", () => {
 // On paper panels stand side by side, however narrow the sheet is: it is read from nearer than a screen. They are lower
 // where the chart would else leave the rest of a sheet empty.
 const SHEET = 0.9; // height of a chart against its width
-const opened = []; // what is folded is printed
 addEventListener("beforeprint", () => {
   cancelAnimationFrame(frame); // of a window that was resized a moment ago
-  for (const part of document.querySelectorAll("details:not([open])")) { opened.push(part); part.open = true; }
   while (waiting.length) begin(waiting.shift());
   for (const live of lives) {
     const width = Math.max(720, COLUMN * live.chart.widths.length);
@@ -429,7 +427,6 @@ addEventListener("beforeprint", () => {
   }
 });
 addEventListener("afterprint", () => {
-  for (const part of opened.splice(0)) part.open = false;
   for (const live of lives) live.draw(live.room.clientWidth || undefined);
 });
 // What is unfolded is drawn as wide as it is then; a link into what is folded opens it.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,12 +24,12 @@ from feedsim.report.content import (
     Part,
     Report,
     Section,
+    Step,
     Table,
     Text,
     Tile,
     code,
     tile_value,
-    typed,
 )
 from feedsim.report.control import asked
 from feedsim.report.formatting import minus, typeset
@@ -39,6 +38,7 @@ from feedsim.report.provenance import figures_part, input_files, inputs_part, ma
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, remarked
 from feedsim.report.uncertainty import drawn_values
+from feedsim.scenario import Scenario
 from feedsim.tune.drive import NOISE, TORQUE
 from feedsim.tune.drive_result import WORSE, Case, Changed, Margins, Point, Tuned, decibels
 from feedsim.tune.effects import EFFECTS
@@ -442,15 +442,13 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
         ],
         provenance=sections.provenance_section(facts, input_files(tuned.scenario)),
         footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
-        next_step=("Run with the new values:\n", code(command(tuned, shlex.quote(folder) if folder else FOLDER)))
-        if tuned.changes
-        else "",
+        next_step=Step("Run with the new values", "run", new_values(tuned.scenario)) if tuned.changes else None,
     )
 
 
-def command(tuned: Tuned, folder: str) -> str:
-    """The command line that runs the scenario with the new values."""
-    return f"feedsim run {typed(tuned.scenario.file)} --set {folder}/{SETTINGS}"
+def new_values(scenario: Scenario) -> dict[str, Any]:
+    """Arguments of a run of the scenario as it was tuned, with the new values."""
+    return {"scenario": scenario.file, "set": [*scenario.overrides, f"{FOLDER}/{SETTINGS}"], "out": f"{FOLDER}_run"}
 
 
 def values(tuned: Tuned, control: str = "") -> Iterator[Part]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -14,11 +15,12 @@ from feedsim.control import Name, names_of
 from feedsim.findings import Note, Wrong
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
-from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import Paragraph, Report, Section, Step, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.style import AFTER, BEFORE, NARROW, remarked
+from feedsim.report.tune.drive import new_values
 from feedsim.report.uncertainty import drawn_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, Judged, amplitude
@@ -125,13 +127,19 @@ def answers(judged: Judged) -> list[str]:
     """What the compensation does to circles that it was not found on."""
     figures = figures_of(judged)
     where = f"{judged.plane[0]}-{judged.plane[1]}"
+    median, worst, of_friction, worst_of_it = (
+        _percent(figures[f"held_out.{name}"]) for name in ("median", "worst", "friction_median", "friction_worst")
+    )
     return [
-        f"{where}: {WORDS[judged.found.kind]} of {', '.join(judged.axes)} takes off {figures['held_out.median']} of "
-        f"the error at the reversals (median of {len(judged.held_out)} other circles), at least "
-        f"{figures['held_out.worst']}; of the part that friction makes {figures['held_out.friction_median']}, at least "
-        f"{figures['held_out.friction_worst']}.",
+        f"{where}: reversal errors fall by {median} (median of {len(judged.held_out)} test circles; worst {worst}) "
+        f"with {WORDS[judged.found.kind]} of {', '.join(judged.axes)}. The part that friction makes "
+        f"falls by {of_friction} (worst {worst_of_it}).",
         *_drawn_answer(judged),
     ]
+
+
+def _percent(figure: Figure) -> str:
+    return f"{figure.value:.2g} %" if math.isfinite(figure.value) else "an unknown share"
 
 
 def _drawn_answer(judged: Judged) -> list[str]:
@@ -225,8 +233,8 @@ def report_of(judged: Judged) -> Report:
         notes=notes,
         tiles=tiles,
         main=[
-            *pictures,
             _values(judged),
+            *pictures,
             _effects(judged, figures),
             _errors(
                 "Circles not used for tuning", judged.held_out, judged.held_errors, judged, judged.held_frictionless
@@ -236,6 +244,7 @@ def report_of(judged: Judged) -> Report:
         ],
         provenance=sections.provenance_section(rows_, input_files(judged.scenario)),
         footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
+        next_step=Step("Run with these values", "run", new_values(judged.scenario)) if judged.found.values else None,
     )
 
 
@@ -247,7 +256,8 @@ def _values(judged: Judged) -> Section | None:
     if not lines:
         return None
     heads = ("Axis", "Number", "Name in the control", "Old", "New", "Unit", "Unit confirmed", "Parameter")
-    return Section("Values to type", [Table("lllrrlll", heads, lines), Paragraph(LIMITS_UNKNOWN + ".", "muted")])
+    table = Table("lllrrlll", heads, lines)
+    return Section("Values to type", [table, Paragraph(LIMITS_UNKNOWN + ".", "muted")], unfolded=True)
 
 
 def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:

@@ -68,7 +68,7 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
 
 def test_unknown_name_is_told_with_those_that_there_are(tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match=r"xz_cirle: no such example, did you mean xz_circle\? \(there are: a_study, ball"
+        InputError, match=r"xz_cirle: no such example, did you mean xz_circle\? \(there are: a_study, airfoil, ball"
     ):
         examples.copy(["xz_cirle"], tmp_path)
 

@@ -1,4 +1,4 @@
-"""Scenarios, studies, machines, structures, histories, records and notebooks that come along, and copies to change.
+"""Scenarios, programs, studies, machines, structures, histories, records and notebooks to copy and to change.
 
 May use: files, installation, signals, errors. Start reading at copy().
 """
@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from feedsim.errors import InputError, OutputError
-from feedsim.files.source import at, places, read
+from feedsim.files.source import at, is_program, places, read
 from feedsim.installation import mend, shipped
 from feedsim.signals import held
 
@@ -22,6 +22,7 @@ from feedsim.signals import held
 # folder is the example.
 _KINDS = {
     "scenario": "*.yaml",
+    "program": "programs/*.mpf",
     "study": "studies/*.yaml",
     "machine": "machines/*/machine.yaml",
     "structure": "structures/*/structure.yaml",
@@ -30,6 +31,7 @@ _KINDS = {
     "notebook": "notebooks/*.ipynb",
 }
 _IN_FOLDERS = ("machine", "structure", "record")
+MACHINE_OF_PROGRAMS = Path("machines/test_centre/machine.yaml")
 _FOR_EDITORS = re.compile(r"# yaml-language-server: \$schema=(\S+)\n")  # a first line
 
 
@@ -39,7 +41,7 @@ class Example:
 
     Attributes:
         name: by which it is asked for.
-        kind: "scenario", "study", "machine", "structure", "history", "record" or "notebook".
+        kind: "scenario", "program", "study", "machine", "structure", "history", "record" or "notebook".
         file: what stands for it.
         about: its first sentence.
     """
@@ -131,13 +133,8 @@ def _asked(names: Iterable[str]) -> list[Example]:
     known = examples()
     result: list[Example] = []
     for name in names:
-        if not (
-            meant := [
-                example
-                for example in known
-                if example.name == name.removesuffix(".yaml").removesuffix(".csv").removesuffix(".ipynb")
-            ]
-        ):
+        plain = re.sub(r"\.(yaml|csv|ipynb|mpf)$", "", name)
+        if not (meant := [example for example in known if example.name == plain]):
             others = sorted({example.name for example in known})
             near = "".join(f", did you mean {other}?" for other in get_close_matches(name, others, 1))
             raise InputError(f"{name}: no such example{near} (there are: {', '.join(others)})")
@@ -156,6 +153,8 @@ def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
         result[file] = None
         if file.name in ("machine.yaml", "structure.yaml") or file.match(_KINDS["record"]):
             waiting += [other for other in file.parent.iterdir() if other.is_file()]
+        if is_program(file):  # names no machine, and needs one
+            waiting.append(root / MACHINE_OF_PROGRAMS)
         if file.suffix == ".yaml":
             waiting += _schema(file)
             for named in _named(file):
@@ -187,7 +186,7 @@ def _about(file: Path) -> str:
         return _sentence(text)
     comment: list[str] = []
     for line in _FOR_EDITORS.sub("", file.read_text(encoding="utf-8")).splitlines():
-        if not line.startswith("# "):
+        if not line.startswith(("# ", "; ")):  # of an NC program
             break
         comment.append(line[2:])
     return _sentence(" ".join(comment))

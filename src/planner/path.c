@@ -652,9 +652,32 @@ static bool set_limits(const Program *p, Zones *zones, Zone *z, double feed, boo
 
 /* --- the builder */
 
+static bool is_element(const Element *e, int64_t row, double s) {
+    return e->count > 0 && e->row == row && e->s == s;
+}
+
+/* A long spline is fitted once, not for each of the sections that are sampled in it. */
+static bool read_once(Builder *builder, int64_t row, double *s, Element *e) {
+    if (!is_element(e, row, *s)) {
+        if (!read_element(builder, row, s, e)) {
+            e->count = 0;
+            return false;
+        }
+        e->behind = *s;
+    }
+    e->trim = 0;
+    *s = e->behind;
+    return true;
+}
+
 bool builder_begin(Builder *builder, int64_t row, double s) {
+    if (is_element(&builder->next, row, s)) {
+        const Element behind = builder->element;
+        builder->element = builder->next;
+        builder->next = behind;
+    }
     builder->s = s;
-    if (!read_element(builder, row, &builder->s, &builder->element)) {
+    if (!read_once(builder, row, &builder->s, &builder->element)) {
         return false;
     }
     builder->row = next_row(builder->program, builder->element.last + 1);
@@ -678,6 +701,13 @@ static bool append_element(const Program *p, Zones *zones, const Element *e, dou
     double q = 0;
     for (size_t k = 0; k < e->count; k++) {
         const Zone *piece = &e->piece[k];
+        if (zones->enough > 0 && zones->count >= zones->enough) {
+            break;
+        }
+        if (zones->enough > 0 && e->row == zones->skipped && (int64_t)k < zones->skipped_pieces) {
+            q += piece->length;
+            continue;
+        }
         const double from = fmax(q, e->trim), to = fmin(q + piece->length, e->length - trim_end);
         if (to - from > 1e-13 * e->length) {
             Zone *z = append(zones, e, k);
@@ -815,7 +845,7 @@ bool builder_next(Builder *builder, Zones *zones, bool *stops) {
     *stops = stops_between(p, builder->element.last, builder->row);
     if (!*stops) {
         double s = builder->s;
-        if (!read_element(builder, builder->row, &s, &builder->next) ||
+        if (!read_once(builder, builder->row, &s, &builder->next) ||
             !append_corner(p, zones, &builder->element, &builder->next, &leg, stops, &appended)) {
             return false;
         }

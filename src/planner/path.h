@@ -56,6 +56,8 @@ typedef struct Zones {
     size_t count, room;
     double *derivatives;
     size_t used, derivatives_room;
+    int64_t skipped, skipped_pieces; /* the first pieces of this element are left out.. */
+    size_t enough;                   /* ..and those beyond so many zones; 0: none */
 } Zones;
 
 /* A line, an arc or a spline: its pieces in order, zones without limits. */
@@ -64,7 +66,7 @@ typedef struct Element {
     size_t count, room;
     double length;
     int64_t row, last; /* first and last row */
-    double s;          /* place of its begin on the programmed path */
+    double s, behind;  /* place of its begin and end on the programmed path */
     double trim;       /* how much the corner at its begin takes */
 } Element;
 

@@ -640,17 +640,22 @@ static bool plan_again(Planner *planner, size_t k) {
     if (!builder_begin(&planner->again, section->element, section->element_s)) {
         return false;
     }
-    bool stops = false;
+    bool stops = false, held = true;
     size_t first = 0;
+    zones->skipped = section->element;
+    zones->skipped_pieces = section->index;
+    zones->enough = (size_t)section->zones;
     do {
-        if (!builder_next(&planner->again, zones, &stops)) {
-            return false;
-        }
+        held = builder_next(&planner->again, zones, &stops);
         while (first < zones->count && zones->zone[first].element == section->element &&
                zones->zone[first].index < section->index) {
             first++;
         }
-    } while (zones->count < first + (size_t)section->zones && !stops);
+    } while (held && zones->count < first + (size_t)section->zones && !stops);
+    zones->enough = 0;
+    if (!held) {
+        return false;
+    }
     drop_zones(zones, first);
     Stretch stretch = stretch_of(&planner->program, zones, 0, (size_t)section->zones - 1, section->v0, section->v1);
     planner->sampled = k;

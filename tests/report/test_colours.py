@@ -38,7 +38,7 @@ WORDS = {
 LISTS = {
     "sweep/figure_plots.py", "sweep/report.py", "machine/model.py", "machine/report.py", "run/axis_plots.py",
     "identify/report.py", "identify/stribeck_plots.py", "show/report.py", "frf/bode.py", "frf/report.py",
-    "chart/model.py", "chart/svg.py",
+    "chart/model.py", "chart/svg.py", "run/contour.py",
 }  # fmt: skip
 RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY"}
 

@@ -6,16 +6,21 @@ Start with evaluate.py, which finds the figures that a scenario asks for; circul
 
 from feedsim.analysis.circle import Diagnosis, answer
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour
+from feedsim.analysis.contour_error import ContourError, with_frictionless
 from feedsim.analysis.evaluate import (
     AccuracyTask,
     CircleTask,
+    ContourTask,
     PositioningTask,
     Result,
     Task,
     check,
+    contours,
+    contours_asked,
     diagnoses,
     doubts,
     evaluate,
+    program_notes,
     tasks,
 )
 from feedsim.analysis.figures import Figure, Figures, Named
@@ -23,7 +28,8 @@ from feedsim.analysis.positioning import Approach, deviation, positioning
 from feedsim.analysis.positioning_accuracy import Accuracy
 
 __all__ = [
-    "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "Diagnosis", "Figure", "Figures", "Glitch",
-    "Named", "PositioningTask", "Result", "Task", "Turn", "answer", "check", "circularity", "contour", "deviation",
-    "diagnoses", "doubts", "evaluate", "positioning", "tasks",
+    "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "ContourError", "ContourTask", "Diagnosis",
+    "Figure", "Figures", "Glitch", "Named", "PositioningTask", "Result", "Task", "Turn", "answer", "check",
+    "circularity", "contour", "contours", "contours_asked", "deviation", "diagnoses", "doubts", "evaluate",
+    "positioning", "program_notes", "tasks", "with_frictionless",
 ]  # fmt: skip

@@ -22,6 +22,7 @@ from feedsim.analysis.circularity import (
     recorded_circle,
     speed_change,
 )
+from feedsim.analysis.contour_error import ContourError, contour_error
 from feedsim.analysis.figures import Array, Figure
 from feedsim.analysis.positioning import MIN_REST_TIME, Approach, positioning
 from feedsim.analysis.positioning_accuracy import Accuracy, readings
@@ -33,9 +34,10 @@ from feedsim.linear.system import LinearSystem
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
 from feedsim.motions.positioning_cycle import Visits
+from feedsim.motions.program import Programmed
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment
-from feedsim.scenario import CircleTest, Machine, Positioning, PositioningAccuracy, Scenario
+from feedsim.scenario import CircleTest, ContourTest, Machine, Positioning, PositioningAccuracy, Scenario
 from feedsim.trace import Trace, matches
 
 # --- Figures that need more of a circle than its radii: why it is not round, and both directions together -------------
@@ -411,7 +413,31 @@ class AccuracyTask:
         }
 
 
-Task = PositioningTask | CircleTask | AccuracyTask
+@dataclass(frozen=True)
+class ContourTask:
+    """An NC program whose contour is evaluated; ``prefix`` of its figures; ``program``: all setpoints."""
+
+    prefix: str
+    segment: Segment
+    program: Program
+    machine: Machine
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Columns without which there is nothing to evaluate."""
+        assert isinstance(self.segment.geometry, Programmed)
+        return tuple(f"{axis}.x_a" for axis in self.segment.geometry.moves.axes)
+
+    def error(self, trace: Trace, frictionless: Trace | None = None) -> ContourError:
+        """Distances from the programmed path; frictionless: the same setpoints nearly without friction."""
+        return contour_error(trace, self.program, self.segment, self.machine, frictionless)
+
+    def figures(self, trace: Trace) -> dict[str, Figure]:
+        """Figures of the task, without prefix."""
+        return self.error(trace).figures()
+
+
+Task = PositioningTask | CircleTask | AccuracyTask | ContourTask
 
 
 def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
@@ -464,6 +490,33 @@ def diagnoses(result: Result, asked: Sequence[Task] | None = None) -> dict[str, 
     return {prefix: diagnosis for prefix, diagnosis in diagnoses.items() if diagnosis is not None}
 
 
+def contours_asked(scenario: Scenario, program: Program) -> bool:
+    """Whether the contour of an NC program is evaluated."""
+    return any(isinstance(task, ContourTask) for task in tasks(scenario, program))
+
+
+def contours(result: Result) -> Mapping[str, ContourError]:
+    """Distances from the paths of its NC programs: prefix of a contour's figures -> what came out.
+
+    Found once for the same result: figures, words and pictures rest on it.
+    """
+    known: Mapping[str, ContourError] | None = result.__dict__.get("_contours")
+    if known is None:
+        frictionless = getattr(result, "frictionless", None)
+        known = result.__dict__["_contours"] = {
+            task.prefix: task.error(result.trace, frictionless)
+            for task in tasks(result.scenario, result.program)
+            if isinstance(task, ContourTask)
+        }
+    return known
+
+
+def program_notes(program: Program) -> tuple[Note, ...]:
+    """What is to be known of the NC programs among the motions."""
+    geometries = [segment.geometry for segment in program.segments]
+    return tuple(Note(text) for entry in geometries if isinstance(entry, Programmed) for text in entry.notes)
+
+
 def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Note, ...]:
     """Figures that do not mean what their names say, of this result."""
     notes = []
@@ -486,15 +539,24 @@ def evaluate(result: Result, asked: Sequence[Task] | None = None) -> dict[str, F
     return {
         f"{task.prefix}.{name}": figure
         for task in (tasks(result.scenario, result.program) if asked is None else asked)
-        for name, figure in task.figures(result.trace).items()
+        for name, figure in (
+            contours(result)[task.prefix].figures() if isinstance(task, ContourTask) else task.figures(result.trace)
+        ).items()
     }
 
 
-def _task(item: Positioning | CircleTest | PositioningAccuracy, scenario: Scenario, program: Program) -> Task:
+def _task(
+    item: Positioning | CircleTest | PositioningAccuracy | ContourTest, scenario: Scenario, program: Program
+) -> Task:
     if isinstance(item, Positioning):
         return _stop(item, program)
     if isinstance(item, CircleTest):
         return _turn(item, scenario, program)
+    if isinstance(item, ContourTest):
+        programs = [s for s in _chosen(program, item.motion) if isinstance(s.geometry, Programmed)]
+        if not programs:
+            raise InputError("contour: the motions have no NC program")
+        return ContourTask("contour", programs[-1], program, scenario.machine)
     cycles = [s.geometry for s in _chosen(program, item.motion) if isinstance(s.geometry, Visits)]
     if not cycles:
         raise InputError("positioning accuracy: the program has no positioning cycle")

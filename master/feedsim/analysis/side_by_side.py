@@ -17,11 +17,14 @@ from feedsim.errors import InputError
 from feedsim.files.columns import Columns
 from feedsim.files.regular import json_file
 from feedsim.motions.circular import SENSE_WORDS
+from feedsim.sheets import read_rows
 from feedsim.trace import Recording, read_recording
 from feedsim.trace.recording import mapped
 
 DIGEST_DIGITS = 12  # digits of a digest
-RESULT, SUMMARY = "result.csv", "summary.json"
+RESULT, SUMMARY, BLOCKS_FILE = "result.csv", "summary.json", "blocks.csv"
+# Of each block of an NC program what is laid side by side, as columns of blocks.csv.
+OF_BLOCKS = ("largest [um]", "rms [um]", "begin [s]", "end [s]")
 # Columns that are laid over each other, of every axis: name -> SI unit.
 COMPARED_SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
 
@@ -33,7 +36,9 @@ class Source:
     Attributes:
         name: short, and of no other one. recording: its curves. time: (N,) [s], as recorded.
         figures: name -> value and unit. parameters: dotted name -> value as text. circles: prefix -> turns.
-        answer: what it says of itself. notes: what its numbers are worth.
+        answer: what it says of itself. blocks: of an NC program, line and text of a block -> the largest distance from
+        the path and its rms [um], the time [s]; of a block that is worked several times the worst.
+        notes: what its numbers are worth.
         shift: of its first row on the first source's time [s], None where none fits. aligned: how that was found.
     """
 
@@ -45,6 +50,7 @@ class Source:
     parameters: Mapping[str, str] = field(default_factory=dict)
     circles: Mapping[str, tuple[Turn, ...]] = field(default_factory=dict)
     answer: tuple[str, ...] = ()
+    blocks: Mapping[tuple[str, str], tuple[float, float, float]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     shift: float | None = 0.0
     aligned: str = ""
@@ -128,6 +134,7 @@ def _read(path: Path, name: str, mappings: Sequence[Columns]) -> Source:
             parameters=_parameters(content),
             circles={prefix: tuple(map(_turn, turns)) for prefix, turns in content.get("circles", {}).items()},
             answer=tuple(map(str, content.get("answer", ()))),
+            blocks=_blocks(summary.with_name(BLOCKS_FILE)) if content.get("contours") else {},
             notes=tuple(str(content.get(part, {}).get("note") or "") for part in ("machine", "scenario")),
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -145,6 +152,23 @@ def _figures(summary: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     label = "".join(map(str, summary["compensation"]["turn"]["plane"]))
     kept = {key: value for key, value in result.items() if not key.startswith("before.")}
     return {f"{label}.{key.removeprefix('after.')}" if key.startswith("after.") else key: e for key, e in kept.items()}
+
+
+def _blocks(path: Path) -> dict[tuple[str, str], tuple[float, float, float]]:
+    """Blocks of a table that a run of an NC program has left; none where it is not there any more."""
+    if not path.is_file():
+        return {}
+    result: dict[tuple[str, str], tuple[float, float, float]] = {}
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = read_rows(file)
+        heads = next(rows)
+        for row in rows:
+            cells = dict(zip(heads, row, strict=True))
+            largest, rms, begin, end = (float(cells[name] or math.nan) for name in OF_BLOCKS)
+            key = f"{cells['file']}:{cells['line']}", cells["text"]
+            if key not in result or largest > result[key][0]:
+                result[key] = (largest, rms, end - begin)
+    return result
 
 
 def _turn(turn: Mapping[str, Any]) -> Turn:

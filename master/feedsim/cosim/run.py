@@ -137,6 +137,8 @@ def logged_axes(scenario: Scenario) -> tuple[str, ...]:
     if scenario.logging is None:
         return ()
     moved = {axis for motion in scenario.motions for axis in motion.axes}
+    if not all(motion.names_axes for motion in scenario.motions):
+        moved = set(scenario.machine.axes)
     return scenario.logging.axes or tuple(axis for axis in scenario.machine.axes if axis in moved)
 
 
@@ -282,6 +284,7 @@ class Run:
         fine: the log's signals, and the setpoints of its axes, at the control cycle; None without a log. Other logs can
             be made of it: :func:`feedsim.cosim.logged`.
         log: the log as the scenario asks for it; None without one.
+        frictionless: the positions "X.x_a" of the same setpoints nearly without friction, where they were asked for.
     """
 
     scenario: Scenario
@@ -301,6 +304,7 @@ class Run:
     fine: Trace | None = None
     log: Trace | None = None
     native: bool = False
+    frictionless: Trace | None = None
 
     def __repr__(self) -> str:
         return f"Run of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows"

@@ -26,6 +26,7 @@ _MANY = (
     f"more than {MAX_VALUES} values, an alias counted as all that it stands for; a long table is a CSV file of its own"
 )
 LARGEST_FILE = 4_000_000  # bytes; people write some kB, and a long line of text is read at 0.3 MB/s
+PROGRAM_ENDINGS = (".mpf", ".spf", ".nc", ".ngc", ".cnc", ".tap", ".h", ".gcode", ".iso", ".eia")  # of NC programs
 _FAST_DEPTH = 2000
 # Where libyaml has a mind of its own: tabs, tags, byte order marks within a text, directives, "#" at the head of a
 # block of text, "?" within braces (which is looked for outside of lines that are comments).
@@ -324,10 +325,15 @@ def is_ssp(path: Path) -> bool:
     return path.suffix.lower() == ".ssp"
 
 
+def is_program(path: Path) -> bool:
+    """Whether a file is meant as an NC program, by its name."""
+    return path.suffix.lower() in PROGRAM_ENDINGS
+
+
 def is_study(path: Path) -> bool:
     """Whether a file that can be read is a study, by its keys."""
     try:
-        data = read(path).data
+        data = None if is_program(path) else read(path).data
     except InputError:
         return False
     return isinstance(data, dict) and "sampling" in data and "parameters" in data and "machine" not in data

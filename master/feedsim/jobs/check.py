@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from feedsim import analysis, judge
-from feedsim.arguments import settings, spelt
+from feedsim.arguments import spelt
 from feedsim.errors import InputError
 from feedsim.files.source import is_study
 from feedsim.findings import severity
-from feedsim.jobs.parameters import Archives, Argument, File, Option, Settings, job
-from feedsim.jobs.subject import opened
+from feedsim.jobs.parameters import Archives, Argument, File, MachineChoice, Option, Settings, job
+from feedsim.jobs.subject import on_machine, opened
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.scenario import Scenario
 
@@ -46,9 +46,14 @@ class Checked:
 def check(
     scenario: Annotated[
         File | Scenario,
-        Argument("SCENARIO", "scenario file (docs/scenarios.md), SSP (docs/ssp.md) or study (docs/sweeps.md)"),
+        Argument(
+            "SCENARIO",
+            "scenario file (docs/scenarios.md), NC program (docs/programs.md), SSP (docs/ssp.md) or study "
+            "(docs/sweeps.md)",
+        ),
     ],
     *,
+    machine: MachineChoice = None,
     set: Settings = None,
     runs: Annotated[int | None, Option("N", "of a study: in place of its sampling.runs")] = None,
     trial: Annotated[bool, Option("", "of a study: make some runs, which show how long all will take")] = False,
@@ -74,15 +79,16 @@ def check(
     >>> fs.check("xz_circle.yaml")
     xz_circle.yaml: valid; 2 motions, 11.98 s on Test centre
     """
+    changes = on_machine(machine, set)
     if not isinstance(scenario, Scenario) and is_study(Path(scenario)):
-        return _study(Path(scenario), settings(set), runs, trial, row, None if fmus is None else Path(fmus), watch)
+        return _study(Path(scenario), changes, runs, trial, row, None if fmus is None else Path(fmus), watch)
     for name, value in (("runs", runs), ("trial", "" if trial else None), ("row", row)):
         if value is not None:
             raise InputError(f"{f'{spelt(name)} {value}'.strip()}: is for a study; {scenario} is none")
-    with opened(scenario, set, fmus) as subject:
+    with opened(scenario, changes, fmus) as subject:
         plan, program = subject.plan, subject.program
         analysis.check(plan, program)
-        warnings = subject.warnings(judge.check(plan, program, fmus=subject.fmus))
+        warnings = (*subject.warnings(judge.check(plan, program, fmus=subject.fmus)), *analysis.program_notes(program))
     shown = plan.name if isinstance(scenario, Scenario) else scenario
     motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
     apart = (

@@ -14,8 +14,20 @@ from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.errors import InputError
 from feedsim.files.source import is_ssp
 from feedsim.jobs.machine import positions
-from feedsim.jobs.parameters import Archives, File, Force, Option, Positions, Settings, SubjectArgument, job, out_file
+from feedsim.jobs.parameters import (
+    Archives,
+    File,
+    Force,
+    MachineChoice,
+    Option,
+    Positions,
+    Settings,
+    SubjectArgument,
+    job,
+    out_file,
+)
 from feedsim.jobs.result import Kind, Made
+from feedsim.jobs.subject import on_machine
 from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
 from feedsim.judge import judged
 from feedsim.outputs import archive_with, begins_with, same
@@ -51,6 +63,7 @@ def export(
         File | None, out_file("FILE", "file to write; its ending, .fmu, .ssp or .html, says what it is")
     ] = None,
     *,
+    machine: MachineChoice = None,
     kind: Annotated[str, Option("", "what it is, where no name says so", choices=("fmu", "ssp", "html"))] = "fmu",
     set: Settings = None,
     inputs: Annotated[
@@ -156,6 +169,7 @@ def export(
             f"{spelt('plant')}" if wrong in OF_PLANT else next(end for end, keys in ENDINGS.items() if wrong in keys)
         )
         raise InputError(f"{spelt(wrong)}: is for {needs}, not for {ending}")
+    set = on_machine(machine, set)
     if ending == ".ssp":
         return write_ssp(subject, out, one=one, fmus=fmus, set=set, force=force)
     if ending == ".html":

@@ -139,6 +139,9 @@ Settings = Annotated[
         many=True,
     ),
 ]
+MachineChoice = Annotated[
+    File | None, Option("MACHINE", "machine file or folder in place of the scenario's; an NC program needs one")
+]
 FigureKinds = Annotated[Sequence[str], Option("png,svg", "draw the figures as files, too, into the folder figures")]
 Force = Annotated[
     bool, Option("", "replace files that feedsim did not write, and results of another kind; never an input")

@@ -23,13 +23,14 @@ from feedsim.jobs.parameters import (
     FigureKinds,
     File,
     Force,
+    MachineChoice,
     Option,
     Settings,
     job,
     out,
 )
 from feedsim.jobs.result import Result, in_words_of, kept
-from feedsim.jobs.subject import Opened, opened
+from feedsim.jobs.subject import Opened, on_machine, opened
 from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.judge import JudgedRun, judged
 from feedsim.outputs import forced, replacing
@@ -105,7 +106,8 @@ class RunResult(JudgedRun, Result):
     @property
     def findings(self) -> Sequence[str]:
         """The warnings of the run, and doubts about what the figures rest on."""
-        return (*self.warnings, *analysis.doubts(self.figures, self.causes))
+        notes = analysis.program_notes(self.program)
+        return (*self.warnings, *analysis.doubts(self.figures, self.causes), *notes)
 
     @property
     def answers(self) -> Sequence[str]:
@@ -242,13 +244,22 @@ def _text(content: bytes) -> str:
 @job("run a scenario or an SSP file; figures, causes, report")
 def run(
     scenario: Annotated[
-        File | Scenario, Argument("SCENARIO", "scenario file (docs/scenarios.md), or SSP (docs/ssp.md)")
+        File | Scenario,
+        Argument("SCENARIO", "scenario file (docs/scenarios.md), NC program (docs/programs.md), or SSP (docs/ssp.md)"),
     ],
     *,
+    machine: MachineChoice = None,
     set: Settings = None,
     page: Annotated[
         bool, Option("", "leave the machine as a page that computes beside the report, which links it (docs/page.md)")
     ] = False,
+    friction_share: Annotated[
+        bool,
+        Option(
+            "",
+            "of NC programs: a second run nearly without friction, for its share of the deviation (default: yes)",
+        ),
+    ] = True,
     uncertain: Draws = 0,
     fmus: Archives = None,
     out: Annotated[File | None, out("{scenario}")] = None,
@@ -274,7 +285,7 @@ def run(
     >>> stiff.figures["Z.settling_time"].unit
     'ms'
     """
-    with opened(scenario, set, fmus) as subject:
+    with opened(scenario, on_machine(machine, set), fmus) as subject:
         analysis.check(subject.plan, subject.program)  # an evaluation that cannot be made is refused before the run
         if report.in_workbook(subject.plan):
             report.workbook_needed()
@@ -293,14 +304,16 @@ def run(
             for sentence in cosim.executed(subject.plan.machine, subject.fmus, subject.plan.coupling):
                 watch.announce(subject.named(sentence))
             if out is None:
-                return _with_draws(_run(subject, None, page, watch), subject, cloud, uncertain, watch)
+                done = _run(subject, None, page, friction_share, watch)
+                return _with_draws(done, subject, cloud, uncertain, watch)
             with _rows_kept(report.growing(out), watch) as recorded:
-                result = _with_draws(_run(subject, recorded, page, watch), subject, cloud, uncertain, watch)
+                done = _run(subject, recorded, page, friction_share, watch)
+                result = _with_draws(done, subject, cloud, uncertain, watch)
                 result.save(out, figures=figures, force=force, control=control, recorded=recorded)
     return result
 
 
-def _run(subject: Opened, recorded: Partial | None, page: bool, watch: Watch) -> RunResult:
+def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: bool, watch: Watch) -> RunResult:
     raw = cosim.run(
         subject.plan,
         program=subject.program,
@@ -309,6 +322,8 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, watch: Watch) ->
         scratch=recorded.scratch if recorded is not None else None,
         sink=recorded,
     )
+    if friction_share and analysis.contours_asked(subject.plan, subject.program):
+        raw = analysis.with_frictionless(raw, subject.fmus, watch.of(f"{subject.plan.name} nearly without friction"))
     done = judged(raw)
     done = replace(done, warnings=subject.warnings(done.warnings))
     if not page:

@@ -26,6 +26,11 @@ def load(file: File, set: Changes = None) -> Scenario:
     return scenario.load(file, settings(set))
 
 
+def on_machine(machine: File | None, changes: Changes) -> list[str]:
+    """Changes with the machine ahead that is chosen for a scenario or an NC program."""
+    return [*([f"machine={machine}"] if machine is not None else []), *settings(changes)]
+
+
 @dataclass(frozen=True, eq=False)
 class Opened:
     """A scenario with its planned motions, ready to be run.

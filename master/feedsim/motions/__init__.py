@@ -15,15 +15,16 @@ from feedsim.motions.constant_speed import ConstantSpeed, SpeedRange
 from feedsim.motions.dwell import Dwell
 from feedsim.motions.move import Move
 from feedsim.motions.positioning_cycle import PositioningCycle
+from feedsim.motions.program import PartProgram
 from feedsim.motions.setpoints import Column, MeasuredSetpoints
 from feedsim.motions.sine import Sine, SineMove
 
 __all__ = [
-    "Arc", "Circle", "Column", "ConstantSpeed", "Dwell", "MeasuredSetpoints", "Motion", "Move", "PositioningCycle",
-    "Sine", "SineMove", "SpeedRange",
+    "Arc", "Circle", "Column", "ConstantSpeed", "Dwell", "MeasuredSetpoints", "Motion", "Move", "PartProgram",
+    "PositioningCycle", "Sine", "SineMove", "SpeedRange",
 ]  # fmt: skip
 
 Motion = Annotated[
-    Move | Arc | Circle | Dwell | MeasuredSetpoints | ConstantSpeed | Sine | PositioningCycle,
+    Move | Arc | Circle | Dwell | MeasuredSetpoints | ConstantSpeed | Sine | PositioningCycle | PartProgram,
     Field(discriminator="kind"),
 ]

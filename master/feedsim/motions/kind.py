@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from pydantic import Discriminator
 
 from feedsim.errors import InputError
 from feedsim.fields import Model
+
+if TYPE_CHECKING:
+    from feedsim.path import Limits
 
 Array = NDArray[np.float64]
 
@@ -32,6 +35,8 @@ class MotionKind(Model):
 
     returns: ClassVar[bool] = False
     """Whether it ends where it begins."""
+    names_axes: ClassVar[bool] = True
+    """Whether its fields name the axes that it moves; else any may move, as its plan has it."""
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -83,6 +88,7 @@ class Start:
         most: cycles of the interpolator that the program has room for.
         acceleration, jerk: the machine's limits along a path [m/s2, m/s3].
         travel: axis -> lowest and highest position [m].
+        limits: of axes and path, which NC programs keep.
     """
 
     position: Mapping[str, float]
@@ -93,6 +99,7 @@ class Start:
     acceleration: float
     jerk: float
     travel: Mapping[str, tuple[float, float]]
+    limits: Limits | None = None
 
 
 class Points(Protocol):

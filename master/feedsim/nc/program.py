@@ -306,7 +306,9 @@ def plan(scenario: Scenario, *, scratch: Path | None = None) -> Program:
                 f"the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its end, which is {cycles:.3g} "
                 f"position cycles; allowed: {MAX_POSITION_CYCLES:.3g}"
             )
-        state.problems += [f"{scenario.at('motions', index)} ({motion.kind}): {problem}" for problem in result]
+        # What is run is the file of the motion itself: its own lines are named, no place in a scenario.
+        where = "" if scenario.file in motion.files.values() else f"{scenario.at('motions', index)} ({motion.kind}): "
+        state.problems += [f"{where}{problem}" for problem in result]
         if cycles > MAX_POSITION_CYCLES:
             break
     if state.problems:
@@ -339,6 +341,7 @@ def _append(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> lis
         acceleration=machine.path.acceleration,
         jerk=machine.path.jerk,
         travel={name: axis.travel for name, axis in machine.axes.items()},
+        limits=machine.program_limits,
     )
     course = motion.plan(start)
     problems = _violations(state, machine, course)

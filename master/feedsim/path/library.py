@@ -50,6 +50,19 @@ class Program(ctypes.Structure):
                 setattr(self, name, value)
 
 
+class ProgrammedPath(ctypes.Structure):
+    """Elements of a path (src/planner/nearest.h); the arrays that it points to are kept in `arrays`."""
+
+    _fields_ = (
+        ("axes", ctypes.c_int64), ("elements", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("begin", "line", "cosine", "sine", "angle", "s")),
+    )  # fmt: skip
+
+    def __init__(self, axes: int, elements: int, *arrays: NDArray[np.float64]) -> None:
+        self.arrays = [np.ascontiguousarray(array, dtype=np.float64) for array in arrays]
+        super().__init__(axes, elements, *(array.ctypes.data for array in self.arrays))
+
+
 @cache
 def load() -> ctypes.CDLL:
     """The library beside the archives.
@@ -72,6 +85,8 @@ def load() -> ctypes.CDLL:
             library.planner_section.restype, library.planner_section.argtypes = None, (pointer, count, pointer, pointer)
             library.planner_sample.restype = ctypes.c_int
             library.planner_sample.argtypes = (pointer, count, *(pointer,) * 8)
+            library.planner_nearest.restype = None
+            library.planner_nearest.argtypes = (ctypes.POINTER(ProgrammedPath), count, *(pointer,) * 7)
             return library
         reasons.append(library)
     why = "; ".join(dict.fromkeys(reasons))

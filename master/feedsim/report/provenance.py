@@ -64,7 +64,11 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
     if scenario.machine.plant is not None:
         named.append(("plant archive", scenario.machine.plant))
     named += [(f"{unit.role.name} of {axis}", unit.fmu) for axis, unit in scenario.machine.foreign_units]
-    named += [("recorded setpoints", path) for motion in scenario.motions for path in motion.files.values()]
+    named += [
+        ("NC program" if motion.kind == "program" else "recorded setpoints", path)
+        for motion in scenario.motions
+        for path in motion.files.values()
+    ]
     named += [("load", load.file) for load in scenario.loads if load.file is not None]
     return named
 

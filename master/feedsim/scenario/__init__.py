@@ -11,6 +11,7 @@ from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.machine import Axis, Cycles, Machine
 from feedsim.scenario.model import (
     CircleTest,
+    ContourTest,
     Delay,
     Level,
     Logging,
@@ -24,8 +25,8 @@ from feedsim.scenario.model import (
 from feedsim.scenario.roles import ForeignUnit
 
 __all__ = [
-    "Axis", "Base", "Change", "CircleTest", "Coupling", "CurrentController", "Cycles", "Delay", "Drive", "Filter",
-    "ForeignUnit", "Friction", "FrictionParameters", "GmsFriction", "Level", "Logging", "Machine", "Noise",
-    "Positioning", "PositioningAccuracy", "Quantisation", "Recording", "Scenario", "Subject", "load", "load_machine",
-    "load_subject",
+    "Axis", "Base", "Change", "CircleTest", "ContourTest", "Coupling", "CurrentController", "Cycles", "Delay",
+    "Drive", "Filter", "ForeignUnit", "Friction", "FrictionParameters", "GmsFriction", "Level", "Logging", "Machine",
+    "Noise", "Positioning", "PositioningAccuracy", "Quantisation", "Recording", "Scenario", "Subject", "load",
+    "load_machine", "load_subject",
 ]  # fmt: skip

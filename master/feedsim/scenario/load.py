@@ -7,12 +7,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from feedsim.errors import InputError
+from feedsim.arguments import spelt
+from feedsim.errors import InputError, no_such_file
 from feedsim.fields import brief
 from feedsim.files import changes
 from feedsim.files.checked import check, checked, fetch, read_group
 from feedsim.files.problems import describe, in_order
-from feedsim.files.source import Place, Source, read
+from feedsim.files.source import Mark, Place, Source, is_program, places, read
 from feedsim.scenario.axis_units import Friction, FrictionParameters, GmsFriction
 from feedsim.scenario.control_keys import translate, translated
 from feedsim.scenario.machine import Machine
@@ -105,7 +106,8 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
 
     `settings` come from outside too, before the `overrides`. InputError: the scenario file itself cannot be read.
     """
-    source = read_group(path)
+    source = _of_program(path) if is_program(path) else read_group(path)
+    _spell_out_programs(source)
     faults: list[str] = []
     outside = [*settings]
     given: list[str] = []
@@ -117,12 +119,39 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
     for key, value in outside:
         if key == "machine":
             source.put(("machine",), value)
+    if is_program(path) and "machine" not in source.data:
+        raise InputError(
+            f"{path}: an NC program needs a machine: {spelt('machine')} MACHINE, a machine file or its folder"
+        )
     own = tuple(_own_settings(source, faults))
     fetch(source, Scenario, (), faults)
     translate(source, ("machine", "axes"), faults)
     others = tuple((key, value) for key, value in outside if key != "machine")
     texts = (*(f"{key}={changes.as_text(value.data)}" for key, value in settings), *given)
     return Draft(path, source, own, others, texts, faults)
+
+
+def _of_program(path: Path) -> Source:
+    """The scenario of an NC program that is run by itself: one motion, its contour evaluated."""
+    if not path.is_file():
+        raise InputError(no_such_file(str(path)))
+    data = {
+        "name": path.stem,
+        "motions": [{"kind": "program", "file": path.name}],
+        "evaluate": [{"kind": "contour"}],
+    }
+    return Source(data, {place: Mark(str(path), path.parent) for place in places(data)})
+
+
+def _spell_out_programs(source: Source) -> None:
+    """A motion {program: part.mpf} is one of kind program with that file."""
+    motions = source.data.get("motions") if isinstance(source.data, dict) else None
+    for i, motion in enumerate(motions if isinstance(motions, list) else ()):
+        if isinstance(motion, dict) and "program" in motion and "kind" not in motion and "file" not in motion:
+            mark = source.mark(("motions", i, "program"))
+            source.forget(("motions", i, "program"))
+            motion |= {"kind": "program", "file": motion.pop("program")}
+            source.marks |= {("motions", i, key): mark for key in ("kind", "file")}
 
 
 def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
@@ -213,6 +242,8 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
 
 
 def _is_machine(path: Path) -> bool:
+    if is_program(path):
+        return False
     data = read(path).data
     return isinstance(data, dict) and "axes" in data and "machine" not in data
 

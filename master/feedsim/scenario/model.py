@@ -27,7 +27,7 @@ from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, Reading, did_you_mean, fault, is_multiple, no_axis
 from feedsim.files.source import Place
-from feedsim.motions import Circle, MeasuredSetpoints, Motion, PositioningCycle
+from feedsim.motions import Circle, MeasuredSetpoints, Motion, PartProgram, PositioningCycle
 from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.machine import Machine
@@ -285,7 +285,16 @@ class PositioningAccuracy(Model):
         return checked(sheet, OF_POSITIONING)
 
 
-Evaluation = Annotated[Positioning | CircleTest | PositioningAccuracy, Field(discriminator="kind")]
+class ContourTest(Model):
+    """Distance of the axes and of the tool from the path of an NC program, block by block, and what makes it."""
+
+    kind: Literal["contour"] = "contour"
+    motion: MotionIndex | None = Field(
+        default=None, description="Place of the program in motions, from 0 (default: the last program)"
+    )
+
+
+Evaluation = Annotated[Positioning | CircleTest | PositioningAccuracy | ContourTest, Field(discriminator="kind")]
 
 
 class Scenario(Model):
@@ -404,7 +413,7 @@ def _logging_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
     for i, axis in enumerate(logging.axes or ()):
         if axis not in scenario.machine.axes:
             yield ("logging", "axes", i), no_axis(axis, scenario.machine.axes)
-    if logging.axes is None and not any(motion.axes for motion in scenario.motions):
+    if logging.axes is None and not any(motion.axes or not motion.names_axes for motion in scenario.motions):
         yield ("logging",), "no motion moves an axis; name the axes to be logged, for example axes: [Z]"
     for group, signals in logging.disturbed().items():
         for signal in signals:
@@ -450,7 +459,7 @@ def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
             continue
         motions = scenario.motions if chosen is None else scenario.motions[chosen : chosen + 1]
         if item.kind == "positioning":
-            if not any(item.axis in motion.axes for motion in motions):
+            if not any(item.axis in motion.axes or not motion.names_axes for motion in motions):
                 which = "no motion moves" if chosen is None else f"motions.{chosen} ({motions[0].kind}) does not move"
                 yield ("evaluate", i), f"positioning of axis {item.axis}, which {which}"
             continue
@@ -461,6 +470,11 @@ def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
                     ("evaluate", i),
                     f"the accuracy of positioning is asked for, but {which} of kind positioning_cycle",
                 )
+            continue
+        if item.kind == "contour":
+            if not any(isinstance(motion, PartProgram) for motion in motions):
+                which = "no motion is" if chosen is None else f"motions.{chosen} ({motions[0].kind}) is not"
+                yield ("evaluate", i), f"a contour is to be evaluated, but {which} of kind program"
             continue
         circles = [motion for motion in motions if isinstance(motion, Circle)]
         recordings = [motion for motion in motions if isinstance(motion, MeasuredSetpoints)]

@@ -20,6 +20,7 @@ from feedsim.cosim.one_unit import UNIT
 from feedsim.errors import InputError
 from feedsim.fields import Quantity
 from feedsim.files.regular import json_value
+from feedsim.files.source import is_program
 from feedsim.scenario import Drive, Scenario
 from feedsim.scenario.axis_units import EFFECTS, FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
@@ -82,9 +83,12 @@ def structure(scenario: Scenario) -> bytes | None:
 
 
 def recordings(scenario: Scenario) -> dict[str, Path]:
-    """Place inside the SSP -> file, of the recorded setpoints that the motions name."""
+    """Place inside the SSP -> file, of the recorded setpoints and NC programs that the motions name."""
     files = dict.fromkeys(path for motion in scenario.motions for path in motion.files.values())
-    return {f"{RECORDINGS}/{i}.csv": path for i, path in enumerate(files)}
+    return {
+        f"{RECORDINGS}/{i}/{path.name}" if is_program(path) else f"{RECORDINGS}/{i}.csv": path
+        for i, path in enumerate(files)
+    }
 
 
 def plain(value: Any, annotation: Any = None) -> Any:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from feedsim.motions.circular import Circular
 from feedsim.motions.positioning_cycle import Visits
+from feedsim.motions.program import Programmed
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment
-from feedsim.scenario import CircleTest, Positioning, PositioningAccuracy, Scenario
+from feedsim.scenario import CircleTest, ContourTest, Positioning, PositioningAccuracy, Scenario
 from feedsim.structure.pack import packaging, packed, setpoint_table
 
-EVALUATED = {"circle": "circularity", "positioning_accuracy": "positioning accuracy"}
+EVALUATED = {"contour": "contour error", "circle": "circularity", "positioning_accuracy": "positioning accuracy"}
 SETPOINTS_IN_ARCHIVE = "resources/setpoints.csv"
 UNEVEN = 1e-6  # of a row, as in the unit
 EVALUATED_REST = 0.050  # s, behind a motion whose positioning is evaluated (feedsim.analysis)
@@ -111,7 +112,7 @@ def evaluation(scenario: Scenario, planned: Program, program: Program) -> tuple[
     return (scenario.model_copy(update={"evaluate": tuple(kept)}), lost) if lost else (scenario, [])
 
 
-def _needed(item: Positioning | CircleTest | PositioningAccuracy, planned: Program) -> float | None:
+def _needed(item: Positioning | CircleTest | PositioningAccuracy | ContourTest, planned: Program) -> float | None:
     """Until when the motions must run for an evaluation [s]; None where they have nothing for it."""
     chosen = planned.segments if item.motion is None else planned.segments[item.motion : item.motion + 1]
     if isinstance(item, Positioning):
@@ -120,5 +121,8 @@ def _needed(item: Positioning | CircleTest | PositioningAccuracy, planned: Progr
     if isinstance(item, PositioningAccuracy):
         cycles = [segment.end for segment in chosen if isinstance(segment.geometry, Visits)]
         return min(cycles[-1], planned.duration) if cycles else None
+    if isinstance(item, ContourTest):
+        programs = [segment.end for segment in chosen if isinstance(segment.geometry, Programmed)]
+        return min(programs[-1], planned.duration) if programs else None
     circles = [segment.end for segment in chosen if isinstance(segment.geometry, Circular | Recorded)]
     return min(circles[-1], planned.duration) if circles else None

@@ -80,7 +80,7 @@ class Curve:
         """The same curve in at most ``most`` rows (and its ends), keeping the extremes of every bin."""
         if len(self.x) <= self.most:
             return self
-        rows = extremes(self.y, self.most) if self.ascending else _along(self.x, self.y, self.most)
+        rows = extremes(self.y, self.most) if self.ascending else along(self.x, self.y, self.most)
         return replace(self, x=self.x[rows], y=self.y[rows])
 
 
@@ -228,9 +228,11 @@ def extremes(y: Array, most: int) -> NDArray[np.intp]:
     return np.unique(np.concatenate(keep))
 
 
-def _along(x: Array, y: Array, most: int) -> NDArray[np.intp]:
-    """Rows of a loop: the extremes of both coordinates in every bin, in their order."""
-    return np.unique(np.concatenate([extremes(x, most // 2), extremes(y, most // 2)]))
+def along(x: Array, y: Array, most: int) -> NDArray[np.intp]:
+    """Rows of a loop: the extremes of both coordinates in every bin, and the ends of its pieces, in their order."""
+    gaps = np.flatnonzero(~np.isfinite(x))
+    ends = np.clip(np.concatenate([gaps - 1, gaps, gaps + 1]), 0, len(x) - 1)
+    return np.unique(np.concatenate([extremes(x, most // 2), extremes(y, most // 2), ends]))
 
 
 def spans(values: Sequence[Array]) -> tuple[float, float] | None:

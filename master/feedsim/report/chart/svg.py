@@ -40,7 +40,8 @@ from feedsim.report.chart.layout import (
     TICK_WIDTH,
     TOP,
 )
-from feedsim.report.chart.model import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Part, Polar, extremes
+from feedsim.report.chart.model import MOST_ROWS as MOST_IN_PAGE
+from feedsim.report.chart.model import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Part, Polar, along, extremes
 from feedsim.report.chart.polar import (
     HALO,
     circle,
@@ -298,9 +299,10 @@ def _curve(curve: Curve, panel: Panel, frame: Frame, to: tuple[Scaled, Scaled, f
     if curve.ascending:
         first, last = np.searchsorted(x, frame.across[0], "left"), np.searchsorted(x, frame.across[1], "right")
         x, y = x[max(0, first - 1) : last + 1], y[max(0, first - 1) : last + 1]
-    if len(x) > MOST_ROWS and not curve.dots:
-        rows = extremes(y, MOST_ROWS) if curve.ascending else np.unique(
-            np.concatenate([extremes(x, MOST_ROWS), extremes(y, MOST_ROWS)]))  # fmt: skip
+    # A loop of which the page keeps more rows than usual is one whose shape is looked at closely.
+    most = MOST_ROWS if curve.ascending or curve.most == MOST_IN_PAGE else curve.most
+    if len(x) > most and not curve.dots:
+        rows = extremes(y, most) if curve.ascending else along(x, y, 2 * most)
         x, y = x[rows], y[rows]
     if not len(x):
         return ""

@@ -14,8 +14,10 @@ from feedsim.analysis import (
     CircleTask,
     Diagnosis,
     Figure,
+    contours,
     diagnoses,
     doubts,
+    program_notes,
     tasks,
 )
 from feedsim.judge import JudgedRun
@@ -34,6 +36,7 @@ from feedsim.report.provenance import (
 )
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.run import sheet
+from feedsim.report.run.contour import BLOCKS_FILE, blocks_csv, contour_part
 from feedsim.report.run.diagnosis import diagnosis_part
 from feedsim.report.run.pose import pose_part
 from feedsim.report.run.report import (
@@ -69,7 +72,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """
     check_place(
         directory,
-        (RESULT, REPORT, SUMMARY, LOG, PAGE, BANDS, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL),
+        (RESULT, REPORT, SUMMARY, LOG, PAGE, BANDS, BLOCKS_FILE, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL),
         inputs,
         kind="run",
         own=(PARTIAL,),
@@ -138,6 +141,8 @@ def files_of(
     files: dict[str, Content] = {RESULT: result}
     if run.log is not None:
         files[LOG] = partial(write_csv, trace=run.log)
+    for prefix, error in contours(run).items():
+        files[BLOCKS_FILE if prefix == "contour" else f"{prefix.replace('#', '-')}-{BLOCKS_FILE}"] = blocks_csv(error)
     if uncertainty is not None:
         files[BANDS] = bands_csv(uncertainty)
     if page:
@@ -166,12 +171,13 @@ def summary(
         "format": FORMAT,
         "answer": answers(run, figures, causes, proposals),
         "action": action(first_proposals(proposals, causes), machine),
-        "warnings": [*run.warnings, *doubts(figures, causes)],
+        "warnings": [*run.warnings, *doubts(figures, causes), *program_notes(run.program)],
         "figures": figures_part(figures),
         **({"uncertain": summary_part(uncertainty, figures)} if uncertainty is not None else {}),
         "changes": changes_part(proposals),
         "circles": _circles(run, causes),
         "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},
+        "contours": {prefix: contour_part(error) for prefix, error in contours(run).items()},
         "scenario": {
             "name": scenario.name,
             "file": scenario.file.name,

@@ -12,12 +12,15 @@ import numpy as np
 from feedsim.analysis import (
     AccuracyTask,
     CircleTask,
+    ContourTask,
     Diagnosis,
     Figure,
     Figures,
     PositioningTask,
     answer,
+    contours,
     doubts,
+    program_notes,
     tasks,
 )
 from feedsim.analysis.circle import worth_telling
@@ -39,6 +42,7 @@ from feedsim.report.run import sheet
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import OVERSHOOT_TITLE, overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
+from feedsim.report.run.contour import contour_pictures, contour_section, contour_words, widened
 from feedsim.report.run.diagnosis import cause_tile, diagnosis_section
 from feedsim.report.run.pose import pose_section
 from feedsim.report.style import NARROW, remarked
@@ -112,6 +116,13 @@ def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequen
     named = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
     if named[:1] == ["peaks"]:
         return Step("See what friction compensation gains", "tune feedforward")
+    for error in contours(run).values():
+        index, plan = error.segment.index, error.main_share("scale")[0] == "plan"
+        tighter = f"motions.{index}.tolerance={error.overall('scale')[0] * 0.5e6:.2g} um"
+        setting = tighter if plan else f"motions.{index}.feed_override=50 %"
+        other = f"{FOLDER}_{'tighter' if plan else 'slower'}"
+        words = f"Run it with {'half of the tolerance' if plan else 'half of the feed'}, for feedsim diff"
+        return Step(words, "run", {"scenario": scenario.file, "set": [*scenario.overrides, setting], "out": other})
     todo = tasks(scenario, run.program)
     for task in todo:
         axis = task.approach.axis if isinstance(task, PositioningTask) else ""
@@ -172,12 +183,29 @@ TILES = {
     "B": "largest reversal value B",
     "E": "systematic deviation E",
     "M": "range of the mean deviations M",
+    "largest": "largest deviation from the path",
+    "rms": "deviation from the path, rms",
+    "p95": "95 % of the positions are within",
+    "speed": "mean speed along the path",
 }
 OF_REVERSALS = {"peak": "reversal peak", "glitch": "quadrant glitch"}  # of an axis: peak_X
 MOST_MOTIONS = 200
-LINE = ("overshoot", "settling_time", "peak_torque", "G", "A", "R", "B")
-FIRST_FIGURES = ("overshoot", "settling_time", "ringing_frequency", "G", "peak", "A", "R", "B")
-HEADER = (*LINE, "duration", "ringing_frequency", "plateau_torque", "rest_torque", "F_max", "F_min", "mean", "E", "M")
+LINE = ("overshoot", "settling_time", "peak_torque", "G", "A", "R", "B", "largest", "p95")
+FIRST_FIGURES = ("overshoot", "settling_time", "ringing_frequency", "G", "peak", "A", "R", "B", "largest", "rms", "p95")
+HEADER = (
+    *LINE,
+    "duration",
+    "ringing_frequency",
+    "plateau_torque",
+    "rest_torque",
+    "F_max",
+    "F_min",
+    "mean",
+    "E",
+    "M",
+    "rms",
+    "speed",
+)
 COUPLING = {
     "residual": "interface energy residual: what the plant gave to the friction bond less what friction took from it",
     "residual_peak": "largest magnitude of the interface energy residual during the run",
@@ -225,7 +253,7 @@ def report_of(
         f"{machine.name} · {counted(len(scenario.motions), 'motion')}, {run.program.duration:.4g} s",
         answer=answers(run, figures, causes, proposals) or ([] if unstable else moved_words(run.trace)),
         action=action(first_proposals(proposals, causes), machine),
-        warnings=run.warnings if unstable else (*run.warnings, *doubts(figures, causes)),
+        warnings=run.warnings if unstable else (*run.warnings, *doubts(figures, causes), *program_notes(run.program)),
         notes=(machine.note, scenario.note),
         tiles=[] if unstable else [*cause_tiles(causes), *tiles(figures, sheet.limits_of(run), list(causes)[:1])],
         lead=lead(run, pictures),
@@ -236,6 +264,7 @@ def report_of(
             changes_section(proposals, machine, scenario.file),
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
+            *(contour_section(prefix, error) for prefix, error in contours(run).items()),
             *accuracy_sections(run),
             sections.figures_section(figures),
             motions_section(run),
@@ -286,7 +315,9 @@ def answers(
         own = {
             name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
         }
-        if own and isinstance(task, PositioningTask):
+        if isinstance(task, ContourTask):
+            result += [f"{task.prefix}: {words}" for words in contour_words(contours(run)[task.prefix])]
+        elif own and isinstance(task, PositioningTask):
             cause = f"stops of {task.approach.axis}"
             remedy = next((entry.what for entry in proposals if entry.cause == cause), "")
             result.append(f"{task.prefix.replace('#', ' no. ')} {stop_words(own, task.band, remedy)}")
@@ -332,8 +363,11 @@ def _has_peak(name: str, figures: Mapping[str, Figure]) -> bool:
 
 
 def lead(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
-    """The picture of the first screen, where it is not the first one: a stop without the way to it."""
+    """The picture of the first screen, where it is not the first one: a stop without the way to it, a path in a wider
+    frame, which is lower there."""
     for task in tasks(run.scenario, run.program)[:1]:
+        if isinstance(task, ContourTask) and pictures:
+            return widened(pictures[0])
         if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
             panel = next(
                 (panel for panel in chart.panels if isinstance(panel, Panel) and panel.title == OVERSHOOT_TITLE), None
@@ -384,6 +418,8 @@ def _drawn(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, D
             )
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
+        elif isinstance(task, ContourTask):
+            pictures += contour_pictures(task.prefix, contours(run)[task.prefix], stem)
         else:
             pictures.append(accuracy_picture(task.prefix, task.accuracies(run.trace)[""], f"accuracy-{stem}"))
     overview = overview_picture(run.trace, list(run.scenario.machine.axes), signs, "overview")

@@ -267,7 +267,11 @@ LEADING_FIGURES = {
     "A": "accuracy of positioning A",
     "R": "repeatability R",
     "B": "largest reversal value B",
+    "largest": "largest deviation from the path",
+    "p95": "95 % of the positions within",
+    "duration": "duration",
 }
+MOST_BLOCKS = 100  # of NC programs, side by side
 LARGEST_SHARE = 1000.0  # [%] a change beyond is one from next to nothing, of which a share says nothing
 
 
@@ -434,6 +438,7 @@ def report_of(sources: Sequence[Source]) -> Report:
             *pictures,
             _stops(sources),
             _figures(sources),
+            _blocks(sources),
             _parameters(sources),
             control_section(changes=dict(differing(sources))),
             _alignment(sources),
@@ -507,6 +512,35 @@ def _figures(sources: Sequence[Source]) -> Section | None:
     for source in sources[1:]:
         heads += [source.name, "difference"]
     return Section("Figures", [Table("l" + "r" * (len(heads) - 1) + "l", [*heads, "Unit"], rows)])
+
+
+def _blocks(sources: Sequence[Source]) -> Section | None:
+    """Blocks of NC programs side by side, those first that are the furthest from the path in any source."""
+    own = [source for source in sources if source.blocks]
+    if not own:
+        return None
+    worst: dict[tuple[str, str], float] = {}
+    for source in own:
+        for key, (largest, *_) in source.blocks.items():
+            worst[key] = max(worst.get(key, 0.0), largest if math.isfinite(largest) else 0.0)
+    rows: list[tuple[Text, ...]] = []
+    for key in sorted(worst, key=lambda key: -worst[key])[:MOST_BLOCKS]:
+        values = [source.blocks.get(key, (math.nan,) * 3) for source in own]
+        rows.append(
+            (
+                key[0],
+                code(key[1]),
+                *(_cell(value, digits) for entry in values for value, digits in zip(entry, (2, 2, 4), strict=True)),
+            )
+        )
+    heads = [f"{source.name}: {what}" for source in own for what in ("largest [µm]", "rms [µm]", "time [s]")]
+    more = f" Of {len(worst)} blocks the {MOST_BLOCKS} worst are listed." if len(worst) > MOST_BLOCKS else ""
+    note = f"Distance of the axes from the programmed path; of a block that is worked several times the worst.{more}"
+    return Section("Blocks of the NC program", [Table("ll" + "r" * len(heads), ["Line", "Block", *heads], rows, note)])
+
+
+def _cell(value: float, digits: int) -> str:
+    return minus(f"{value:.{digits}f}") if math.isfinite(value) else "–"
 
 
 def _difference(value: float, unit: str) -> str:

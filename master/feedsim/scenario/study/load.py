@@ -18,7 +18,7 @@ from feedsim.files.source import Source, at
 from feedsim.motions import Circle, MeasuredSetpoints
 from feedsim.scenario.base import Base
 from feedsim.scenario.load import Setting
-from feedsim.scenario.model import Positioning, Scenario
+from feedsim.scenario.model import ContourTest, Positioning, Scenario
 from feedsim.scenario.study.file import MOST_RUNS, StudyFile
 from feedsim.scenario.study.parameter import Reader
 from feedsim.scenario.study.study import Parameter, Sampling, Study, as_text, changes_of
@@ -256,6 +256,8 @@ def _beginnings(scenario: Scenario) -> set[str] | None:
     for item in scenario.evaluate:
         if isinstance(item, Positioning):
             result.add(item.axis)
+        elif isinstance(item, ContourTest):
+            result.add("contour")
         elif recorded:
             return None
         else:

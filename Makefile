@@ -86,7 +86,7 @@ fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml
 	$(PY) -m feedsim_packager build $* --out $@ --build-dir $(BUILD)/fmus
 
 # What the master knows of the units' variables.
-VARIABLES := master/feedsim/variables.json
+VARIABLES := master/feedsim/foundation/variables.json
 fmus: $(VARIABLES)
 $(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h src/machine_fmu/cycle.h $(foreach unit,$(UNITS),$(wildcard src/$(unit)_fmu/*.def src/$(unit)_fmu/identity.h))
 	$(PY) -m feedsim_packager variables --out $@

@@ -20,8 +20,9 @@ from harness import ROOT, Contestant, Costs, arguments, digits, measure, progres
 import numpy as np
 from fits import exponent
 
-from feedsim import cosim, nc, scenario
-from feedsim.scenario.coupling import SCHEMES
+from feedsim import scenario
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation import cosim, nc
 
 sys.path.insert(0, str(ROOT / "tests"))
 from reference import monolithic

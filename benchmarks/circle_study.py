@@ -22,12 +22,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from compensation_study import scenarios
 
-from feedsim import cosim, nc, scenario
+from feedsim import scenario
 from feedsim.analysis import Diagnosis, contour
 from feedsim.analysis.circle import CircleUnderTest, TurnedPath, diagnose, name
 from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnosed, tasks
-from feedsim.errors import FeedsimError
-from feedsim.trace import Trace
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import FeedsimError
+from feedsim.simulation import cosim, nc
 
 MACHINES = (("default", "XZ"), ("default", "XY"), ("default", "YZ"), ("linear", "XZ"), ("gantry", "XZ"))
 RADII, FEEDS = (8.0, 120.0), (0.5, 15.0)  # drawn evenly in their logarithms [mm], [m/min]

@@ -22,9 +22,9 @@ import numpy as np
 import yaml
 
 import feedsim as fs
+from feedsim.design.tune.compensators import COMPENSATOR_KINDS
 from feedsim.jobs.tune_compensation import TuneCompensationResult
 from feedsim.structure.modes import Modes, write_modes
-from feedsim.tune.compensators import COMPENSATOR_KINDS
 
 CIRCLE = Path(__file__).resolve().parents[1] / "scenarios" / "xz_circle.yaml"
 UNITS = {

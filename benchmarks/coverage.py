@@ -2,9 +2,9 @@
 
 Axis Z of the default machine, synthetic and known, is logged again and again with noise of 5 % on the current and
 identified from every log. Each set gives a band of the contour of a short circle, which the contour of the true machine
-lies in or not. Intervals allow for viscous friction that changes while the log is taken (identify/stribeck.py). So the
-axis warms or cools by a course drawn from that; with --still it does not. A friction compensation found on a set is
-judged on the true machine, beside that found on the truth.
+lies in or not. Intervals allow for viscous friction that changes while the log is taken
+(estimation/identify/stribeck.py). So the axis warms or cools by a course drawn from that; with --still it does not. A
+friction compensation found on a set is judged on the true machine, beside that found on the truth.
 
     make band-coverage
     python benchmarks/coverage.py --logs 3 --kinds pulse,pulse_characteristic
@@ -23,19 +23,18 @@ import numpy as np
 from identification import Case, records, simulate
 from numpy.typing import NDArray
 
-from feedsim import cosim
 from feedsim.analysis import circularity, tasks
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import Identified, Options, friction_file, identify
-from feedsim.identify import stribeck as drift
-from feedsim.identify.record import Record
-from feedsim.identify.result import Estimate
+from feedsim.design.tune.circles import Circles, practical, size
+from feedsim.design.tune.compensators import GROUP_OF_KIND, tune
+from feedsim.design.uncertainty import cloud_of, curves_of, of_run
+from feedsim.estimation.identify import Identified, Options, friction_file, identify
+from feedsim.estimation.identify import stribeck as drift
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Estimate
 from feedsim.scenario import Scenario, load
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from feedsim.structure.modes import checked_modes
-from feedsim.tune.circles import Circles, practical, size
-from feedsim.tune.compensators import GROUP_OF_KIND, tune
-from feedsim.uncertainty import cloud_of, of_run
-from feedsim.uncertainty.draws import curves_of
 
 CIRCLE = Path(__file__).resolve().parents[1] / "scenarios" / "xz_circle.yaml"
 SHORT = ("motions.0.radius=5 mm",)

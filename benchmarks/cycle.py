@@ -20,9 +20,10 @@ import fmpy
 import numpy as np
 
 import feedsim
-from feedsim import cosim, nc, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.trace import Trace
+from feedsim import scenario
+from feedsim.files.trace import Trace
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.archive import Archive
 
 DEFAULT = ROOT / "scenarios" / "machines" / "test_centre"
 STEPS = 200_000

@@ -31,19 +31,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead
 
 import numpy as np
 
-from feedsim.cosim import run
-from feedsim.errors import FeedsimError
+from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.identified import identify_drives
+from feedsim.estimation.replay.machine_files import ElasticMode, with_modes
+from feedsim.estimation.replay.tuning import decision
 from feedsim.files.columns import load_columns
-from feedsim.identify.result import Estimate
-from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.elastic import ElasticMode, with_modes
-from feedsim.replay.identified import identify_drives
-from feedsim.replay.tuning import decision
+from feedsim.files.trace import write_csv
+from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario import Machine, load, load_machine
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
 from feedsim.structure.modes import write_modes
-from feedsim.trace import write_csv
 
 MACHINE = Path(__file__).resolve().parents[1] / "scenarios" / "machines" / "sinumerik_840d"
 FACTOR = 1.5  # about the measured value, to either side

@@ -24,11 +24,12 @@ from harness import CIRCLE, ROOT, Contestant, arguments, digits, measure, table
 
 import numpy as np
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.one_unit import pack_whole
-from feedsim.cosim.system import System
-from feedsim.cosim.unit import Unit
+from feedsim import scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.system import System
+from feedsim.simulation.cosim.unit import Unit
+from feedsim.simulation.cosim.whole import pack_whole
 from feedsim_packager import build as packaging
 from feedsim_packager import compile, toolchain
 

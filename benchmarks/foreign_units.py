@@ -17,8 +17,9 @@ from pathlib import Path
 from harness import ROOT, Contestant, arguments, digits, measure, table
 
 sys.path.insert(0, str(ROOT / "tests"))
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import worker
+from feedsim import scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import worker
 from feedsim_packager import toolchain
 from foreign import acme
 from foreign.test_faulty_units import ROWS

@@ -33,15 +33,15 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 import feedsim
-from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.estimation.identify import Asked, Options, Record, identify, read_traces
+from feedsim.estimation.identify.motion import RecordTorque, motion
+from feedsim.estimation.identify.parameters import torque as torque_over_speed
+from feedsim.estimation.identify.read import Recorded
+from feedsim.estimation.identify.stages import with_structure
 from feedsim.files.columns import load_columns
-from feedsim.identify import Asked, Options, Record, identify, read_traces
-from feedsim.identify.motion import RecordTorque, motion
-from feedsim.identify.parameters import torque as torque_over_speed
-from feedsim.identify.read import Recorded
-from feedsim.identify.stages import with_structure
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS, GMS
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]

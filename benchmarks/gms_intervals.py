@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import FeedsimError
+from feedsim.estimation.identify import Options, Record, identify
+from feedsim.estimation.identify.parameters import estimate
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import Options, Record, identify
-from feedsim.identify.parameters import estimate
+from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario.roles import FRICTION_UNITS, GMS
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 I_P, J, M_0 = 0.02 / (2 * pi), 0.0164, 0.2  # lead [m/rad], inertia [kg.m^2], load [N.m]
 INTERVAL, FINER = 2e-3, 40  # of the record [s], steps of the law within it

@@ -26,10 +26,11 @@ import machines
 from fits import Line
 from watched import memory
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.system import System
+from feedsim import scenario
 from feedsim.scenario import Scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.system import System
 from feedsim.structure import checked_modes
 
 SERIES = {"modes": (10, 30, 93, 300, 1000, 5000), "axes": (1, 2, 3, 6, 12)}

@@ -18,15 +18,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import cosim, scenario
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import Options, identify
-from feedsim.identify.parameters import curve
-from feedsim.identify.record import Record
-from feedsim.identify.result import Estimate
+from feedsim import scenario
+from feedsim.estimation.identify import Options, identify
+from feedsim.estimation.identify.parameters import curve
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Estimate
+from feedsim.files.trace import Trace
 from feedsim.scenario import Delay, Level, Machine, Noise
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from feedsim.structure.modes import checked_modes
-from feedsim.trace import Trace
 
 Floats = NDArray[np.float64]
 

@@ -23,11 +23,11 @@ from types import FrameType
 
 from identification_logs import FLAWS, Log, made, names
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
+from feedsim.estimation.identify import Asked, identify, named_apart, read_traces
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.columns import load_columns
-from feedsim.identify import Asked, identify, named_apart, read_traces
+from feedsim.foundation.errors import InputError
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 LONGEST = 120  # s of one core: a log that takes longer is given up
 BY_CHANCE = 3.0  # standard deviations: a value farther off is no matter of chance

@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from feedsim.cosim import fmus_directory
+from feedsim.simulation.cosim import fmus_directory
 from feedsim.structure.modes import Modes, write_modes
 from feedsim.structure.pack import pack
 

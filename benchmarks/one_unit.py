@@ -20,8 +20,9 @@ sys.path.insert(0, str(ROOT / "tests"))  # the adapters of the importers
 
 from fmpy import simulate_fmu
 
-from feedsim import nc, scenario
-from feedsim.cosim import fmus_directory
+from feedsim import scenario
+from feedsim.simulation import nc
+from feedsim.simulation.cosim import fmus_directory
 from importers import whole, z_move
 from importers.registry import IMPORTERS, Importer
 from importers.system import Experiment, Result, System

@@ -19,11 +19,12 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from feedsim import cosim, nc, scenario  # noqa: E402
-from feedsim.judge import judged  # noqa: E402
-from feedsim.page import html  # noqa: E402
-from feedsim.page.content import content  # noqa: E402
-from feedsim.page.html import computing  # noqa: E402
+from feedsim import scenario  # noqa: E402
+from feedsim.report.live_page import html  # noqa: E402
+from feedsim.report.live_page.content import content  # noqa: E402
+from feedsim.report.live_page.html import computing  # noqa: E402
+from feedsim.simulation import cosim, nc  # noqa: E402
+from feedsim.simulation.judge import judged  # noqa: E402
 from page_helpers import NODE  # noqa: E402
 
 ROUNDS, TURNS = 15, 50

@@ -22,7 +22,8 @@ from harness import CIRCLE, ONE_WAY, ROOT, SHORT_CIRCLE, Contestant, Costs, argu
 import numpy as np
 from peers_contestants import AXES, STEP, Outcome
 
-from feedsim import nc, scenario, ssp
+from feedsim import scenario
+from feedsim.simulation import nc, ssp
 
 REFERENCE = ROOT / "tests" / "reference" / "system" / "xz_circle_ref.csv"
 ROUNDS = 5

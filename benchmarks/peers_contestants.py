@@ -66,7 +66,8 @@ def _last(values: Mapping[str, float], seconds: float, cycles: int, job: Job) ->
 
 
 def _ours(job: Job, scheme: str, native: bool) -> Outcome:
-    from feedsim import cosim, nc, scenario
+    from feedsim import scenario
+    from feedsim.simulation import cosim, nc
 
     loaded = scenario.load(job.scenario, (*job.overrides, f"coupling.scheme={scheme}"))
     program = nc.plan(loaded)
@@ -78,7 +79,8 @@ def _ours(job: Job, scheme: str, native: bool) -> Outcome:
 def _floor(job: Job) -> Outcome:
     from floor import build, floor
 
-    from feedsim import nc, scenario
+    from feedsim import scenario
+    from feedsim.simulation import nc
 
     library = build(ROOT / "build" / "bench" / "floor")
     loaded = scenario.load(job.scenario, job.overrides)

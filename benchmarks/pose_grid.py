@@ -17,17 +17,17 @@ import numpy as np
 import pose_reference
 from numpy.typing import NDArray
 
-from feedsim import cosim, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.operations import Interpreter, When, do_step, get_row, set_real, set_slopes
-from feedsim.cosim.unit import Log, Port, Unit
+from feedsim import scenario
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.operations import Interpreter, When, do_step, get_row, set_real, set_slopes
+from feedsim.simulation.cosim.unit import Log, Port, Unit
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
 from feedsim.structure.pack import pack
-from feedsim.structure.poses import grid_axis, pose_grid
-from feedsim.structure.poses_file import PoseGrid, write_poses
+from feedsim.structure.poses import PoseGrid, grid_axis, pose_grid, write_poses
 from feedsim.structure.solve import solve
 
 Floats = NDArray[np.float64]

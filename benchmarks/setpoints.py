@@ -20,10 +20,11 @@ from harness import ONE_WAY, ROOT, arguments, digits, table
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.one_unit import pack_whole
-from feedsim.cosim.unit import Unit
+from feedsim import scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.unit import Unit
+from feedsim.simulation.cosim.whole import pack_whole
 
 STEPS = (1, 2, 5, 10)  # position cycles, of 1 ms
 SHORT_CIRCLE = (ONE_WAY, "motions.0.radius=1 mm", "evaluate=[]")

@@ -15,8 +15,9 @@ from harness import ROOT, arguments, digits, progress, table
 
 import numpy as np
 
-from feedsim import cosim, scenario
-from feedsim.scenario.coupling import SCHEMES
+from feedsim import scenario
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation import cosim
 from feedsim.structure import checked_modes
 
 MOTIONS = """

@@ -2,7 +2,7 @@
 
 Commands take turns; a time is the wall time of the process, Python's own start included. The parts of a run are those
 of ``feedsim run`` itself (watched.py), made three times by one process: the first has libraries to load, archives to
-unpack and poses to solve, the later ones find them there (feedsim.cosim.unpacked).
+unpack and poses to solve, the later ones find them there (feedsim.simulation.cosim.unpacked).
 """
 
 from __future__ import annotations

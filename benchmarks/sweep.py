@@ -19,11 +19,11 @@ from harness import ROOT, Contestant, Costs, arguments, digits, measure, progres
 import numpy as np
 import psutil
 
-from feedsim.cosim import fmus_directory
+from feedsim.design.sweep.bundle import Bundle, Workplace
+from feedsim.design.sweep.design import Outcome, Task
+from feedsim.design.sweep.engine import Engine, open_engine
 from feedsim.scenario import Base, Change
-from feedsim.sweep.bundle import Bundle, Workplace
-from feedsim.sweep.design import Outcome, Task
-from feedsim.sweep.engine import Engine, open_engine
+from feedsim.simulation.cosim import fmus_directory
 
 WORKERS = 2
 MANY = 10_000

@@ -131,14 +131,15 @@ def main() -> int:
     told, times, *words = sys.argv[1:]
     clock = Clock()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead of numpy
-    from feedsim import analysis, cosim, nc, scenario
+    from feedsim import analysis, scenario
     from feedsim.cli import main as command
-    from feedsim.cosim.system import System
-    from feedsim.judge import judged  # noqa: F401, timed below
     from feedsim.report import run as report
-    from feedsim.report.partial import Partial
+    from feedsim.report.page import Partial
+    from feedsim.simulation import cosim, nc
+    from feedsim.simulation.cosim.system import System
+    from feedsim.simulation.judge import judged  # noqa: F401, timed below
 
-    of_runs = sys.modules["feedsim.judge.run"]
+    of_runs = sys.modules["feedsim.simulation.judge"]
     for home, name, part in (
         (scenario, "load", "read"), (nc, "plan", "plan"), (System, "__init__", "open"),
         (System, "initialise", "initialise"), (of_runs, "pose_use", "pose"), (Partial, "__call__", "rows"),

@@ -26,8 +26,8 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import cosim
-from feedsim.cosim.archive import Archive
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.archive import Archive
 
 H = 125e-6  # control cycle [s]
 STEPS = 8000  # 1 s

@@ -12,13 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim import cosim, scenario
+from feedsim import scenario
 from feedsim.analysis import Diagnosis
 from feedsim.analysis.circle import name
 from feedsim.analysis.circle.words import worth_telling
 from feedsim.analysis.circularity import contour
 from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnosed, tasks
-from feedsim.report.style import SIMULATED
+from feedsim.report.formatting import SIMULATED
+from feedsim.simulation import cosim
 
 HERE = Path(__file__).resolve().parent
 CIRCLE = HERE.parent / "scenarios" / "xz_circle.yaml"

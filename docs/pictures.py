@@ -22,7 +22,7 @@ import feedsim as fs
 from feedsim import cli
 from feedsim.analysis.circularity import contour as course_of
 from feedsim.analysis.evaluate import CircleTask, tasks
-from feedsim.report.compare.report import picture_of
+from feedsim.report.compare import picture_of
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES, SCENARIOS = ROOT / "docs" / "images", ROOT / "scenarios"

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from fmpy import simulate_fmu
 
-from feedsim.installation import shipped
+from feedsim.foundation.installation import shipped
 
 time = np.linspace(0, 2, 4001)
 speed = np.rec.fromarrays((time, 5 * np.sin(2 * np.pi * time)), names="time,n_fr")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.trace import Array, Series
+from feedsim.files.trace import Array, Series
 
 
 def brute_bounds(time: Sequence[float], values: Sequence[float], at: float, reach: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import rotation
 
 if TYPE_CHECKING:
-    from feedsim.cosim.friction_law import FrictionLaw
+    from feedsim.simulation.cosim.friction_law import FrictionLaw
     from pint_registry import Registry
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -111,7 +111,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def law(fmus: Path) -> Iterator["FrictionLaw"]:
     """The friction law of the shipped unit, LuGre with the transmission engaging model."""
-    from feedsim.cosim.friction_law import FrictionLaw
+    from feedsim.simulation.cosim.friction_law import FrictionLaw
 
     with FrictionLaw(fmus) as opened:
         yield opened

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feedsim.control.reading import Reading
+from feedsim.files.control.reading import Reading
 
 NC = """; start-up data, written by hand
 %_N_INITIAL_INI

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from feedsim.cosim import run
+from feedsim.estimation.identify import Recorded
+from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.replay.drive import DriveFound
+from feedsim.estimation.replay.identified import identify_drives
 from feedsim.files.columns import Columns
-from feedsim.identify import Recorded
-from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
-from feedsim.replay.drive import DriveFound
-from feedsim.replay.identified import identify_drives
+from feedsim.files.trace import write_csv
 from feedsim.scenario import Machine, load
-from feedsim.trace import write_csv
+from feedsim.simulation.cosim import run
 
 MACHINES = Path(__file__).resolve().parents[1] / "scenarios" / "machines"
 SCENARIO = """

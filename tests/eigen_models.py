@@ -16,7 +16,7 @@ from scipy.sparse import block_diag, csc_array, diags_array, eye_array, kron
 
 from feedsim.scenario.structure import Damping
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.factor import SparseFactor
+from feedsim.structure.eigenpairs import SparseFactor
 from feedsim.structure.solve import Solution
 
 Floats = NDArray[np.float64]

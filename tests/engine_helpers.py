@@ -13,8 +13,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from feedsim.design.sweep.design import Outcome, Task
 from feedsim.scenario import Change
-from feedsim.sweep.design import Outcome, Task
 
 
 @dataclass(frozen=True)

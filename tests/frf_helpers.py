@@ -11,10 +11,10 @@ import numpy as np
 from feedsim.analysis import linear
 from feedsim.analysis.campaign import Campaign, Excited, Plan
 from feedsim.analysis.responses import Overlay, Responses, closed_form
+from feedsim.files.trace.response import FrequencyResponse
 from feedsim.linear.loops import names
 from feedsim.scenario import Subject, load_subject
 from feedsim.structure import checked_modes
-from feedsim.trace.response import FrequencyResponse
 from scenario_helpers import MACHINE
 
 AXES = ("X", "Z")

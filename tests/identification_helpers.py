@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.identify import Identified, parameters
-from feedsim.identify.read import Provenance
-from feedsim.identify.record import Array, Record
-from feedsim.identify.result import (
+from feedsim.estimation.identify import Identified, parameters
+from feedsim.estimation.identify.read import Provenance
+from feedsim.estimation.identify.record import Array, Record
+from feedsim.estimation.identify.result import (
     Balance,
     Correlation,
     Drift,
@@ -23,8 +23,8 @@ from feedsim.identify.result import (
     Stationary,
     Stretch,
 )
+from feedsim.files.trace import Trace
 from feedsim.scenario import load_subject
-from feedsim.trace import Trace
 from scenario_helpers import MACHINE
 
 I_P = 0.02 / (2 * pi)

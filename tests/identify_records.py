@@ -12,7 +12,7 @@ from math import copysign, exp, log1p
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.identify.record import Record
+from feedsim.estimation.identify.record import Record
 
 Array = NDArray[np.float64]
 

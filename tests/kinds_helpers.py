@@ -6,7 +6,7 @@ from pathlib import Path
 
 from command_helpers import feedsim
 from feedsim.analysis import evaluate
-from feedsim.arguments import Call, calling
+from feedsim.foundation.arguments import Call, calling
 from feedsim.jobs.identify import IdentifyResult
 from feedsim.jobs.parameters import command_line
 from feedsim.report import run as report

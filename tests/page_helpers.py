@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from feedsim.page.html import computing
+from feedsim.report.live_page.html import computing
 
 NODE = shutil.which("node")
 MAIN = """

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.part_program import Blending, Motion, Moves
-from feedsim.path import Limits
+from feedsim.motions.part_program import Blending, Motion, Moves
+from feedsim.motions.planner import Limits
 
 Floats = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.estimation.identify.read import Recorded, read_records
 from feedsim.files.columns import Columns, load_columns
-from feedsim.identify.read import Recorded, read_records
+from feedsim.foundation.errors import InputError
 
 PITCH = 0.02
 LEAD = PITCH / (2 * pi)

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.cosim.loads import Work
-from feedsim.judge import PoseUse
+from feedsim.files.trace import Trace
 from feedsim.motions import Circle, Dwell, Move
-from feedsim.nc import Program, plan
 from feedsim.scenario import CircleTest, Positioning, Scenario
-from feedsim.trace import Trace
+from feedsim.simulation.cosim.loads import Work
+from feedsim.simulation.judge import PoseUse
+from feedsim.simulation.nc import Program, plan
 from scenario_helpers import scenario
 
 

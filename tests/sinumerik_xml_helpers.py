@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from feedsim.trace.sinumerik_xml import ALPHABET
+from feedsim.files.trace.sinumerik_xml import ALPHABET
 
 N, STEP = 255, 125e-6
 

@@ -7,8 +7,9 @@ import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from feedsim import cosim, scenario, ssp
-from feedsim.judge import JudgedRun, judged
+from feedsim import scenario
+from feedsim.simulation import cosim, ssp
+from feedsim.simulation.judge import JudgedRun, judged
 
 ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"

@@ -10,8 +10,8 @@ import yaml
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure.parts import GeometryStructure
 from feedsim.structure.assembly import Assembly
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from feedsim import cache
+from feedsim.foundation import cache
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.scenario import load_machine

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import analysis, cli, cosim, scenario, ssp
-from feedsim.judge import judged
+from feedsim import analysis, cli, scenario
+from feedsim.simulation import cosim, ssp
+from feedsim.simulation.judge import judged
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted(

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import cli, examples, scenario
+from feedsim import cli, scenario
 from feedsim.cli.commands import commands
-from feedsim.errors import InputError, OutputError
+from feedsim.foundation.errors import InputError, OutputError
+from feedsim.jobs import examples
 from feedsim.scenario.study import load_study
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import extras
 from feedsim.cli.commands import commands
+from feedsim.foundation import installation
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-EVERY = sorted({module for modules in extras.EXTRAS.values() for module in modules})
+EVERY = sorted({module for modules in installation.EXTRAS.values() for module in modules})
 # Runs the command line with packages missing, those that argv[1] names.
 BLOCK = """
 import sys
@@ -27,7 +27,7 @@ class Missing:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Missing())
 """
-WITHOUT = f"{BLOCK}import feedsim.cli, feedsim.extras\nsys.exit(feedsim.cli.main(sys.argv[2:]))\n"
+WITHOUT = f"{BLOCK}import feedsim.cli, feedsim.foundation.installation\nsys.exit(feedsim.cli.main(sys.argv[2:]))\n"
 # A stretch of every command's work; {scenarios} is where those that come along are.
 EXAMPLES = {
     "example": ["xz_circle", "--to", "copied"],
@@ -78,18 +78,18 @@ def example(name: str) -> list[str]:
     return [*name.split(), *(each.format(scenarios=ROOT / "scenarios") for each in EXAMPLES[name])]
 
 
-@pytest.mark.parametrize("extra", extras.EXTRAS)
+@pytest.mark.parametrize("extra", installation.EXTRAS)
 def test_every_extra_brings_its_modules(extra: str) -> None:
-    assert set(packages(extra)) == set(extras.EXTRAS[extra])
+    assert set(packages(extra)) == set(installation.EXTRAS[extra])
 
 
 def test_the_wheel_alone_runs_scenarios() -> None:
     plain = {re.split(r"[\[>=]", text)[0] for text in PROJECT["dependencies"]}
-    assert set(extras.EXTRAS["run"]) <= plain
+    assert set(installation.EXTRAS["run"]) <= plain
 
 
 def test_all_brings_what_commands_need() -> None:
-    needed = {module for command in LEAVES.values() for extra in command.needs for module in extras.EXTRAS[extra]}
+    needed = {module for command in LEAVES.values() for extra in command.needs for module in installation.EXTRAS[extra]}
     assert needed | {"pyuff", "xlsxwriter", "h5py"} == set(packages("all"))
 
 
@@ -116,7 +116,7 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
         assert (done.returncode, done.stderr) == (0, "")
         return
     (extra,) = needs
-    *others, last = extras.EXTRAS[extra]
+    *others, last = installation.EXTRAS[extra]
     lacking = f"{', '.join(others)} and {last} are not installed"
     said = f'feedsim: feedsim {name} needs feedsim[{extra}], of which {lacking}: pip install "feedsim[{extra}]"\n'
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
@@ -125,16 +125,16 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
 
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if LEAVES[name].needs])
 def test_a_command_does_with_its_extra(name: str, folder: Path) -> None:
-    brought = {module for extra in LEAVES[name].needs for module in extras.EXTRAS[extra]}
+    brought = {module for extra in LEAVES[name].needs for module in installation.EXTRAS[extra]}
     done = without([module for module in EVERY if module not in brought], *example(name), cwd=folder)
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("module", extras.EXTRAS["run"])
+@pytest.mark.parametrize("module", installation.EXTRAS["run"])
 def test_a_check_does_with_nothing_less(module: str, folder: Path) -> None:
     """Each package of `run` is asked for because a check imports it, not because the command says so."""
     done = python(
-        WITHOUT.replace("sys.exit", "feedsim.extras.EXTRAS['run'] = ()\nsys.exit"),
+        WITHOUT.replace("sys.exit", "feedsim.foundation.installation.EXTRAS['run'] = ()\nsys.exit"),
         [module],
         *example("check"),
         cwd=folder,
@@ -184,15 +184,15 @@ def test_what_is_drawn_is_asked_for_ahead_of_a_run(folder: Path) -> None:
 
 @pytest.mark.parametrize("module", ["scipy", "distributed"])
 def test_a_study_asks_for_all_at_once(module: str) -> None:
-    told = extras.missing(ModuleNotFoundError("x", name=module), "feedsim.sweep")
+    told = installation.missing(ModuleNotFoundError("x", name=module), "feedsim.sweep")
     assert str(told).endswith(f'of which {module} is not installed: pip install "feedsim[sweep]"')
-    run = str(extras.missing(ModuleNotFoundError("x", name="scipy"), "feedsim.frf"))
+    run = str(installation.missing(ModuleNotFoundError("x", name="scipy"), "feedsim.frf"))
     assert run.endswith('pip install "feedsim[run]"')
 
 
 def test_what_is_no_extra_is_an_error_of_its_own() -> None:
-    assert extras.missing(ModuleNotFoundError("x", name="feedsim.unknown")) is None
-    assert extras.missing(ImportError("cannot import name", name="scipy")) is None
+    assert installation.missing(ModuleNotFoundError("x", name="feedsim.unknown")) is None
+    assert installation.missing(ImportError("cannot import name", name="scipy")) is None
 
 
 def test_the_front_door_says_it_too(tmp_path: Path) -> None:

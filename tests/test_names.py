@@ -154,7 +154,7 @@ def test_comments_say_shown_given_or_determined(file: Path) -> None:
 
 # Verbs and pronouns as names: of what?
 WITHOUT_A_THING = frozenset({"each", "found", "held", "left", "told"})
-MAX_NAMES_WITHOUT_A_THING = 112  # in the whole package, 1,700 once; only ever fewer
+MAX_NAMES_WITHOUT_A_THING = 111  # in the whole package, 1,700 once; only ever fewer
 
 
 def bound(tree: ast.Module) -> Iterator[str]:

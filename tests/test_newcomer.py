@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import cli, examples
+from feedsim import cli
+from feedsim.jobs import examples
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"

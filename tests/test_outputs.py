@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from command_helpers import feedsim
-from feedsim.errors import OutputError
-from feedsim.outputs import archive_with, begins_with, check_file, replacing, unchanged
+from feedsim.foundation.errors import OutputError
+from feedsim.foundation.outputs import archive_with, begins_with, check_file, replacing, unchanged
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -16,10 +16,10 @@ from types import FrameType
 import pytest
 
 from command_helpers import PATIENCE
-from feedsim import owned
-from feedsim.errors import OutputError
-from feedsim.owned import TemporaryFolder, claimed, remove_orphans
-from feedsim.trace import written_whole
+from feedsim.files.trace import written_whole
+from feedsim.foundation import owned
+from feedsim.foundation.errors import OutputError
+from feedsim.foundation.owned import TemporaryFolder, claimed, remove_orphans
 
 ROOT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -29,9 +29,8 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[subprocess.Popen[str]]:
     """A process that has run `code` and waits; killed before the block if so asked, else ended behind it."""
     text = textwrap.dedent(code) + "\nprint('there', flush=True)\nsys.stdin.readline()\n"
-    head = (
-        "import sys\nfrom pathlib import Path\nfrom feedsim.owned import *\nfrom feedsim.trace import written_whole\n"
-    )
+    rooms = "from feedsim.foundation.owned import *\nfrom feedsim.files.trace import written_whole\n"
+    head = f"import sys\nfrom pathlib import Path\n{rooms}"
     process = subprocess.Popen(
         [sys.executable, "-c", head + text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT / "master"), "TMPDIR": str(folder)},
@@ -229,7 +228,7 @@ def test_a_signal_at_any_line_leaves_no_temporary_folder(
 
 POOL = """
 import multiprocessing, sys, time
-from feedsim.owned import TemporaryFolder
+from feedsim.foundation.owned import TemporaryFolder
 folders = []
 
 def work(number):

@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import feedsim
-from feedsim import cli, control
-from feedsim.identify.signals import ALIASES
+from feedsim import cli
+from feedsim.estimation.identify.signals import ALIASES
+from feedsim.files import control
+from feedsim.foundation.variables import table
 from feedsim.scenario.schema import json_schema
-from feedsim.variables import table
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"

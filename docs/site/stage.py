@@ -17,7 +17,7 @@ from pathlib import Path
 
 import feedsim
 import reference
-from feedsim.installation import shipped
+from feedsim.foundation.installation import shipped
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

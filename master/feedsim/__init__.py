@@ -38,7 +38,7 @@ _OLD_NAMES = {
 
 def __getattr__(public: str) -> _Any:
     if public == "__version__":
-        from feedsim.installation import version
+        from feedsim.foundation.installation import version
 
         return version("feedsim") or "unknown"
     if public in _OLD_NAMES:
@@ -49,7 +49,7 @@ def __getattr__(public: str) -> _Any:
     try:
         return getattr(_import_module(room), name)
     except ModuleNotFoundError as error:
-        from feedsim.extras import missing
+        from feedsim.foundation.installation import missing
 
         raise missing(error, f"feedsim.{public}") or error from None
 

@@ -2,10 +2,12 @@
 
 from feedsim.analysis.evaluate import evaluate as evaluate
 from feedsim.analysis.figures import Figure as Figure
-from feedsim.errors import FeedsimError as FeedsimError
-from feedsim.errors import InputError as InputError
-from feedsim.errors import OutputError as OutputError
-from feedsim.errors import SimulationError as SimulationError
+from feedsim.files.trace import Trace as Trace
+from feedsim.files.trace.files import read_trace as read_trace
+from feedsim.foundation.errors import FeedsimError as FeedsimError
+from feedsim.foundation.errors import InputError as InputError
+from feedsim.foundation.errors import OutputError as OutputError
+from feedsim.foundation.errors import SimulationError as SimulationError
 from feedsim.jobs.check import check as check
 from feedsim.jobs.circle import circle as circle
 from feedsim.jobs.compare import compare as compare
@@ -34,14 +36,12 @@ from feedsim.jobs.tools import example as example
 from feedsim.jobs.tools import schema as schema
 from feedsim.jobs.tune_compensation import tune_compensation as tune_compensation
 from feedsim.jobs.tune_drive import tune_drive as tune_drive
+from feedsim.jobs.tune_drive import tune_proposals as tune_proposals
 from feedsim.jobs.tune_feedforward import tune_feedforward as tune_feedforward
-from feedsim.jobs.tune_proposals import tune_proposals as tune_proposals
-from feedsim.judge import JudgedRun as Run
 from feedsim.scenario import Machine as Machine
 from feedsim.scenario import Scenario as Scenario
 from feedsim.scenario import load_machine as load_machine
 from feedsim.scenario.load import load_scenario as load_scenario
-from feedsim.trace import Trace as Trace
-from feedsim.trace.csv import read_trace as read_trace
+from feedsim.simulation.judge import JudgedRun as Run
 
 __version__: str

@@ -1,5 +1,5 @@
 /* One control cycle: the rows of cycle.h on the parts of the machine. The master works the same rows on units of their
- * own (feedsim/cosim/schedule.py), so that both give the same bits. */
+ * own (feedsim/simulation/cosim/schedule.py), so that both give the same bits. */
 #include <string.h>
 
 #include "machine.h"

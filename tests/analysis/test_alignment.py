@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.analysis.alignment import aligned, approaches, stops
-from feedsim.analysis.circularity import Turn
-from feedsim.analysis.side_by_side import Source, read_sources
-from feedsim.analysis.spectrum import amplitude_spectrum
-from feedsim.errors import InputError
+from feedsim.analysis.circularity import Turn, amplitude_spectrum
+from feedsim.analysis.side_by_side import Source, aligned, approaches, read_sources, stops
+from feedsim.foundation.errors import InputError
 
 Array = NDArray[np.float64]
 STEP = 1e-3

@@ -12,11 +12,11 @@ from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
 from feedsim.analysis.evaluate import bidirectional
-from feedsim.errors import InputError
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, Dwell, Move
-from feedsim.nc import plan
 from feedsim.scenario import CircleTest
-from feedsim.trace import Trace
+from feedsim.simulation.nc import plan
 from scenario_helpers import default_machine, scenario
 
 RADIUS, OMEGA = 0.015, 0.05 / 0.015

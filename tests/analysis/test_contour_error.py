@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 import feedsim as fs
 from feedsim.analysis import contours
 from feedsim.analysis.contour_error import ContourError, contour_error, per_block, without_friction
+from feedsim.files.trace import Trace
+from feedsim.motions.part_program import Motion, Moves
+from feedsim.motions.planner.nearest import ProgrammedPath
 from feedsim.motions.program import Programmed
-from feedsim.nc import Program, Segment
-from feedsim.part_program import Motion, Moves
-from feedsim.path.nearest import ProgrammedPath
-from feedsim.trace import Trace
+from feedsim.simulation.nc import Program, Segment
 
 Array = NDArray[np.float64]
 NAN3 = [np.nan] * 3

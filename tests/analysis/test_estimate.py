@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.signal import freqz, lfilter
 
 from feedsim.analysis import campaign as estimate
-from feedsim.errors import InputError
-from feedsim.nc.excitation import multisine
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Cycles
-from feedsim.trace import Trace
+from feedsim.simulation.nc.excitation import multisine
 
 Floats = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Turn, tasks
-from feedsim.errors import InputError
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, Column, MeasuredSetpoints, Move
-from feedsim.nc import plan
 from feedsim.scenario import CircleTest
-from feedsim.trace import Trace
+from feedsim.simulation.nc import plan
 from scenario_helpers import scenario
 
 Array = NDArray[np.float64]

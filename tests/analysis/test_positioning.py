@@ -14,11 +14,11 @@ from pydantic import ValidationError
 from scipy.optimize import brentq
 
 from feedsim.analysis import Approach, Figure, PositioningTask, check, positioning, tasks
-from feedsim.errors import InputError
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, Dwell, Move
-from feedsim.nc import plan
 from feedsim.scenario import Positioning, Recording, load
-from feedsim.trace import Trace
+from feedsim.simulation.nc import plan
 from scenario_helpers import MACHINE, scenario
 
 START, END, UNTIL = 0.2, 1.2, 3.0

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import Accuracy, evaluate, tasks
-from feedsim.cosim import run
-from feedsim.cosim.loads import _random
-from feedsim.errors import InputError
-from feedsim.judge import judged
+from feedsim.foundation.errors import InputError
 from feedsim.motions.positioning_cycle import Visits
-from feedsim.nc import plan
 from feedsim.report.run.report import draw, report_of
 from feedsim.scenario import Scenario, load
 from feedsim.scenario.loads import TorqueNoise
+from feedsim.simulation.cosim import run
+from feedsim.simulation.cosim.loads import _random
+from feedsim.simulation.judge import judged
+from feedsim.simulation.nc import plan
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "scenarios" / "z_iso230_2.yaml"

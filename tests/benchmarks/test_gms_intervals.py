@@ -18,7 +18,7 @@ from friction_reference import sine  # noqa: E402
 from gms_intervals import I_P, INTERVAL, M_0, NAMES, NOISES, SINES, J, Outcome, friction, records, table  # noqa: E402
 from gms_reference import solved  # noqa: E402
 
-from feedsim.cosim.friction_law import FrictionLaw  # noqa: E402
+from feedsim.simulation.cosim.friction_law import FrictionLaw  # noqa: E402
 
 
 def test_a_record_is_that_of_its_axis(fmus: Path) -> None:

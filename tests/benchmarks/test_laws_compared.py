@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 from friction_laws import Row, halves, main, summary, table  # noqa: E402
 
-from feedsim.identify.read import Provenance, Recorded  # noqa: E402
-from feedsim.identify.record import Record  # noqa: E402
+from feedsim.estimation.identify.read import Provenance, Recorded  # noqa: E402
+from feedsim.estimation.identify.record import Record  # noqa: E402
 
 I_P, J, F_C, SIGMA_2 = 0.02 / (2 * pi), 0.0164, 1.5, 0.01
 

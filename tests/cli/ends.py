@@ -19,8 +19,8 @@ from collections import Counter
 from pathlib import Path
 
 from command_helpers import PATIENCE
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.trace import write_csv
+from feedsim.files.trace import write_csv
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identification_helpers import I_P, log_of, strokes
 from ssp_helpers import short_scenario
 

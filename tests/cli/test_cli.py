@@ -15,8 +15,8 @@ import pytest
 from scipy.io import savemat
 
 from command_helpers import feedsim, feedsim_process
-from feedsim.owned import LOCK
-from feedsim.trace import read_csv
+from feedsim.files.trace import read_csv
+from feedsim.foundation.owned import LOCK
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIO = """

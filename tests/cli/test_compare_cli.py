@@ -16,7 +16,7 @@ from scipy.io import savemat
 
 from compare_helpers import changed, wave, written
 from feedsim.cli import main
-from feedsim.trace import Series
+from feedsim.files.trace import Series
 
 ROOT = Path(__file__).resolve().parents[2]
 

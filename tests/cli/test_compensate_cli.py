@@ -16,10 +16,9 @@ import yaml
 from command_helpers import Done, feedsim, summary_of
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
-from feedsim.errors import SimulationError
-from feedsim.findings import severity
-from feedsim.report.compensate.report import _um, table_csv
-from feedsim.trace import read_csv
+from feedsim.files.trace import read_csv
+from feedsim.foundation.errors import SimulationError, severity
+from feedsim.report.compensate import _um, table_csv
 from report_helpers import Page, contents
 
 ROOT = Path(__file__).resolve().parents[2]

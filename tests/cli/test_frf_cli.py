@@ -16,19 +16,19 @@ from command_helpers import Done, feedsim, summary_of
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
-from feedsim.errors import InputError, OutputError
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.files.trace.response_files import read_response_csv, write_response
+from feedsim.foundation.errors import InputError, OutputError
 from feedsim.jobs.frf import FrfResult
 from feedsim.linear.loops import names, response, unit_of
 from feedsim.report import frf as report
+from feedsim.report.content import Picture
 from feedsim.report.frf import report as report_module
 from feedsim.report.frf.bode_plots import curves_of, speed_controlled_pictures
 from feedsim.report.frf.report import report_of
 from feedsim.report.page import html, script
-from feedsim.report.picture import Picture
 from feedsim.scenario import load_machine, load_subject
 from feedsim.structure import checked_modes
-from feedsim.trace.response import FrequencyResponse
-from feedsim.trace.response_files import read_response_csv, write_response
 from frf_helpers import responses, subject
 from report_helpers import Page, contents
 from scenario_helpers import MACHINE, default_machine

@@ -14,7 +14,7 @@ HEAVY = {"numpy", "scipy", "matplotlib", "fmpy", "pydantic", "yaml", "ruckig", "
 # What neither a run nor a check of a scenario needs, beyond the report's own.
 NOT_FOR_A_RUN = {"scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
 # Nor what reads files of other kinds.
-NOT_FOR_A_RUN |= {"feedsim.scenario.study", "feedsim.files.tolerances", "feedsim.ssp"}
+NOT_FOR_A_RUN |= {"feedsim.scenario.study", "feedsim.files.columns", "feedsim.simulation.ssp"}
 # Nor what makes modes of other programs' matrices, or of a grid of poses.
 NOT_FOR_A_RUN |= {"feedsim.structure.build", "feedsim.structure.matrices", "feedsim.structure.poses"}
 

@@ -15,19 +15,19 @@ import pytest
 
 from command_helpers import Done, feedsim, summary_of
 from feedsim.cli import main
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
-from feedsim.identify import Options, identify, stages
-from feedsim.identify.friction_file import Line, friction_text
-from feedsim.identify.motion import RecordTorque
-from feedsim.identify.read import distinct
-from feedsim.identify.record import Record
-from feedsim.identify.result import Correlation, Estimate, Plateau
-from feedsim.identify.stages import begins, merged_correlation, transitions
+from feedsim.estimation.identify import Options, identify, stages
+from feedsim.estimation.identify.friction_file import Line, friction_text
+from feedsim.estimation.identify.motion import RecordTorque
+from feedsim.estimation.identify.read import distinct
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Correlation, Estimate, Plateau
+from feedsim.estimation.identify.stages import begins, merged_correlation, transitions
+from feedsim.files.trace import write_csv
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.variables import parameters
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
-from feedsim.trace import write_csv
-from feedsim.variables import parameters
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identification_helpers import (
     I_P,
     TRUE,

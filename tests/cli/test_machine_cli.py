@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 import yaml
 
-from feedsim import cli, cosim, scenario
+from feedsim import cli, scenario
 from feedsim.analysis import evaluate
-from feedsim.judge import judged
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import judged
 from feedsim.structure import read_modes
 from feedsim.structure.table_check import table_mismatch
 

@@ -12,8 +12,8 @@ import pytest
 import feedsim as fs
 from command_helpers import feedsim, summary_of
 from feedsim.cli import parser
-from feedsim.trace.response import FrequencyResponse
-from feedsim.trace.response_files import write_response
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.files.trace.response_files import write_response
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 ONE_AXIS, CENTRE = SCENARIOS / "machines" / "one_axis", SCENARIOS / "machines" / "test_centre"

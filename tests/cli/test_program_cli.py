@@ -204,6 +204,6 @@ def test_examples_of_programs_come_with_a_machine_and_run(tmp_path: Path, fmus: 
 
 
 def fs_examples() -> list[object]:
-    from feedsim.examples import examples
+    from feedsim.jobs.examples import examples
 
     return list(examples())

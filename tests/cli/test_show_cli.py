@@ -17,7 +17,7 @@ from command_helpers import feedsim
 from feedsim import cli
 from feedsim.analysis import diagnoses, evaluate
 from feedsim.report import run as report
-from feedsim.report.show.report import _beside, _figures
+from feedsim.report.show import _beside, _figures
 from report_helpers import circle_run
 
 

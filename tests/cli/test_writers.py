@@ -18,9 +18,9 @@ import pytest
 
 from command_helpers import PATIENCE
 from feedsim.cli import main
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.sweep import read_table
-from feedsim.trace import write_csv
+from feedsim.design.sweep import read_table
+from feedsim.files.trace import write_csv
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identification_helpers import I_P, log_of, strokes
 from ssp_helpers import short_scenario
 
@@ -81,7 +81,7 @@ def complete(out: Path, besides: Sequence[str] = ()) -> dict[str, object]:
 def test_a_second_one_is_refused_before_it_begins(
     command: str, place: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = "import sys\nfrom pathlib import Path\nfrom feedsim.owned import claimed\n"
+    code = "import sys\nfrom pathlib import Path\nfrom feedsim.foundation.owned import claimed\n"
     code += "with claimed(Path('claimed')):\n    print('there', flush=True)\n    sys.stdin.readline()\n"
     owner = subprocess.Popen(
         [sys.executable, "-c", code], cwd=place, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compare_helpers import brute_bounds, changed, wave
-from feedsim.compare import Options, Tolerances, Variable, bounds, compare
-from feedsim.errors import InputError
-from feedsim.trace import Array, Series, Trace
+from feedsim.comparison import Options, Tolerances, Variable, bounds, compare
+from feedsim.files.trace import Array, Series, Trace
+from feedsim.foundation.errors import InputError
 
 EXACT = Tolerances.parse(["0"])
 

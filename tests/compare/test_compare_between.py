@@ -11,8 +11,8 @@ import pytest
 
 from compare_helpers import changed, wave, written
 from feedsim.cli import main
-from feedsim.compare import Options, Tolerances, compare, thinned
-from feedsim.trace import Array, Series, as_series
+from feedsim.comparison import Options, Tolerances, compare, thinned
+from feedsim.files.trace import Array, Series, as_series
 
 TIGHT = Tolerances.parse(["1e-6"])
 DENSE = wave(3201)
@@ -158,7 +158,7 @@ def test_columns_and_time_that_are_left_out_are_told() -> None:
     ],
 )
 def test_bounds_of_something_else_are_refused(between: Series, reason: str, tmp_path: Path) -> None:
-    from feedsim.compare import compare_files
+    from feedsim.comparison import compare_files
 
     result, reference = written(tmp_path / "r.csv", DENSE), written(tmp_path / "case.csv", KEPT)
     written(tmp_path / "case.bounds.csv", between)

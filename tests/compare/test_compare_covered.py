@@ -10,9 +10,9 @@ import pytest
 
 from compare_helpers import changed, wave, written
 from feedsim.cli import main
-from feedsim.compare import Comparison, Options, Tolerances, compare
-from feedsim.errors import InputError
-from feedsim.trace import Array, Series, Trace, matches, matching, read_series
+from feedsim.comparison import Comparison, Options, Tolerances, compare
+from feedsim.files.trace import Array, Series, Trace, matches, matching, read_series
+from feedsim.foundation.errors import InputError
 
 
 def at_rows(series: Series, rows: object) -> Series:

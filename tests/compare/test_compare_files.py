@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from compare_helpers import wave, written
-from feedsim.compare import Tolerances, compare_files, pairs_of, tolerances_of
-from feedsim.errors import InputError
-from feedsim.files.tolerances import load_tolerances
+from feedsim.comparison import Tolerances, compare_files, pairs_of, tolerances_of
+from feedsim.files.columns import load_tolerances
+from feedsim.files.trace import read_series
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.schema import json_schema
-from feedsim.trace import read_series
 
 
 def file(tmp_path: Path, content: str | bytes, name: str = "t.csv") -> Path:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from feedsim.cli import main
-from feedsim.compare import Comparison, Options, Tolerances, compare, tolerances_of
-from feedsim.trace import Series
+from feedsim.comparison import Comparison, Options, Tolerances, compare, tolerances_of
+from feedsim.files.trace import Series
 
 TIME = np.arange(101) * 0.1
 RAMP = np.minimum(100.0 * np.arange(101), 4500.0)

@@ -9,9 +9,9 @@ import pytest
 
 from compare_helpers import changed, wave, written
 from feedsim.cli import main
-from feedsim.compare import Options, Tolerances, estimated_shift
-from feedsim.errors import InputError
-from feedsim.trace import Array, Series
+from feedsim.comparison import Options, Tolerances, estimated_shift
+from feedsim.files.trace import Array, Series
+from feedsim.foundation.errors import InputError
 
 
 def moves(time: Array, late: float = 0.0, torque_late: float | None = None) -> Series:

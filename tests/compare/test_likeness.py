@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from feedsim import cli
-from feedsim.compare import Comparison, Options, Tolerances, compare
-from feedsim.trace import Array, Series
+from feedsim.comparison import Comparison, Options, Tolerances, compare
+from feedsim.files.trace import Array, Series
 
 TIME = np.linspace(0.0, 1.2, 1201)
 UNITS = {"Z.x_a": "m", "Z.n_a": "rad/s", "Z.M_a": "N.m"}

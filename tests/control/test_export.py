@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feedsim.control.formats import opened
-from feedsim.control.reading import Value, read
-from feedsim.control.writing import changed, number
-from feedsim.errors import InputError
+from feedsim.files.control.formats import opened
+from feedsim.files.control.reading import Value, read
+from feedsim.files.control.writing import changed, number
+from feedsim.foundation.errors import InputError
 
 NC = """\ufeff; Sch\xe4rfe \xb5m, by hand\r
 N10000 $MN_AXCONF_MACHAX_NAME_TAB[0]="X1"\r

@@ -8,10 +8,10 @@ from pathlib import PurePath
 import pytest
 
 from control_helpers import DRIVE, INI, NC, reasons, values
-from feedsim.control import table
-from feedsim.control.formats import opened
-from feedsim.control.reading import read, usual_ranges
-from feedsim.errors import InputError
+from feedsim.files.control import table
+from feedsim.files.control.formats import opened
+from feedsim.files.control.reading import read, usual_ranges
+from feedsim.foundation.errors import InputError
 
 
 def test_machine_data() -> None:

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control_helpers import DRIVE, INI, NC, TABLE, reasons, values
-from feedsim.control.archive import scalar
-from feedsim.control.formats import opened
-from feedsim.control.reading import read
-from feedsim.errors import InputError
+from feedsim.files.control.archive import scalar
+from feedsim.files.control.formats import opened
+from feedsim.files.control.reading import read
+from feedsim.foundation.errors import InputError
 
 
 def test_tables() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import feedsim as fs
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 
 CENTRE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"
 DATA = """N32200 $MA_POSCTRL_GAIN[0,AX1]=5

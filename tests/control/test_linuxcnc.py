@@ -12,10 +12,10 @@ import pytest
 
 import feedsim as fs
 from control_helpers import reasons, values
-from feedsim.control.formats import opened
-from feedsim.control.reading import read
-from feedsim.control.writing import changed
-from feedsim.errors import InputError
+from feedsim.files.control.formats import opened
+from feedsim.files.control.reading import read
+from feedsim.files.control.writing import changed
+from feedsim.foundation.errors import InputError
 
 
 def ini(kinematics: str, coordinates: str, joints: int = 6, section: str = "JOINT", more: str = "") -> bytes:
@@ -252,7 +252,7 @@ def test_a_link_does_not_lead_out_of_the_folder(tmp_path: Path) -> None:
 def test_values_are_written_into_the_file_that_has_them(tmp_path: Path) -> None:
     """The acceleration differs; the main file keeps its bytes."""
     from feedsim.jobs.machine_import import read_files
-    from feedsim.jobs.watch import NO_WATCH
+    from feedsim.jobs.result import NO_WATCH
 
     main = laid(tmp_path, {"main.ini": HEAD + "[JOINT_1]\n#INCLUDE a.inc\n", "a.inc": JOINT.format(30)})
     made = changed(read_files([main], NO_WATCH), {"Z": "Z"}, {"Z": {"max_acceleration": 0.2, "max_speed": 0.03}})

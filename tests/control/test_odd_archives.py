@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from feedsim.control.archive import Archive
-from feedsim.control.formats import opened
-from feedsim.control.reading import Reading, Value, read
-from feedsim.control.writing import changed
-from feedsim.errors import InputError
+from feedsim.files.control.archive import Archive
+from feedsim.files.control.formats import opened
+from feedsim.files.control.reading import Reading, Value, read
+from feedsim.files.control.writing import changed
+from feedsim.foundation.errors import InputError
 
 LATIN = "; Sch\xe4rfe der Achsen, \xb5m\n"
 # Spaces, tabs, letters of either case, no blank behind the block number, several assignments in a line, values that are

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.untrusted import MOST_ENTRIES
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.unpacked import MOST_ENTRIES
 
 
 def test_entries_are_counted(tmp_path: Path) -> None:

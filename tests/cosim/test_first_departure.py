@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario
-from feedsim.cosim.run import first_departure
-from feedsim.errors import SimulationError
-from feedsim.trace import Trace
+from feedsim import scenario
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import SimulationError
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.run import first_departure
 from scenario_helpers import default_machine
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.cosim import Follower, follow
-from feedsim.errors import SimulationError
-from feedsim.nc import Program
-from feedsim.replay.elastic import ElasticMode, with_modes
+from feedsim.estimation.replay.machine_files import ElasticMode, with_modes
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import SimulationError
 from feedsim.scenario import Machine, load_machine
-from feedsim.trace import Trace
+from feedsim.simulation.cosim import Follower, follow
+from feedsim.simulation.nc import Program
 from machine_helpers import rigid_copy
 
 MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import feedsim as fs
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
-from feedsim.identify.options import Asked
-from feedsim.identify.read import Provenance
+from feedsim.estimation.identify.read import Provenance
+from feedsim.estimation.identify.stages import Asked
+from feedsim.foundation.errors import InputError
 from feedsim.linear.judgement import Bristles
 from feedsim.report.provenance import axis_parameters
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 PARAMETERS = {

@@ -10,14 +10,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 
-from feedsim import cosim, judge, nc, scenario
+from feedsim import scenario
 from feedsim.cli import main
-from feedsim.cosim.loads import Acting
-from feedsim.cosim.loop import REPORTED_EVERY
-from feedsim.errors import InputError
-from feedsim.judge import JudgedRun, judged
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Base, load_machine
 from feedsim.scenario.loads import ForceTable, ToolLoad
+from feedsim.simulation import cosim, judge, nc
+from feedsim.simulation.cosim.loads import Acting
+from feedsim.simulation.cosim.loop import REPORTED_EVERY
+from feedsim.simulation.judge import JudgedRun, judged
 
 Floats = NDArray[np.float64]
 

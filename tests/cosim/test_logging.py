@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario
-from feedsim.cosim import logged
-from feedsim.cosim.recording import recorded_columns
-from feedsim.cosim.run import logged_axes
-from feedsim.errors import InputError
-from feedsim.judge import judged
+from feedsim import scenario
+from feedsim.files.trace import Trace, read_csv
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Move
 from feedsim.motions.constant_speed import Strokes
 from feedsim.report import run as report
 from feedsim.scenario import Logging
 from feedsim.scenario.model import Signal
-from feedsim.trace import Trace, read_csv
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim import logged
+from feedsim.simulation.cosim.recording import recorded_columns
+from feedsim.simulation.cosim.run import logged_axes
+from feedsim.simulation.judge import judged
 from scenario_helpers import MACHINE
 from scenario_helpers import scenario as described
 

@@ -11,19 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import loop, recording
-from feedsim.cosim.unit import Log
-from feedsim.errors import InputError, OutputError, SimulationError
-from feedsim.judge import judged
+from feedsim import scenario
+from feedsim.files.trace import Table, Trace, least_and_largest, read_csv, release, stretches, write_csv
+from feedsim.files.trace import trace as table
+from feedsim.foundation.errors import InputError, OutputError, SimulationError
+from feedsim.foundation.outputs import replacing
 from feedsim.motions import circular
-from feedsim.motions.points import Held, Joined
-from feedsim.nc import program
-from feedsim.nc import program as spline
-from feedsim.outputs import replacing
+from feedsim.motions.kind import Held, Joined
 from feedsim.report import run as report
-from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, write_csv
-from feedsim.trace import trace as table
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import loop, recording
+from feedsim.simulation.cosim.unit import Log
+from feedsim.simulation.judge import judged
+from feedsim.simulation.nc import program
+from feedsim.simulation.nc import program as spline
 
 ROOT = Path(__file__).resolve().parents[2]
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
@@ -107,7 +108,7 @@ def test_long_traces_are_written_like_short_ones(tmp_path: Path, monkeypatch: py
     time = np.arange(1000) / 7
     trace = Trace(time, {"y": np.sin(time), "n": np.round(time)}, {"y": "m"})
     write_csv(tmp_path / "whole.csv", trace)
-    monkeypatch.setattr("feedsim.trace.csv.ROWS", 13)
+    monkeypatch.setattr("feedsim.files.trace.files.ROWS", 13)
     write_csv(tmp_path / "parts.csv", trace)
     assert (tmp_path / "parts.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
 
@@ -289,7 +290,7 @@ import sys, tracemalloc
 from pathlib import Path
 from feedsim import cosim, nc, scenario
 from feedsim.report import run as report
-from feedsim.trace import trace as table
+from feedsim.files.trace import trace as table
 table.IN_MEMORY = 0
 def peak(turns):
     settings = [f"motions.0.turns={turns}", "motions.0.radius=5 mm", "recording.interval=250 us", "evaluate=[]"]

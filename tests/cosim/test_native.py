@@ -16,19 +16,19 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import exchange
-from feedsim.cosim.excite import measure, usual_rms
-from feedsim.cosim.loop import REPORTED_EVERY, Loop, Progress
-from feedsim.cosim.operations import set_real
-from feedsim.cosim.schedule import Cycle
-from feedsim.cosim.system import System
-from feedsim.cosim.unit import Port
-from feedsim.errors import InputError, SimulationError
-from feedsim.findings import severity
-from feedsim.judge import JudgedRun, judged
-from feedsim.nc.excitation import multisine
-from feedsim.scenario.coupling import SCHEMES
+from feedsim import scenario
+from feedsim.foundation.errors import InputError, SimulationError, severity
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import exchange
+from feedsim.simulation.cosim.excite import measure, usual_rms
+from feedsim.simulation.cosim.loop import REPORTED_EVERY, Loop, Progress
+from feedsim.simulation.cosim.operations import set_real
+from feedsim.simulation.cosim.schedule import Cycle
+from feedsim.simulation.cosim.system import System
+from feedsim.simulation.cosim.unit import Port
+from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.nc.excitation import multisine
 from feedsim_packager import toolchain
 from feedsim_packager.native import build as build_library
 from scenario_helpers import default_machine

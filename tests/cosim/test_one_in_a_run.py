@@ -8,12 +8,13 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from feedsim import load_scenario, nc
+from feedsim import load_scenario
 from feedsim.cli import main
-from feedsim.cosim import executed, run
-from feedsim.errors import InputError
-from feedsim.judge import JudgedRun, check, judged
-from feedsim.scenario.coupling import SCHEMES
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation import nc
+from feedsim.simulation.cosim import executed, run
+from feedsim.simulation.judge import JudgedRun, check, judged
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 SHORT = ("motions.0.by.Z=1 mm", "motions.1.duration=0.05 s", "recording.interval=125 us")

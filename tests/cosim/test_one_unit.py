@@ -23,13 +23,13 @@ from fmpy.fmi2 import (
 from fmpy.model_description import ModelDescription
 
 from feedsim import load_scenario
-from feedsim.cosim.one_unit import pack_whole
-from feedsim.cosim.run import run
-from feedsim.errors import InputError
-from feedsim.judge import JudgedRun, judged
-from feedsim.nc import Program, plan
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Scenario
-from feedsim.scenario.coupling import SCHEMES
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation.cosim.run import run
+from feedsim.simulation.cosim.whole import pack_whole
+from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.nc import Program, plan
 
 ROOT = Path(__file__).resolve().parents[2]
 SIGNALS = ("x_a", "n_a", "M_a", "M_fr", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q")

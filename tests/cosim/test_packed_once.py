@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.cosim import plant
 from feedsim.scenario import load
+from feedsim.simulation.cosim import plant
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import loop, recording
-from feedsim.nc import Program
+from feedsim import scenario
 from feedsim.scenario import Scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import loop, recording
+from feedsim.simulation.nc import Program
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
 # Every control cycle is a position cycle: a run may end at any.

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, judge, nc, scenario
-from feedsim.cosim import unpacked
-from feedsim.cosim.operations import Interpreter, do_step
-from feedsim.cosim.system import System
-from feedsim.cosim.unpacked import STORE
-from feedsim.errors import InputError, SimulationError
-from feedsim.judge import JudgedRun, judged
-from feedsim.scenario.coupling import SCHEMES
+from feedsim import scenario
+from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation import cosim, judge, nc
+from feedsim.simulation.cosim import unpacked
+from feedsim.simulation.cosim.operations import Interpreter, do_step
+from feedsim.simulation.cosim.system import System
+from feedsim.simulation.cosim.unpacked import STORE
+from feedsim.simulation.judge import JudgedRun, judged
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 # A short reversal of all axes at once: every unit works, every branch of the friction is passed.

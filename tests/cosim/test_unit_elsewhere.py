@@ -16,7 +16,7 @@ from fmpy.fmi1 import FMICallException
 
 from cosim.test_one_unit import ROOT, Packed, Unit, outside, packed
 from feedsim import load_scenario
-from feedsim.cosim.one_unit import pack_whole
+from feedsim.simulation.cosim.whole import pack_whole
 from feedsim_packager.variables import fnv1a_64
 
 T_C = 125e-6

@@ -16,13 +16,13 @@ from typing import Any
 import pytest
 
 from command_helpers import PATIENCE
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import unpacked
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.unit import Unit
-from feedsim.cosim.unpacked import STORE
-from feedsim.cosim.untrusted import Allowance
-from feedsim.errors import InputError
+from feedsim import scenario
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import unpacked
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.unit import Unit
+from feedsim.simulation.cosim.unpacked import STORE, Allowance
 from ssp_helpers import short_scenario
 
 
@@ -148,8 +148,8 @@ def test_a_forked_process_has_its_own_and_leaves_its_parents(fmus: Path, scratch
     code = f"""
 import os, sys, tempfile
 from pathlib import Path
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.unpacked import STORE
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.unpacked import STORE
 file = Path({str(fmus / "friction.fmu")!r})
 idle = Archive(file).directory
 open_one = Archive(file)
@@ -254,7 +254,7 @@ WORKERS = """
 import multiprocessing, sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from feedsim.cosim.archive import Archive
+from feedsim.simulation.cosim.archive import Archive
 opened = []
 def work(file):
     with Archive(file) as archive:
@@ -294,9 +294,9 @@ def test_a_lock_held_while_forking_is_renewed(fmus: Path, scratch: Path) -> None
     code = f"""
 import os, signal
 from pathlib import Path
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.unit import Unit
-from feedsim.cosim.unpacked import STORE
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.unit import Unit
+from feedsim.simulation.cosim.unpacked import STORE
 STORE.loading.acquire()
 child = os.fork()
 if child == 0:

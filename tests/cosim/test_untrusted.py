@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli
-from feedsim.cosim import archive as archives
-from feedsim.cosim import untrusted
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.cosim.unit import Unit
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
+from feedsim.simulation.cosim import archive as archives
+from feedsim.simulation.cosim import unpacked
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.friction_law import FrictionLaw
+from feedsim.simulation.cosim.unit import Unit
 from ssp_helpers import UNPACKED, contents, write
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -140,7 +140,7 @@ def test_a_document_type_in_any_encoding(friction: dict[str, bytes], tmp_path: P
 
 def test_more_than_it_may_unpack_to(friction: dict[str, bytes], tmp_path: Path) -> None:
     """Zeros deflate to a thousandth; what no run needs may be as large as it likes."""
-    zeros = bytes(untrusted.FREE + 1)
+    zeros = bytes(unpacked.FREE + 1)
     said = refusal(write(tmp_path / "bomb.fmu", friction | {"resources/zeros": zeros}))
     assert "unpacks to" in said
     with Archive(write(tmp_path / "source.fmu", friction | {"sources/zeros": zeros})) as archive:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.native import library_name
+from feedsim.foundation.installation import library_name
 from feedsim_distribution import backend
 
 LOOP, PLANNER = library_name("exchange"), library_name("planner")
@@ -93,7 +93,7 @@ def test_wheel_holds_what_runs_need_and_no_path_of_this_machine(wheel: Path) -> 
         units = ("plant", "controller", "friction", "friction_gms", "setpoint", "machine")
         assert held == {*(f"{unit}.fmu" for unit in units), LOOP, PLANNER}
         assert "feedsim/shipped/scenarios/machines/test_centre/modes.csv" in names
-        assert "feedsim/variables.json" in names
+        assert "feedsim/foundation/variables.json" in names
         for name in names:
             content = opened.read(name)
             assert str(ROOT).encode() not in content, name

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
 from feedsim.estimation.fit import correlation, fit, inverse
 from feedsim.estimation.parameter import Parameter, Prior
+from feedsim.foundation.errors import InputError
 
 TIME = np.linspace(0.0, 4.0, 41)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from feedsim.estimation import covariance, interval
-from feedsim.estimation.covariance import Covariance, correlation_length, stretched
-from feedsim.identify.result import Estimate, Status
+from feedsim.estimation import interval
+from feedsim.estimation.identify.result import Estimate, Status
+from feedsim.estimation.interval import Covariance, correlation_length, stretched
 
 ROWS, RUNS, POLE = 2000, 400, 0.9
 
@@ -107,7 +107,7 @@ def test_blocks_that_share_their_noise() -> None:
 def test_the_autocorrelation_is_the_sum_of_products() -> None:
     values = np.random.default_rng(2).standard_normal(50)
     expected = np.correlate(values, values, "full")[49:]
-    assert covariance.autocorrelation(values)[:50] == pytest.approx(expected, abs=1e-12)
+    assert interval.autocorrelation(values)[:50] == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("free", [2, 7, 40, 1e6])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feedsim.estimation.robust import covariance_of, robust_fit
+from feedsim.estimation.least_squares import covariance_of, robust_fit
 
 
 def test_samples_that_fit_badly_do_not_leave_a_value_unknown() -> None:

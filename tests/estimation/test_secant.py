@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from feedsim.errors import InputError
-from feedsim.estimation.least_squares import LeastSquares
+from feedsim.estimation.least_squares import LeastSquares, secant
 from feedsim.estimation.parameter import Array, Parameter
-from feedsim.estimation.secant import secant
+from feedsim.foundation.errors import InputError
 
 TIME = np.linspace(0.0, 3.0, 200)
 TRUE = np.array([1.2, 0.7, 0.4, -0.3])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import variables
+from feedsim.foundation import variables
 from feedsim_packager import cycle
 from feedsim_packager.errors import InputError
 

@@ -11,7 +11,7 @@ import pytest
 import worst_case
 
 import fmi_helpers
-from feedsim.cosim.archive import Archive
+from feedsim.simulation.cosim.archive import Archive
 from fmu.unpacked import UNITS
 
 pytestmark = pytest.mark.skipif(

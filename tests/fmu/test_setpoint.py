@@ -299,8 +299,8 @@ def test_command_line_packs_the_same(packed: Archive, fmus: Path, tmp_path: Path
         (
             "setpoint",
             [],
-            "files of one kind are needed (axes, modes, poses, mounts; or setpoints; or axes, modes, poses, mounts, settings, "
-            "setpoints), given are none",
+            "files of one kind are needed (axes, modes, poses, mounts; or setpoints; or axes, modes, poses, mounts, "
+            "settings, setpoints), given are none",
         ),
         ("plant", ["--setpoints", "t.csv"], "plant: has resources of the kind 'machine', those given are of the kind"),
         ("plant", ["--axes", "a.csv"], "with axes goes modes, which is not given"),

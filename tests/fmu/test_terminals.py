@@ -16,8 +16,8 @@ import pytest
 from lxml import etree
 from PIL import Image
 
-from feedsim.cosim import wiring
 from feedsim.jobs.export import pack as pack_machine
+from feedsim.simulation.cosim import system
 from feedsim_packager import build, cli
 from feedsim_packager.errors import InputError
 from fmu.toy_table import toy
@@ -125,14 +125,14 @@ def units(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Arc
     return {unit: unpack(unit, fmus, tmp_path_factory.mktemp(unit)) for unit in EXPECTED}
 
 
-def figure_2() -> set[tuple[wiring.Variable, wiring.Variable]]:
+def figure_2() -> set[tuple[system.Variable, system.Variable]]:
     """Input and what drives it; without the inputs that nothing does."""
-    return {(each.target, each.source) for each in wiring.figure_2(AXES) if each.source.instance != wiring.ZERO}
+    return {(each.target, each.source) for each in system.figure_2(AXES) if each.source.instance != system.ZERO}
 
 
 def _plugged(
     first: tuple[str, Archive, str], second: tuple[str, Archive, str]
-) -> Iterator[tuple[wiring.Variable, wiring.Variable]]:
+) -> Iterator[tuple[system.Variable, system.Variable]]:
     """Two terminals (instance, its archive, terminal) as a tool plugs them: members of one name, output to input."""
     sides = [(instance, archive, terminals(archive)[name]) for instance, archive, name in (first, second)]
     assert len({side[2].attrib["terminalKind"] for side in sides}) == 1
@@ -140,20 +140,20 @@ def _plugged(
     assert found[0].keys() == found[1].keys()  # the rule `plug`
     for member in found[0]:
         ends = {
-            archive.variables()[names[member]].attrib["causality"]: wiring.Variable(instance, names[member])
+            archive.variables()[names[member]].attrib["causality"]: system.Variable(instance, names[member])
             for (instance, archive, _), names in zip(sides, found, strict=True)
         }
         yield ends["input"], ends["output"]
 
 
 def test_terminals_plugged_together_are_the_wiring_of_figure_2(units: Mapping[str, Archive]) -> None:
-    plugged: list[tuple[wiring.Variable, wiring.Variable]] = []
+    plugged: list[tuple[system.Variable, system.Variable]] = []
     for axis in AXES:
-        control, contact = wiring.controller(axis), wiring.friction(axis)
+        control, contact = system.controller(axis), system.friction(axis)
         for other, unit, kind in ((control, "controller", "motor"), (contact, "friction", "friction")):
-            plugged += _plugged((wiring.PLANT, units["plant"], f"{axis}.{kind}"), (other, units[unit], kind))
+            plugged += _plugged((system.PLANT, units["plant"], f"{axis}.{kind}"), (other, units[unit], kind))
         plugged += _plugged(
-            (wiring.NC, units["setpoint"], f"{axis}.setpoint"), (control, units["controller"], "setpoint")
+            (system.NC, units["setpoint"], f"{axis}.setpoint"), (control, units["controller"], "setpoint")
         )
     assert len(plugged) == len(set(plugged))
     assert set(plugged) == figure_2()
@@ -170,20 +170,20 @@ def test_fmucontainer_plugs_the_terminals(units: Mapping[str, Archive], fmus: Pa
         container.get_fmu(f"{unit}.fmu", f"{instance}.fmu")
         return f"{instance}.fmu"
 
-    plant, setpoint = load(wiring.PLANT, "plant"), load(wiring.NC, "setpoint")
+    plant, setpoint = load(system.PLANT, "plant"), load(system.NC, "setpoint")
     for axis in AXES:
-        control, contact = load(wiring.controller(axis), "controller"), load(wiring.friction(axis), "friction")
+        control, contact = load(system.controller(axis), "controller"), load(system.friction(axis), "friction")
         container.add_link(setpoint, f"{axis}.setpoint", control, "setpoint")
         container.add_link(control, "motor", plant, f"{axis}.motor")
         container.add_link(plant, f"{axis}.friction", contact, "friction")
     found = {(_end(target), _end(source)) for source, link in container.links.items() for target in link.cport_to_list}
     assert found == {
-        (each.target, each.source) for each in wiring.figure_2(AXES) if each.source.instance != wiring.ZERO
+        (each.target, each.source) for each in system.figure_2(AXES) if each.source.instance != system.ZERO
     }
 
 
-def _end(port: Any) -> wiring.Variable:
-    return wiring.Variable(port.fmu.name.removesuffix(".fmu"), port.port.name)
+def _end(port: Any) -> system.Variable:
+    return system.Variable(port.fmu.name.removesuffix(".fmu"), port.port.name)
 
 
 # --- another machine

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from feedsim.cosim.archive import folders
+from feedsim.simulation.cosim.archive import folders
 from feedsim_packager import toolchain
 
 HERE = Path(__file__).resolve().parent

@@ -19,12 +19,13 @@ import numpy as np
 import pytest
 
 from command_helpers import PATIENCE, feedsim, feedsim_process
-from feedsim import cosim, scenario
-from feedsim.cosim import worker
-from feedsim.errors import SimulationError
-from feedsim.judge import judged
+from feedsim import scenario
+from feedsim.files.trace import Trace, read_csv
+from feedsim.foundation.errors import SimulationError
 from feedsim.report import run as report
-from feedsim.trace import Trace, read_csv
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim import worker
+from feedsim.simulation.judge import judged
 from foreign import acme
 
 pytestmark = pytest.mark.skipif(not worker.AVAILABLE, reason="this system has no worker process")
@@ -299,8 +300,8 @@ def test_a_study_goes_on(fault: str, place: Callable[[str], Path], fmus: Path) -
 HERE = """
 import pickle, sys
 from feedsim import cosim, scenario
-from feedsim.cosim import worker
-from feedsim.judge import judged
+from feedsim.simulation.cosim import worker
+from feedsim.simulation.judge import judged
 worker.AVAILABLE = False
 run = judged(cosim.run(scenario.load(sys.argv[1], [sys.argv[2]])))
 with open(sys.argv[3], "wb") as file:

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli
-from feedsim.cosim import binaries
-from feedsim.cosim.archive import Archive, folders
+from feedsim.simulation.cosim import binaries
+from feedsim.simulation.cosim.archive import Archive, folders
 from feedsim_packager import toolchain
 from foreign import acme
 from foreign.conftest import Libraries

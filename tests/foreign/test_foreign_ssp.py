@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario, ssp
-from feedsim.errors import InputError
-from feedsim.judge import JudgedRun, judged
+from feedsim import scenario
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim, ssp
+from feedsim.simulation.judge import JudgedRun, judged
 from foreign import acme
 from foreign.conftest import Libraries
 from foreign.test_foreign_units import MOTION, mapped, other_name, renamed, settings_of

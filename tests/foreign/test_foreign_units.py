@@ -12,12 +12,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from feedsim import cosim, judge, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.roles import start_value
-from feedsim.errors import InputError, SimulationError
-from feedsim.judge import JudgedRun, judged
+from feedsim import scenario
+from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.scenario.study import load_study
+from feedsim.simulation import cosim, judge
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.roles import start_value
+from feedsim.simulation.judge import JudgedRun, judged
 from foreign import acme
 from foreign.conftest import Libraries
 from ssp_helpers import SHORT, short_scenario
@@ -214,7 +215,7 @@ def renamed(fmus: Path, folder: Path, kind: str) -> Path:
 
 def settings_of(loaded: scenario.Scenario, axis: str, drive: Path | None, friction: Path | None) -> list[str]:
     """What puts renamed copies of the shipped units on an axis, with the parameters that the machine file gives it."""
-    from feedsim.cosim.roles import controller_parameters
+    from feedsim.simulation.cosim.roles import controller_parameters
 
     machine = loaded.machine
     given: dict[str, tuple[Path | None, Any, dict[str, Any]]] = {
@@ -269,6 +270,6 @@ def test_a_scheme_that_does_not_serve_is_refused_with_those_that_do(units: Path,
 
 
 def cosim_program(loaded: scenario.Scenario) -> Any:
-    from feedsim import nc
+    from feedsim.simulation import nc
 
     return nc.plan(loaded)

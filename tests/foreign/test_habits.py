@@ -12,9 +12,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario, ssp
-from feedsim.errors import InputError, SimulationError
-from feedsim.trace import Trace
+from feedsim import scenario
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.simulation import cosim, ssp
 from foreign import acme
 from foreign.conftest import Libraries
 from foreign.test_foreign_units import MOTION, ROOT, mapped

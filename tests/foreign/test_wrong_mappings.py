@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from feedsim import judge, nc, scenario
-from feedsim.errors import InputError
+from feedsim import scenario
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import judge, nc
 from foreign import acme
 from foreign.conftest import Libraries
 from foreign.test_foreign_units import MOTION, ROOT

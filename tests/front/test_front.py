@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import feedsim as fs
-from feedsim import cosim, extras
-from feedsim.errors import InputError
+from feedsim.foundation import installation
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim
 
 ROOT = Path(__file__).resolve().parents[2]
 DWELL = {"motions": [{"kind": "dwell", "duration": "20 ms"}], "evaluate": []}
@@ -40,7 +41,7 @@ def circle(folder: Path) -> fs.Result:
     return fs.run(folder / "xz_circle.yaml")
 
 
-@pytest.mark.parametrize("module", ["feedsim", "feedsim.examples", "feedsim.extras"])
+@pytest.mark.parametrize("module", ["feedsim", "feedsim.jobs.examples", "feedsim.foundation.installation"])
 def test_examples_of_docstrings(module: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     found = doctest.testmod(import_module(module))
@@ -91,21 +92,6 @@ def test_the_front_door_offers_public_names_and_has_them_all() -> None:
         fs.plot_all  # noqa: B018
 
 
-@pytest.mark.parametrize("room", ["compare", "sweep"])
-def test_rooms_that_are_called_are_rooms_as_well(room: str) -> None:
-    """In a process of its own: whichever is first, the import or the call."""
-    file = f"jobs.{room}"
-    code = (
-        f"import feedsim as fs, inspect; import feedsim.{room}; from feedsim.{file} import {room} as meant\n"
-        f"assert inspect.ismodule(fs.{room}) and fs.{room}.__all__\n"
-        f"assert inspect.signature(fs.{room}) == inspect.signature(meant)\n"
-        f"assert inspect.getdoc(fs.{room}) == inspect.getdoc(meant)\n"
-        f"try: fs.{room}()\nexcept (TypeError, fs.InputError) as error: print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ("RESULT and REFERENCE are needed" if room == "compare" else f"{room}() missing") in done.stdout
-
-
 def test_a_file_and_what_was_loaded_give_the_same(folder: Path) -> None:
     file = folder / "z_positioning.yaml"
     by_file = fs.run(file, set=DWELL)
@@ -124,7 +110,7 @@ def test_set_means_what_it_means_on_the_command_line(folder: Path) -> None:
 
 
 def test_an_ssp_file_runs(folder: Path) -> None:
-    from feedsim import ssp
+    from feedsim.simulation import ssp
 
     scenario = fs.load(folder / "z_positioning.yaml", DWELL)
     ssp.export(scenario, folder / "dwell.ssp")
@@ -182,7 +168,7 @@ def test_saved_is_what_the_command_leaves(circle: fs.Result, folder: Path, tmp_p
 def test_pandas_is_asked_for_only_where_it_is_used(circle: fs.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)  # type: ignore[arg-type]
     said = r'a DataFrame needs .* pandas is not installed: pip install "feedsim\[pandas\]"'
-    with pytest.raises(extras.MissingPackage, match=said):
+    with pytest.raises(installation.MissingPackage, match=said):
         circle.to_pandas()
 
 

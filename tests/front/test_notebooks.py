@@ -12,7 +12,7 @@ import matplotlib as mpl
 import pytest
 
 import feedsim as fs
-from feedsim.examples import examples
+from feedsim.jobs.examples import examples
 
 NOTEBOOKS = {each.name: each.file for each in examples() if each.kind == "notebook"}
 # In place of the cell "parameters".

@@ -14,25 +14,26 @@ from pathlib import Path
 import numpy as np
 
 import mat_helpers
-from feedsim import judge, scenario, ssp, trace
+from feedsim import scenario
 from feedsim.analysis import check as check_evaluation
-from feedsim.control import formats, reading
-from feedsim.cosim.archive import Archive, folders
-from feedsim.cosim.roles import foreign
-from feedsim.errors import FeedsimError
-from feedsim.files.columns import load_columns
-from feedsim.files.tolerances import load_tolerances
+from feedsim.design.sweep.table import read_table
+from feedsim.files import trace
+from feedsim.files.columns import load_columns, load_tolerances
+from feedsim.files.control import formats, reading
+from feedsim.files.trace.response_files import read_response
+from feedsim.files.trace.series import read_series
+from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario.load import load_machine, read_friction
 from feedsim.scenario.roles import DRIVE
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.scenario.study import load_study
+from feedsim.simulation import judge, ssp
+from feedsim.simulation.cosim.archive import Archive, folders
+from feedsim.simulation.cosim.roles import foreign
 from feedsim.structure.matrices import build as market
 from feedsim.structure.matrices import calculix
 from feedsim.structure.modes import read_modes
-from feedsim.structure.poses_file import read_cell, read_grid
-from feedsim.sweep.table import read_table
-from feedsim.trace.response_files import read_response
-from feedsim.trace.series import read_series
+from feedsim.structure.poses import read_cell, read_grid
 from fuzz.changes import entries, packed
 
 ROOT = Path(__file__).resolve().parents[2]

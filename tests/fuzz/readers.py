@@ -31,8 +31,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from feedsim import cosim
-from feedsim.errors import FeedsimError
+from feedsim.foundation.errors import FeedsimError
+from feedsim.simulation import cosim
 from fuzz.changes import changed
 from fuzz.kinds import Kind, kinds
 

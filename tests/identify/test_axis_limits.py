@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.identify import identify_axis_limits
-from feedsim.identify.axis_limits import profile_of_rest_to_rest
+from feedsim.estimation.identify import identify_axis_limits
+from feedsim.estimation.identify.axis_limits import profile_of_rest_to_rest
+from feedsim.foundation.errors import InputError
 from feedsim.motions.profile import rest_to_rest
 
 CYCLE = 2e-3

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import identify
-from feedsim.identify.clipping import tied_at_limit, without_clipped
-from feedsim.identify.inertia import inertia
-from feedsim.identify.options import Options
-from feedsim.identify.plateaus import plateaus
-from feedsim.identify.record import Record
-from feedsim.identify.stribeck import stationary
+from feedsim.estimation.identify import identify
+from feedsim.estimation.identify.clipping import tied_at_limit, without_clipped
+from feedsim.estimation.identify.inertia import inertia
+from feedsim.estimation.identify.plateaus import plateaus
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.stages import Options
+from feedsim.estimation.identify.stribeck import stationary
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identify_records import SPEEDS, TRUE, J, constant_speeds
 from identify_records import stationary as friction_at
 

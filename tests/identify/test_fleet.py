@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from feedsim.estimation.identify.parameters import CONSTANT_SPEED, estimate
+from feedsim.estimation.identify.result import Correlation, Stationary
+from feedsim.estimation.identify.stages import with_fleet
 from feedsim.estimation.parameter import Prior
-from feedsim.identify.parameters import CONSTANT_SPEED, estimate
-from feedsim.identify.result import Correlation, Stationary
-from feedsim.identify.stages import with_fleet
 from identify_records import TRUE
 
 NAMES = ("F_C", "F_S", "v_s", "F_log", "sigma_2")

@@ -8,9 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from feedsim.estimation.identify.friction_file import (
+    constant_load_hint,
+    friction_yaml,
+    interval_text,
+    relative_text,
+    value_text,
+)
+from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.friction_file import constant_load_hint, friction_yaml, interval_text, relative_text, value_text
-from feedsim.identify.result import Estimate
 from feedsim.scenario.load import read_friction
 from identification_helpers import estimates, identified
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from feedsim.cli import main
-from feedsim.errors import InputError
-from feedsim.identify import Estimate, Options
-from feedsim.identify.parameters import DELAYS, FRICTION_NAMES, PARAMETER_KINDS
+from feedsim.estimation.identify import Estimate, Options
+from feedsim.estimation.identify.parameters import DELAYS, FRICTION_NAMES, PARAMETER_KINDS
+from feedsim.files.trace import Trace, write_csv
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Friction
-from feedsim.trace import Trace, write_csv
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"
 J_RANGE = r"allowed: more than 0 kg\.m2"

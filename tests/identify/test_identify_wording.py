@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.identify.identifiability import GOES_WITH, doubts, verdict
-from feedsim.identify.parameters import EXCESS
+from feedsim.estimation.identify.parameters import EXCESS
+from feedsim.estimation.identify.uncertainty import GOES_WITH, doubts, verdict
 from identification_helpers import TRUE, estimates, stationary
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from feedsim.errors import InputError
-from feedsim.identify.inertia import inertia
-from feedsim.identify.record import Record
+from feedsim.estimation.identify.inertia import inertia
+from feedsim.estimation.identify.record import Record
+from feedsim.foundation.errors import InputError
 from identify_records import TRUE, J, constant_speeds
 
 RIGID = {**TRUE, "F_S": 1.6, "F_log": 0.0, "sigma_2": 0.02, "W": 0.0, "M_0": -0.3}

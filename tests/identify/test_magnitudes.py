@@ -8,11 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.identify.magnitudes import MAX_ROWS, check_estimates, check_inertia, check_size, check_time
-from feedsim.identify.parameters import estimate
-from feedsim.identify.read import read_records
-from feedsim.identify.record import Record
+from feedsim.estimation.identify.parameters import estimate
+from feedsim.estimation.identify.read import (
+    MAX_ROWS,
+    check_estimates,
+    check_inertia,
+    check_size,
+    check_time,
+    read_records,
+)
+from feedsim.estimation.identify.record import Record
+from feedsim.foundation.errors import InputError
 from record_helpers import LEAD, mapped, refusal, table
 
 # A stroke of an axis with a pitch of 20 mm, there and back: 0.2 m/s, 2 m/s2.

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError, SimulationError
+from feedsim.estimation.identify.friction_file import drift_texts
+from feedsim.estimation.identify.open_loop import balanced, first_deflection, first_speed, reached, substeps
+from feedsim.estimation.identify.parameters import FRICTION_NAMES, NO_EFFECT
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Balance, Estimate
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.friction_file import drift_texts
-from feedsim.identify.open_loop import balanced, first_deflection, first_speed, reached, substeps
-from feedsim.identify.parameters import FRICTION_NAMES, NO_EFFECT
-from feedsim.identify.record import Record
-from feedsim.identify.result import Balance, Estimate
+from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 Array = NDArray[np.float64]
 
@@ -169,7 +169,7 @@ def test_steps_of_the_free_axis_are_all_that_is_wrong(
     general: Record, law: FrictionLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record = general.between(1230, len(general))
-    monkeypatch.setattr("feedsim.identify.open_loop.EXPLICIT_STEP_SHARE", 0.05)
+    monkeypatch.setattr("feedsim.estimation.identify.open_loop.EXPLICIT_STEP_SHARE", 0.05)
     assert_true(found(record, law, estimates(OFF)), EXACT / 9)  # three steps per interval
 
 

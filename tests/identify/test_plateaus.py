@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feedsim.estimation.covariance import correlation_length
-from feedsim.identify import plateaus as averages
-from feedsim.identify.plateaus import plateaus
-from feedsim.identify.record import Record
+from feedsim.estimation.identify import plateaus as averages
+from feedsim.estimation.identify.plateaus import plateaus
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.interval import correlation_length
 from identify_records import I_P, SPEEDS, TRUE, J, constant_speeds, noisy, stationary
 
 

@@ -8,10 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.estimation.identify import Record, read_records
+from feedsim.estimation.identify.position_loop import (
+    Taps,
+    gain_by_deviation,
+    noisy_delay,
+    setpoint_delay,
+    speed_setpoint,
+)
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import Record, read_records
-from feedsim.identify.position_loop import Taps, gain_by_deviation, noisy_delay, setpoint_delay, speed_setpoint
+from feedsim.foundation.errors import InputError
 
 H = 2e-3
 

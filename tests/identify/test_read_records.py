@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from feedsim.estimation.identify.read import read_records
 from feedsim.files.columns import load_columns
-from feedsim.identify.read import read_records
 from feedsim.scenario import Machine, load_machine
 from record_helpers import ANGLE, DIGITS, K_T, LEAD, PITCH, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.estimation.identify import stribeck
+from feedsim.estimation.identify import stribeck as drift
+from feedsim.estimation.identify.parameters import curve, torque
+from feedsim.estimation.identify.result import Plateau, Stationary
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import stribeck
-from feedsim.identify import stribeck as drift
-from feedsim.identify.parameters import curve, torque
-from feedsim.identify.result import Plateau, Stationary
+from feedsim.foundation.errors import InputError
 from identify_records import I_P, SPEEDS, TRUE, stationary
 
 

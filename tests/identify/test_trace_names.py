@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.identify.read import read_records
-from feedsim.identify.signals import _BY_KEY, ALIASES, alias_of
+from feedsim.estimation.identify.read import read_records
+from feedsim.estimation.identify.signals import _BY_KEY, ALIASES, alias_of
 from feedsim.scenario import Machine, load_machine
 from record_helpers import ANGLE, DIGITS, K_T, LEAD, PITCH, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 

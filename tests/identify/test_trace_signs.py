@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.identify.read import read_records
+from feedsim.estimation.identify.read import read_records
 from record_helpers import ANGLE, SPEED, TIME, TORQUE, mapped, refusal, simple, table
 
 REST = "torque: {column: ActTorque}\n"

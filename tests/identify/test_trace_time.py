@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.identify.read import read_records
-from feedsim.identify.record import GRID_TOLERANCE, even_pieces
+from feedsim.estimation.identify.read import read_records
+from feedsim.estimation.identify.record import GRID_TOLERANCE, even_pieces
+from feedsim.foundation.errors import InputError
 from record_helpers import DIGITS, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 
 REST = "torque: {column: ActTorque}\n"

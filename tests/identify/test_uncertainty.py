@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.estimation.fit import fit
+from feedsim.estimation.identify.uncertainty import drift_covariance
 from feedsim.estimation.parameter import Parameter, Prior
-from feedsim.identify.uncertainty import drift_covariance
 
 Array = NDArray[np.float64]
 NAMES = ("F_C", "sigma_2")

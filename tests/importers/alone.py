@@ -10,9 +10,9 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.operations import Interpreter, do_step
-from feedsim.cosim.unit import Port, Unit
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.operations import Interpreter, do_step
+from feedsim.simulation.cosim.unit import Port, Unit
 from importers import z_move
 from importers.system import Component, Experiment, Floats, Result, System, Value
 

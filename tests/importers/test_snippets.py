@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cli, cosim, scenario, ssp
-from feedsim.trace import write_csv
+from feedsim import cli, scenario
+from feedsim.files.trace import write_csv
+from feedsim.simulation import cosim, ssp
 from importers import document, with_ecos, z_move
 
 _PART = re.compile(r"^### (.+?)\n(.*?)(?=^##)", re.MULTILINE | re.DOTALL)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import nc, scenario
+from feedsim import scenario
+from feedsim.simulation import nc
 from importers import document, loops, with_ecos, with_fmpy, with_libcosim, z_move
 from importers.loops import Master
 from importers.registry import IMPORTERS, Importer
@@ -96,7 +97,7 @@ def _importer(name: str) -> Importer:
 @pytest.fixture(scope="session")
 def ssp(move: z_move.Move, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The move as `feedsim export` writes it."""
-    from feedsim import ssp as room
+    from feedsim.simulation import ssp as room
 
     path = tmp_path_factory.mktemp("ssp") / "z_move.ssp"
     room.export(move.scenario, path, fmus=fmus)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim.one_unit import pack_whole
-from feedsim.trace import Trace
+from feedsim import scenario
+from feedsim.files.trace import Trace
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.whole import pack_whole
 from importers.system import Component, Experiment, Floats, Result, System
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.operations import Interpreter, do_step
-from feedsim.cosim.unit import Port, Unit
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.operations import Interpreter, do_step
+from feedsim.simulation.cosim.unit import Port, Unit
 from importers.system import Experiment, Result, System
 
 OUT = "recorded."  # a container calls its links `instance.variable` already

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim.roles import controller_parameters
-from feedsim.cosim.system import plant_parameters
-from feedsim.trace import Trace
+from feedsim import scenario
+from feedsim.files.trace import Trace
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.roles import controller_parameters
+from feedsim.simulation.cosim.system import plant_parameters
 from feedsim_packager import repack, setpoints
 from feedsim_packager.machine import named
 from feedsim_packager.resources import File

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.judge import run as loops
-from feedsim.judge.run import loops_of
 from feedsim.linear.judgement import judge
 from feedsim.scenario import Machine, load
+from feedsim.simulation import judge as loops
+from feedsim.simulation.judge import loops_of
 from feedsim.structure import checked_modes
 
 FILE = Path(__file__).resolve().parents[2] / "scenarios" / "z_positioning.yaml"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli
-from feedsim.cosim import fmus_directory
+from feedsim.simulation.cosim import fmus_directory
 from page_browsers import FIREFOX, Firefox
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"

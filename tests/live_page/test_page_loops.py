@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import nc, scenario
-from feedsim.cosim import fmus_directory
+from feedsim import scenario
 from feedsim.linear.judgement import judge
 from feedsim.linear.loops import position_reference
 from feedsim.linear.system import LinearSystem
-from feedsim.page.content import content
+from feedsim.report.live_page.content import content
+from feedsim.simulation import nc
+from feedsim.simulation.cosim import fmus_directory
 from feedsim.structure import checked_modes
 from page_helpers import NODE, answers
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cli, cosim, nc, scenario
-from feedsim.cosim import fmus_directory
-from feedsim.errors import InputError
-from feedsim.judge import judged
-from feedsim.page import content as module
-from feedsim.page import write
-from feedsim.page.content import content
+from feedsim import cli, scenario
+from feedsim.foundation.errors import InputError
+from feedsim.report.live_page import content as module
+from feedsim.report.live_page import write
+from feedsim.report.live_page.content import content
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import fmus_directory
+from feedsim.simulation.judge import judged
 from live_page.test_page_numbers import SAME, settings
 from machine_helpers import write_machine, write_scenario
 from page_helpers import NODE, answers
@@ -86,7 +87,7 @@ def test_a_plant_that_follows_its_pose_is_computed_and_its_end_is_said(tmp_path:
 
 
 def test_a_page_that_is_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feedsim.page.html.MAX_PAGE_BYTES", 200_000)
+    monkeypatch.setattr("feedsim.report.live_page.html.MAX_PAGE_BYTES", 200_000)
     out = tmp_path / "page.html"
     given = scenario.load(SCENARIOS / "one_axis.yaml")
     with pytest.raises(InputError, match=r"its page takes 0\.\d+ MB; allowed are 0\.2 MB"):

@@ -13,20 +13,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cli, cosim, nc, scenario
+from feedsim import cli, scenario
 from feedsim.analysis import Diagnosis, Figure, evaluate
 from feedsim.analysis.circle import answer, swinging
 from feedsim.analysis.evaluate import diagnoses, doubts
-from feedsim.cosim import fmus_directory
-from feedsim.errors import FeedsimError
-from feedsim.judge import judged
+from feedsim.foundation.errors import FeedsimError
 from feedsim.linear.loops import position_gain
 from feedsim.linear.margins import grid, margins
 from feedsim.linear.system import LinearSystem
-from feedsim.page.content import content, rows, segments
 from feedsim.report.content import Table
 from feedsim.report.formatting import typeset
+from feedsim.report.live_page.content import content, rows, segments
 from feedsim.report.run.diagnosis import diagnosis_section
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import fmus_directory
+from feedsim.simulation.judge import judged
 from feedsim.structure import checked_modes
 from page_browsers import FIGURES, Firefox, Opened, address_of, number_of
 from page_helpers import NODE, answers

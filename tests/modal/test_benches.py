@@ -11,10 +11,10 @@ from scipy.linalg import eigh
 from scipy.signal import cont2discrete, lfilter
 
 from feedsim.cli import main
-from feedsim.modal.estimate import estimated
-from feedsim.modal.rational import fitted, least, scatter
-from feedsim.trace import Trace, write_csv
-from feedsim.trace.trace import Array
+from feedsim.estimation.modal.estimate import estimated
+from feedsim.estimation.modal.rational import fitted, least, scatter
+from feedsim.files.trace import Trace, write_csv
+from feedsim.files.trace.trace import Array
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "one_axis"
 RATE, PERIOD = 2500.0, 2500

@@ -12,14 +12,14 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from feedsim.cli import main
-from feedsim.modal.estimate import estimated, period_of
-from feedsim.modal.rational import fitted
+from feedsim.estimation.modal.estimate import estimated, period_of
+from feedsim.estimation.modal.rational import fitted
+from feedsim.files.trace import Trace, write_csv
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.files.trace.response_files import write_response
+from feedsim.files.trace.trace import Array
 from feedsim.scenario import load_machine
 from feedsim.structure import checked_modes
-from feedsim.trace import Trace, write_csv
-from feedsim.trace.response import FrequencyResponse
-from feedsim.trace.response_files import write_response
-from feedsim.trace.trace import Array
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "one_axis"
 RATE = 2000.0
@@ -187,8 +187,8 @@ def test_a_measured_bench_of_two_inertias(tmp_path: Path) -> None:
 def test_the_response_of_a_control_from_its_time_signals() -> None:
     """The control's own spectrum of its speed loop, from the same time signals: equal up to 400 Hz. Its frequencies are
     those of 2044 samples, of which it recorded 2047."""
-    from feedsim.trace import read_recording
-    from feedsim.trace.response_files import read_response
+    from feedsim.files.trace import read_recording
+    from feedsim.files.trace.response_files import read_response
 
     path = Path(os.environ["FEEDSIM_TRACE"])
     recording = read_recording(path)

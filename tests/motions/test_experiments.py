@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.motions import ConstantSpeed, Dwell, Move, Sine, SineMove, SpeedRange
 from feedsim.motions.constant_speed import Strokes
 from feedsim.motions.sine import Oscillations, faded_sine
-from feedsim.nc import Program, plan
+from feedsim.simulation.nc import Program, plan
 from scenario_helpers import scenario
 
 LEAD = 0.020 / (2 * math.pi)

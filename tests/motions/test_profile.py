@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.motions.profile import rest_to_rest, speed_change
-from feedsim.nc.program import RestSpline
+from feedsim.simulation.nc.program import RestSpline
 
 JERK = 150.0
 

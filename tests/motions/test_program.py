@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import feedsim as fs
-from feedsim import nc
 from feedsim.motions import PartProgram
 from feedsim.motions.kind import Start, whole_cycles
+from feedsim.motions.part_program import Blending, Motion
+from feedsim.motions.planner import Limits
 from feedsim.motions.program import Programmed
-from feedsim.part_program import Blending, Motion
-from feedsim.path import Limits
+from feedsim.simulation import nc
 
 HERE = {"X": 0.8, "Y": 0.3, "Z": 0.1}
 AXES = tuple(HERE)

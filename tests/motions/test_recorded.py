@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.files.trace import convert, read_csv
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Column, MeasuredSetpoints, Move
-from feedsim.nc import plan
-from feedsim.trace import convert, read_csv
+from feedsim.simulation.nc import plan
 from scenario_helpers import scenario
 
 POSE = {"X": 0.8, "Y": 0.327, "Z": 0.1}

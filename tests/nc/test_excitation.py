@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
-from feedsim.nc.excitation import Excitation, binary_sequence, distinct_lines, multisine
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Cycles
+from feedsim.simulation.nc.excitation import Excitation, binary_sequence, distinct_lines, multisine
 
 CYCLES = Cycles(control=125e-6, position=1e-3, interpolation=2e-3)
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Arc, Circle, Dwell, Move
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
 from feedsim.motions.profile import rest_to_rest
-from feedsim.nc import Program, plan
 from feedsim.scenario import load
+from feedsim.simulation.nc import Program, plan
 from scenario_helpers import MACHINE, default_machine, scenario
 
 POSE = {"X": 0.8, "Y": 0.327, "Z": 0.1}

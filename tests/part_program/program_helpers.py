@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from feedsim.part_program import Moves
-from feedsim.part_program.reading import interpret
+from feedsim.motions.part_program import Moves
+from feedsim.motions.part_program.reading import interpret
 
 
 def read(

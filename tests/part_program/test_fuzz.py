@@ -17,8 +17,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import program_helpers
 
-from feedsim.errors import InputError
-from feedsim.part_program import conversational, interpreter, recorder, words
+from feedsim.foundation.errors import InputError
+from feedsim.motions.part_program import conversational, interpreter, recorder, words
 
 # Programs of a dialect, parted by lines of ===.
 SEEDS = {

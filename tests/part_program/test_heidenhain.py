@@ -12,8 +12,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from program_helpers import read
 
-from feedsim.errors import InputError
-from feedsim.part_program import Blending, Moves, conversational
+from feedsim.foundation.errors import InputError
+from feedsim.motions.part_program import Blending, Moves, conversational
 
 
 def heidenhain(blocks: str, unit: str = "MM") -> Moves:

@@ -14,8 +14,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from program_helpers import ends, read
 
-from feedsim.errors import InputError
-from feedsim.part_program import Blending, Motion
+from feedsim.foundation.errors import InputError
+from feedsim.motions.part_program import Blending, Motion
 
 ORACLE = json.loads((Path(__file__).parent / "linuxcnc.json").read_text(encoding="utf-8"))
 DIGITS = 6e-5  # [mm]: it prints four decimals

@@ -10,8 +10,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from program_helpers import read
 
-from feedsim.errors import InputError
-from feedsim.part_program import interpreter, read_program, recorder, source
+from feedsim.foundation.errors import InputError
+from feedsim.motions.part_program import interpreter, read_program, recorder, source
 
 # Program -> line, word, a part of the reason.
 FAULTS = {

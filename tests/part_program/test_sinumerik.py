@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 sys.path.insert(0, str(Path(__file__).parent))
 from program_helpers import ends, read
 
-from feedsim.errors import InputError
-from feedsim.part_program import Blending, Motion
-from feedsim.part_program.interpreter import Interpreter
+from feedsim.foundation.errors import InputError
+from feedsim.motions.part_program import Blending, Motion
+from feedsim.motions.part_program.interpreter import Interpreter
 
 HALF = 0.5
 ROOT3 = math.sqrt(3) / 2

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.part_program import Blending, Moves
-from feedsim.path import PlannedPath, plan_moves
+from feedsim.motions.part_program import Blending, Moves
+from feedsim.motions.planner import PlannedPath, plan_moves
 from path_helpers import Draft, limits_of
 
 Floats = NDArray[np.float64]

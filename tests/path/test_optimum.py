@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 
-from feedsim.part_program import Blending, Moves
-from feedsim.path import PlannedPath, plan_moves
+from feedsim.motions.part_program import Blending, Moves
+from feedsim.motions.planner import PlannedPath, plan_moves
 from path_helpers import Draft, limits_of, square
 
 Floats = NDArray[np.float64]

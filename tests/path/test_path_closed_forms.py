@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
-from feedsim.findings import severity
-from feedsim.part_program import Blending
-from feedsim.path import Acts, plan_moves
+from feedsim.foundation.errors import InputError, severity
+from feedsim.motions.part_program import Blending
+from feedsim.motions.planner import Acts, plan_moves
 from path_helpers import Draft, limits_of, square
 
 Floats = NDArray[np.float64]

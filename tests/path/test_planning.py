@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import native
-from feedsim.errors import InputError
-from feedsim.part_program import Blending
-from feedsim.path import library, plan_moves
+from feedsim.foundation import installation
+from feedsim.foundation.errors import InputError
+from feedsim.motions.part_program import Blending
+from feedsim.motions.planner import plan_moves
+from feedsim.motions.planner import planned as library
 from path_helpers import Draft, limits_of, square
 
 
@@ -94,10 +95,10 @@ def test_without_a_library_it_says_so(tmp_path: Path, monkeypatch: pytest.Monkey
     try:
         with pytest.raises(InputError, match=r"a library of C, which is missing here: planner.*no such file beside"):
             plan_moves(square(), LIMITS)
-        (tmp_path / native.library_name("planner")).write_bytes(b"no library")
-        native.library.cache_clear()
+        (tmp_path / installation.library_name("planner")).write_bytes(b"no library")
+        installation.library.cache_clear()
         with pytest.raises(InputError, match="cannot be used"):
             plan_moves(square(), LIMITS)
     finally:
         library.load.cache_clear()
-        native.library.cache_clear()
+        installation.library.cache_clear()

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.part_program import Blending
-from feedsim.path import plan_moves
+from feedsim.motions.part_program import Blending
+from feedsim.motions.planner import plan_moves
 from path_helpers import Draft, limits_of
 
 pytestmark = pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify.record import Record
+from feedsim.estimation.identify.record import Record
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 Array = NDArray[np.float64]
 

@@ -17,12 +17,12 @@ from scipy.io import loadmat
 from scipy.optimize import brentq
 from scipy.signal import butter, cheby1, filtfilt
 
-from feedsim import units
-from feedsim.cosim import run
-from feedsim.identify.record import Record
+from feedsim.estimation.identify.record import Record
+from feedsim.foundation import units
 from feedsim.motions.setpoints import Recorded
-from feedsim.nc import Program
 from feedsim.scenario import load, load_machine
+from feedsim.simulation.cosim import run
+from feedsim.simulation.nc import Program
 
 Floats = NDArray[np.float64]
 

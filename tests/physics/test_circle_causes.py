@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import analysis, cosim, scenario
+from feedsim import analysis, scenario
 from feedsim.analysis import Diagnosis, Figure
+from feedsim.simulation import cosim
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
 SPEED = 0.05  # m/s

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import analysis, cosim, scenario
+from feedsim import analysis, scenario
+from feedsim.simulation import cosim
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
 FRICTION_OFF = tuple(

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
+from feedsim import scenario
 from feedsim.analysis import compensation as module
 from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
-from feedsim.cosim.feedforward import friction_feedforward, lag_of
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
-from feedsim.findings import severity
+from feedsim.foundation.errors import InputError, severity
 from feedsim.jobs.tune_feedforward import CompensateResult
 from feedsim.linear.drive import LinearDrive
-from feedsim.report.compensate.report import rows_of
+from feedsim.report.compensate import rows_of
 from feedsim.scenario import Axis, Machine, Scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.feedforward import friction_feedforward, lag_of
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from scenario_helpers import default_machine
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import Run
+from feedsim import scenario
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim import Run
 from reference import monolithic
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"

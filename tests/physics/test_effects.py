@@ -12,12 +12,13 @@ import pytest
 from numpy.typing import NDArray
 from plant_unit import write_modes
 
-from feedsim import cosim, scenario
+from feedsim import scenario
 from feedsim.analysis.compensation import compensate
 from feedsim.analysis.evaluate import evaluate
-from feedsim.errors import InputError
-from feedsim.judge import JudgedRun, judged
-from feedsim.nc import plan
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.nc import plan
 from fmi_helpers import Archive
 
 Array = NDArray[np.float64]

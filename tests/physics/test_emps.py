@@ -16,9 +16,9 @@ import pytest
 from emps_axis import I_P, SCENARIO, Measured, Parameters, T, closed_loop, follow, least_squares, open_loop, read
 
 from feedsim.cli import main
-from feedsim.cosim import run
-from feedsim.identify.inertia import inertia
+from feedsim.estimation.identify.inertia import inertia
 from feedsim.scenario import load
+from feedsim.simulation.cosim import run
 
 MAPPING = SCENARIO.parent / "machines" / "emps" / "columns.yaml"
 PUBLISHED_RECORD = "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e"

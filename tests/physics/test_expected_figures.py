@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import analysis, cosim, scenario
+from feedsim import analysis, scenario
 from feedsim.analysis import Figure
+from feedsim.simulation import cosim
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 WITHIN = 0.02

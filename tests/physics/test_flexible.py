@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.identify.record import Record
-from feedsim.identify.stages import structure_torque, with_structure
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.stages import structure_torque, with_structure
+from feedsim.foundation.errors import InputError
 from feedsim.structure import Modes
 
 J_1, J_2, STIFFNESS = 0.01, 0.006, 180.0  # kg.m2, kg.m2, N.m/rad: resonance at 34.9 Hz, rotor held: 27.6 Hz

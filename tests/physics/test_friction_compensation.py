@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import analysis, cosim
-from feedsim.errors import InputError
+from feedsim import analysis
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import load
+from feedsim.simulation import cosim
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
 PULSE = [

@@ -11,7 +11,7 @@ from fmpy.fmi1 import FMICallException
 from friction_reference import Motion, line, sine
 from gms_reference import Z_AXIS, elements, solved
 
-from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from fmi_helpers import Archive, Instance
 
 H = 2.0**-13  # s, near the control cycle; a power of two: see test_friction_law.exact

@@ -1,4 +1,5 @@
-"""The friction law as a function (feedsim.cosim.friction_law): against the unit behind the FMI, and against scipy."""
+"""The friction law as a function (feedsim.simulation.cosim.friction_law): against the unit behind the FMI, and against
+scipy."""
 
 from __future__ import annotations
 
@@ -13,10 +14,10 @@ import pytest
 from friction_reference import X_AXIS, Z_AXIS, level, line, sine, solved, torque
 from scipy.integrate import solve_ivp
 
-from feedsim import variables
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError, SimulationError
-from feedsim.identify.parameters import torque as constant_speed_torque
+from feedsim.estimation.identify.parameters import torque as constant_speed_torque
+from feedsim.foundation import variables
+from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from fmi_helpers import Archive, Floats
 
 H = 2.0**-13  # s, near the control cycle; a power of two, see `exact`

@@ -13,14 +13,15 @@ import pytest
 from cramer_rao import Known, least
 from numpy.typing import NDArray
 
-from feedsim import analysis, cosim, nc, scenario
+from feedsim import analysis, scenario
 from feedsim.analysis.compensation import compensate
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import Options, identify
-from feedsim.identify.parameters import curve
-from feedsim.identify.record import Record
-from feedsim.identify.result import Estimate, Identification
+from feedsim.estimation.identify import Options, identify
+from feedsim.estimation.identify.parameters import curve
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Estimate, Identification
 from feedsim.scenario import Delay, Friction, Level, Noise
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from feedsim.structure.modes import checked_modes
 from scenario_helpers import default_machine
 

@@ -12,10 +12,10 @@ import pytest
 from friction_reference import sine
 from gms_reference import Z_AXIS, solved
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
-from feedsim.identify import Options, Record, identify
-from feedsim.identify.parameters import estimate
+from feedsim.estimation.identify import Options, Record, identify
+from feedsim.estimation.identify.parameters import estimate
+from feedsim.foundation.errors import InputError
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 I_P, J, M_0, H = 0.02 / (2 * pi), 0.0164, 0.2, 2e-3
 TRUE = Z_AXIS | {"spread": 35.0, "skew": 0.4, "sigma_1": 0.5, "C": 70.0}

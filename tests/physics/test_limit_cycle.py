@@ -18,7 +18,7 @@ from plant_unit import write_modes
 from scipy.linalg import expm
 
 from feedsim import scenario
-from feedsim.cosim.roles import controller_parameters
+from feedsim.simulation.cosim.roles import controller_parameters
 from feedsim.structure import Modes, checked_modes
 from fmi_helpers import Archive
 

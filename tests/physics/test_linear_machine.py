@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from feedsim.analysis import linear
 from feedsim.analysis.linear import LinearSystem
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.operations import Interpreter, do_step, get_real, set_real, set_slopes
-from feedsim.cosim.roles import controller_parameters
-from feedsim.cosim.unit import Port, Unit
 from feedsim.scenario import Filter, Machine
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.operations import Interpreter, do_step, get_real, set_real, set_slopes
+from feedsim.simulation.cosim.roles import controller_parameters
+from feedsim.simulation.cosim.unit import Port, Unit
 from feedsim.structure import Modes, checked_modes
 from scenario_helpers import default_machine
 

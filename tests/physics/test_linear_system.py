@@ -12,7 +12,7 @@ import pytest
 
 from feedsim.analysis import linear
 from feedsim.analysis.linear import LinearSystem
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Filter, Machine
 from feedsim.structure import Modes
 from physics.linear_reference import Simulation

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
+from feedsim import scenario
 from feedsim.analysis.linear import LinearSystem, unstable_poles
-from feedsim.errors import InputError
-from feedsim.judge import check, judged
+from feedsim.foundation.errors import InputError
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Friction, Scenario, load_subject
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.judge import check, judged
 from feedsim.structure import Modes, checked_modes
 
 MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"

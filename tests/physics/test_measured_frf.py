@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from feedsim.analysis import campaign as estimate
-from feedsim.cosim.excite import Measurement, measure, usual_rms
-from feedsim.errors import InputError
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.foundation.errors import InputError
 from feedsim.linear.loops import speed_gain
 from feedsim.linear.system import LinearSystem
-from feedsim.nc.excitation import binary_sequence, multisine
 from feedsim.scenario import load_machine
+from feedsim.simulation.cosim.excite import Measurement, measure, usual_rms
+from feedsim.simulation.nc.excitation import binary_sequence, multisine
 from feedsim.structure import checked_modes
-from feedsim.trace.response import FrequencyResponse
 from scenario_helpers import default_machine
 from structure_helpers import MACHINES
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.estimation.identify import Options, identify
+from feedsim.estimation.identify.motion import RecordTorque
+from feedsim.estimation.identify.output_error import dynamic
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Dynamic, Estimate
+from feedsim.estimation.identify.search import Solution
+from feedsim.estimation.identify.uncertainty import reversals, turnover_rows
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import Options, identify
-from feedsim.identify.identifiability import reversals, turnover_rows
-from feedsim.identify.motion import RecordTorque
-from feedsim.identify.output_error import dynamic
-from feedsim.identify.record import Record
-from feedsim.identify.result import Dynamic, Estimate
-from feedsim.identify.search import Solution
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identify_records import constant_speeds, noisy
 
 Floats = NDArray[np.float64]

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from plant_unit import AXES, H
 
 import feedsim
-from feedsim import cosim, scenario
-from feedsim.cosim import Run
-from feedsim.errors import InputError
+from feedsim import scenario
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim import Run
 from feedsim.structure.modes import checked_modes, with_mounts
 from feedsim.structure.mounts import friction_cycle, read_mounts, viscous_cycle
 from feedsim.structure.pack import pack

@@ -12,13 +12,14 @@ import pytest
 from cramer_rao import Known, least, torque
 from numpy.typing import NDArray
 
-from feedsim import cosim, scenario
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
-from feedsim.identify.motion import motion, parts
-from feedsim.identify.output_error import dynamic
-from feedsim.identify.record import Record
-from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary
+from feedsim import scenario
+from feedsim.estimation.identify.motion import motion, parts
+from feedsim.estimation.identify.output_error import dynamic
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Correlation, Dynamic, Estimate, Stationary
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identify_records import I_P, TRUE, J
 
 Array = NDArray[np.float64]

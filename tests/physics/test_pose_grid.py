@@ -16,10 +16,10 @@ import pose_reference
 import pytest
 from numpy.typing import NDArray
 
-from feedsim import judge
 from feedsim.scenario import Machine
-from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.simulation import judge
 from feedsim.structure.poses import grid_axis, pose_grid
 from fmi_helpers import Archive, Instance
 

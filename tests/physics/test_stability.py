@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario
-from feedsim.judge import judged
-from feedsim.scenario.coupling import SCHEMES
+from feedsim import scenario
+from feedsim.scenario.model import SCHEMES
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import judged
 from feedsim.structure import checked_modes
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.identify.parameters import curve, torque
-from feedsim.identify.plateaus import plateaus
-from feedsim.identify.record import Record
-from feedsim.identify.result import Stationary
-from feedsim.identify.stribeck import stationary as identify
+from feedsim.estimation.identify.parameters import curve, torque
+from feedsim.estimation.identify.plateaus import plateaus
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Stationary
+from feedsim.estimation.identify.stribeck import stationary as identify
 from identify_records import I_P, SPEEDS, TRUE, J, constant_speeds, noisy, stationary
 
 NAMES = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")

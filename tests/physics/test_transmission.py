@@ -11,10 +11,11 @@ from fmpy.fmi2 import fmi2Error
 from plant_unit import write_modes
 from scipy.optimize import brentq
 
-from feedsim import cosim, scenario
-from feedsim.cosim import Run
-from feedsim.errors import InputError
+from feedsim import scenario
+from feedsim.foundation.errors import InputError
 from feedsim.linear.judgement import judge
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim import Run
 from feedsim.structure import Modes, checked_modes
 from feedsim.structure.modes import joined
 from fmi_helpers import Archive

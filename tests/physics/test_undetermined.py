@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import Options, identify
-from feedsim.identify.inertia import contradiction, inertia
-from feedsim.identify.parameters import estimate
-from feedsim.identify.record import Record
-from feedsim.identify.stages import transitions
+from feedsim.estimation.identify import Options, identify
+from feedsim.estimation.identify.inertia import contradiction, inertia
+from feedsim.estimation.identify.parameters import estimate
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.stages import transitions
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identify_records import FINE, I_P, TRUE, J, constant_speeds, friction, noisy
 
 H = 2e-3
@@ -96,7 +96,7 @@ def test_what_contradicts_the_rigid_axis_is_not_offered(law: FrictionLaw, monkey
         changed = {**found.estimates, name: estimate(name, wrong, 0.01)}
         changed["F_S"] = estimate("F_S", max(changed["F_C"].value, changed["F_S"].value))
         assert "rigid axis" in contradiction(rigid, changed), name
-    monkeypatch.setattr("feedsim.identify.stages.contradiction", lambda rigid, estimates: "nonsense")
+    monkeypatch.setattr("feedsim.estimation.identify.stages.contradiction", lambda rigid, estimates: "nonsense")
     doubted = identify(records, law, Options("Z", I_P))
     assert not [each.name for each in doubted.estimates.values() if each.status == "estimated"]
     assert doubted.estimates["F_C"].value == doubted.rigid["F_C"].value

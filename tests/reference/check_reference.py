@@ -19,12 +19,13 @@ import system
 from reference_files import HELD, HERE, Case, Table, all_cases, read_case
 from run_case import Unusable, simulate
 
-from feedsim import cosim, nc, scenario
-from feedsim.compare import Comparison, bounds_of, compare_series, tolerances_of, unusable
-from feedsim.cosim.one_unit import pack_whole
-from feedsim.errors import FeedsimError
+from feedsim import scenario
+from feedsim.comparison import Comparison, bounds_of, compare_series, tolerances_of, unusable
+from feedsim.files.trace import Series
+from feedsim.foundation.errors import FeedsimError
 from feedsim.report.compare import write as write_comparison
-from feedsim.trace import Series
+from feedsim.simulation import cosim, nc
+from feedsim.simulation.cosim.whole import pack_whole
 
 ARCHIVES = HERE.parents[1] / "fmus"
 

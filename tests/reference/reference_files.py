@@ -3,7 +3,7 @@
 CSV: first column "time" [s], double-quoted header of exact variable names, no row of units. Inputs run linearly between
 the rows, Boolean ones keep the value of a row until the next. Additions to the rules: <case>_par.csv with the columns
 "name","value" sets parameters; <case>_ref.bounds.csv tells what lies between the rows of
-<case>_ref.csv (feedsim.compare.between); held/<case>_ref.csv is what comes out where the importer holds every input
+<case>_ref.csv (feedsim.comparison.between); held/<case>_ref.csv is what comes out where the importer holds every input
 over a step of StepSize; <case>_modes.csv is a table of modes that the plant takes instead of its archive's (parameter
 modes_file).
 """
@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.compare import thinned
-from feedsim.trace import Series
+from feedsim.comparison import thinned
+from feedsim.files.trace import Series
 
 HERE = Path(__file__).parent
 UNITS = ("friction", "friction_gms", "plant", "controller", "setpoint")

@@ -19,8 +19,8 @@ from reference_files import HERE, UNITS, all_cases, read_case, read_table, same_
 from run_case import simulate
 from solve_friction import OWN_ERROR
 
-from feedsim.compare import bounds_of, compare, tolerances_of
-from feedsim.trace import Series
+from feedsim.comparison import bounds_of, compare, tolerances_of
+from feedsim.files.trace import Series
 
 CASES, BOUNDS = all_cases(), ".bounds.csv"
 NAMES = {f"{unit}/{'held/' if held else ''}{name}" for unit, name, held in CASES}

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.identify.result import Estimate
-from feedsim.report.control import control_names
+from feedsim.estimation.identify.result import Estimate
+from feedsim.report.changes import control_names
 from feedsim.report.replay.drive import beside, beside_lines, beside_part, beside_section
 from feedsim.scenario import load_machine
 

@@ -8,18 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.cosim import run
-from feedsim.errors import InputError
+from feedsim.estimation.identify import Record
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
+from feedsim.estimation.replay.identified import _beside, coupled
+from feedsim.estimation.replay.machine_files import Beside, ElasticMode, RigidAxis, machine_files, with_modes
 from feedsim.files.columns import load_columns
-from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
-from feedsim.replay.elastic import Beside, ElasticMode, with_modes
-from feedsim.replay.identified import _beside, coupled
-from feedsim.replay.machine_files import RigidAxis, machine_files
+from feedsim.files.trace import write_csv
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Machine, load, load_machine
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.trace import write_csv
 from machine_helpers import rigid_copy
 
 MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from drive_helpers import COLUMNS, MACHINES, SCENARIO
-from feedsim.cosim import run
+from feedsim.estimation.identify.parameters import estimate
+from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.identified import identify_drives
+from feedsim.estimation.replay.tuning import OtherCycle, decision, gain_of, with_either
 from feedsim.files.columns import load_columns
-from feedsim.identify.parameters import estimate
-from feedsim.identify.result import Estimate
-from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.identified import identify_drives
-from feedsim.replay.tuning import OtherCycle, decision, gain_of, with_either
+from feedsim.files.trace import write_csv
 from feedsim.scenario import load, load_machine
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.trace import write_csv
 from machine_helpers import rigid_copy
 
 

@@ -13,17 +13,17 @@ import pytest
 from agreement_helpers import assert_numbers_agree
 from drive_helpers import COLUMNS, MACHINES, SCENARIO, identified, logged
 from feedsim.cli import main
-from feedsim.cosim import run
-from feedsim.errors import InputError
+from feedsim.estimation.identify import Record
+from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes
+from feedsim.estimation.replay.drive import feedforward_of
+from feedsim.estimation.replay.identified import _refuse_implausible
 from feedsim.files.columns import load_columns
-from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord, read_axes
-from feedsim.replay.drive import feedforward_of
-from feedsim.replay.identified import _refuse_implausible
+from feedsim.files.trace import write_csv
+from feedsim.files.trace.trace import Array
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import load, load_machine
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.trace import write_csv
-from feedsim.trace.trace import Array
 from machine_helpers import rigid_copy
 
 OFF = ["T_n=16 ms", "K_v=3.5 (m/min)/mm", "T_dyn=1 ms", "T_sym=3 ms", "k_ffw=98 %",

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import drive_helpers
-from feedsim.cosim import run
-from feedsim.errors import InputError
+from feedsim.estimation.identify import Record
+from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.replay.identified import identify_drives
+from feedsim.estimation.replay.machine_files import ElasticMode, resonance, with_modes
 from feedsim.files.columns import load_columns
-from feedsim.identify import Record
+from feedsim.files.trace import write_csv
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.identify_drive import count_of_modes
-from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
-from feedsim.replay.elastic import ElasticMode, resonance, with_modes
-from feedsim.replay.identified import identify_drives
 from feedsim.scenario import load, load_machine
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.trace import write_csv
 from machine_helpers import rigid_copy
 
 SCENARIO = """

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from feedsim.estimation.identify.parameters import estimate
+from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.parameters import estimate
-from feedsim.identify.result import Estimate
-from feedsim.replay.estimates import STRETCHES, between_stretches, shared_lag, with_undecided
-from feedsim.replay.start import of_cycle
-from feedsim.replay.tuning import parameter
+from feedsim.estimation.replay.closed_loop import of_cycle
+from feedsim.estimation.replay.estimates import STRETCHES, between_stretches, shared_lag, with_undecided
+from feedsim.estimation.replay.tuning import parameter
 
 
 def fits(*values: dict[str, float]) -> Any:

@@ -13,9 +13,9 @@ import pytest
 from drive_helpers import MACHINES, identified
 from feedsim.cli import main
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.identified import identify_drives
 from feedsim.files.columns import load_columns
-from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.identified import identify_drives
 from feedsim.scenario import load_machine
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord
-from feedsim.replay.elastic import resonator
-from feedsim.replay.moving_lines import Line, lines_in_motion
-from feedsim.trace.trace import Array
+from feedsim.estimation.identify import Record
+from feedsim.estimation.replay.closed_loop import AxisRecord
+from feedsim.estimation.replay.machine_files import resonator
+from feedsim.estimation.replay.moving_lines import Line, lines_in_motion
+from feedsim.files.trace.trace import Array
 
 H, I_P = 2e-3, 10e-3 / (2 * np.pi)  # [s], [m/rad] of a pitch of 10 mm
 NOISE = 0.1e-6  # [m]

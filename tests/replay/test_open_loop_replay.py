@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from feedsim.cli import main
-from feedsim.cosim import run
+from feedsim.files.trace import read_csv, write_csv
 from feedsim.scenario import load
-from feedsim.trace import read_csv, write_csv
+from feedsim.simulation.cosim import run
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINES = ROOT / "scenarios" / "machines"

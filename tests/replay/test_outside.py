@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord
-from feedsim.replay.moving_lines import Line, in_words, without_outside
-from feedsim.trace.trace import Array
+from feedsim.estimation.identify import Record
+from feedsim.estimation.replay.closed_loop import AxisRecord
+from feedsim.estimation.replay.moving_lines import Line, in_words, without_outside
+from feedsim.files.trace.trace import Array
 
 H = 2e-3
 TIME = H * np.arange(700)

@@ -11,11 +11,11 @@ import pytest
 
 from drive_helpers import COLUMNS, MACHINES, logged
 from feedsim.cli import main
-from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord
-from feedsim.replay.plausible import implausible
-from feedsim.trace import Trace, read_csv, write_csv
-from feedsim.trace.trace import Array
+from feedsim.estimation.identify import Record
+from feedsim.estimation.replay.closed_loop import AxisRecord
+from feedsim.estimation.replay.drive import implausible
+from feedsim.files.trace import Trace, read_csv, write_csv
+from feedsim.files.trace.trace import Array
 
 
 @pytest.fixture(scope="module")

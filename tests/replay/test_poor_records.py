@@ -12,13 +12,13 @@ import pytest
 
 from drive_helpers import COLUMNS, MACHINES, SCENARIO, logged
 from feedsim.cli import main
-from feedsim.cosim import run
+from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.identified import DrivesFound, identify_drives
 from feedsim.files.columns import load_columns
-from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.identified import DrivesFound, identify_drives
+from feedsim.files.trace import write_csv
 from feedsim.scenario import Machine, load, load_machine
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.trace import write_csv
 from machine_helpers import rigid_copy
 
 GENTLE = """
@@ -42,7 +42,9 @@ def simple_axis(
 
     limit: share of the largest torque at which the record is cut off; the axis had all of it.
     """
-    monkeypatch.setattr("feedsim.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, []))
+    monkeypatch.setattr(
+        "feedsim.estimation.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, [])
+    )
     machine = rigid_copy(MACHINES / "sinumerik_840d", folder / "rigid")
     (folder / "moves.yaml").write_text(GENTLE.format(machine=machine, seed=seed))
     axis = "machine.axes.X"
@@ -132,7 +134,9 @@ def test_an_axis_that_is_refused_does_not_take_another_along(
 ) -> None:
     """X moves both ways, Y stands still or is not in the record: X is written as by itself, the status is 1, and the
     reason is there."""
-    monkeypatch.setattr("feedsim.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, []))
+    monkeypatch.setattr(
+        "feedsim.estimation.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, [])
+    )
     text = GENTLE.format(machine=MACHINES / "sinumerik_840d", seed=1).replace("axes: [X]", "axes: [X, Y]")
     (tmp_path / "moves.yaml").write_text(text)
     log = run(load(tmp_path / "moves.yaml", ["machine.axes.X.max_acceleration=10 m/s^2"])).log

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from drive_helpers import MACHINES
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify import Record
-from feedsim.replay.closed_loop import AxisRecord, Replay, run_in
+from feedsim.estimation.identify import Record
+from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, run_in
 from feedsim.scenario import load_machine
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 FRICTION = load_machine(MACHINES / "sinumerik_840d").axes["X"].friction
 

@@ -11,11 +11,11 @@ import pytest
 
 from agreement_helpers import assert_numbers_agree
 from feedsim.cli import main
-from feedsim.cosim import run
-from feedsim.replay.closed_loop import Replay, read_axes, windowed
+from feedsim.estimation.replay.closed_loop import Replay, read_axes, windowed
+from feedsim.files.trace import Trace, read_csv, write_csv
+from feedsim.files.trace.trace import Array
 from feedsim.scenario import load, load_machine
-from feedsim.trace import Trace, read_csv, write_csv
-from feedsim.trace.trace import Array
+from feedsim.simulation.cosim import run
 from kinds_helpers import LOGGED as SCENARIO
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from drive_helpers import COLUMNS, MACHINES
-from feedsim.cosim import run
+from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.identified import identify_drives
 from feedsim.files.columns import load_columns
-from feedsim.replay.closed_loop import read_axes, windowed
-from feedsim.replay.identified import identify_drives
+from feedsim.files.trace import write_csv
 from feedsim.scenario import load
+from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.trace import write_csv
 from machine_helpers import rigid_copy
 
 MOVES = """
@@ -43,7 +43,9 @@ def test_the_structure_of_a_drive(
 ) -> None:
     """Taken for a drive without it, K_p came out 3 % small beside a current loop, and 15 times too large beside a
     reference model, in intervals of 1 and 30 %."""
-    monkeypatch.setattr("feedsim.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, []))
+    monkeypatch.setattr(
+        "feedsim.estimation.replay.drive.friction_parts", lambda problem, found, progress: ((), {}, found, [])
+    )
     machine = rigid_copy(MACHINES / "sinumerik_840d", tmp_path / "rigid")
     (tmp_path / "moves.yaml").write_text(MOVES.format(machine=machine))
     own = ("drive.K_p=5.65 N.m.s/rad", "drive.T_n=6 ms", "max_acceleration=10 m/s^2", "friction.F_log=0 N.m")

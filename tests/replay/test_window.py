@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from feedsim.cli import main
-from feedsim.errors import InputError
-from feedsim.replay.window import window
-from feedsim.trace import Mark
+from feedsim.estimation.replay.closed_loop import window
+from feedsim.files.trace import Mark
+from feedsim.foundation.errors import InputError
 
 MARKS = [
     Mark(0.5, "N1 G0 X10"),

@@ -12,6 +12,7 @@ import pytest
 from feedsim.analysis.linear import Bandwidth, Extreme, GainCrossing, Margins, Pair, PhaseCrossing, grid
 from feedsim.analysis.responses import Overlay
 from feedsim.analysis.truncation import deviations, structure_responses
+from feedsim.files.trace.response import FrequencyResponse
 from feedsim.report import chart
 from feedsim.report.chart import Panel
 from feedsim.report.chart.scales import ranges, ticks
@@ -26,7 +27,6 @@ from feedsim.report.frf.bode_plots import (
 )
 from feedsim.report.frf.report import truncation_pictures
 from feedsim.structure import Modes, checked_modes
-from feedsim.trace.response import FrequencyResponse
 from frf_helpers import responses
 from scenario_helpers import default_machine
 from svg_helpers import assert_legible, drawn_panels

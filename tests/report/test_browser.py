@@ -14,10 +14,9 @@ import pytest
 from feedsim.analysis import evaluate
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
-from feedsim.report.content import Report
+from feedsim.report.content import Picture, Report
+from feedsim.report.formatting import PALETTE
 from feedsim.report.page import html
-from feedsim.report.picture import Picture
-from feedsim.report.style import PALETTE
 from page_browsers import drawn
 from report_helpers import FakeRun, circle_run, positioning_run
 

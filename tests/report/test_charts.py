@@ -17,7 +17,7 @@ from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Pa
 from feedsim.report.chart.model import embedded
 from feedsim.report.chart.scales import measured, ranges, ticks
 from feedsim.report.chart.svg import svg
-from feedsim.report.picture import Picture
+from feedsim.report.content import Picture
 from svg_helpers import Drawn, drawn_panels, overlap
 
 TIME, HEIGHT = Axis("time", "s"), Axis("height", "m")

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.report import style
+from feedsim.files.trace import Mark
+from feedsim.report import formatting
 from feedsim.report.chart import Curve
-from feedsim.report.replay.plots import MOST_NAMES, names_of
-from feedsim.report.show.report import looks_of
-from feedsim.trace import Mark
+from feedsim.report.replay.report import MOST_NAMES, names_of
+from feedsim.report.show import looks_of
 
-REPORT = Path(style.__file__).parent
+REPORT = Path(formatting.__file__).parent
 MEANINGS = ("SIMULATED", "RECORDED", "SETPOINT", "AT_TOOL", "RESIDUAL_COLOUR", "ALLOWED", "FRICTION", "OTHERWISE")
 # Word with which the name of a curve begins -> meanings that its colour may have.
 WORDS = {
@@ -44,9 +44,9 @@ RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY"}
 
 
 def test_no_two_meanings_share_a_colour() -> None:
-    colours = [getattr(style, name) for name in MEANINGS]
+    colours = [getattr(formatting, name) for name in MEANINGS]
     assert len(set(colours)) == len(colours)
-    assert (style.BEFORE, style.AFTER) == (style.RECORDED, style.SIMULATED)
+    assert (formatting.BEFORE, formatting.AFTER) == (formatting.RECORDED, formatting.SIMULATED)
 
 
 def test_colours_are_taken_by_their_meaning() -> None:
@@ -55,7 +55,7 @@ def test_colours_are_taken_by_their_meaning() -> None:
     for file in REPORT.rglob("*.py"):
         tree = ast.parse(file.read_text(encoding="utf-8"))
         names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
-                 and node.module == "feedsim.report.style" for alias in node.names}  # fmt: skip
+                 and node.module == "feedsim.report.formatting" for alias in node.names}  # fmt: skip
         if names & RAW:
             found.add(file.relative_to(REPORT).as_posix())
     assert found <= LISTS, found - LISTS
@@ -88,9 +88,9 @@ RESULT, RECORD = OneOf(figures={"XZ.G": 1.0}), OneOf()
 @pytest.mark.parametrize(
     ("sources", "colours"),
     [
-        ([RESULT, RESULT], [style.BEFORE, style.AFTER]),
-        ([RESULT, RECORD], [style.SIMULATED, style.RECORDED]),
-        ([RECORD, RESULT, RESULT], [style.RECORDED, style.SIMULATED, style.SKY]),
+        ([RESULT, RESULT], [formatting.BEFORE, formatting.AFTER]),
+        ([RESULT, RECORD], [formatting.SIMULATED, formatting.RECORDED]),
+        ([RECORD, RESULT, RESULT], [formatting.RECORDED, formatting.SIMULATED, formatting.SKY]),
     ],
 )
 def test_results_over_each_other(sources: list[OneOf], colours: list[str]) -> None:
@@ -115,4 +115,4 @@ def test_names_of_blocks_have_room() -> None:
 
 
 def test_curves_take_their_meaning_by_default() -> None:
-    assert Curve("", np.zeros(1), np.zeros(1)).colour == style.SIMULATED
+    assert Curve("", np.zeros(1), np.zeros(1)).colour == formatting.SIMULATED

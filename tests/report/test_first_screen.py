@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import diagnoses, evaluate
-from feedsim.findings import Wrong
+from feedsim.foundation.errors import Wrong
 from feedsim.report import run as report
 from feedsim.report.content import Report, parted
 from feedsim.report.page import html

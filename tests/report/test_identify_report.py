@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from agreement_helpers import assert_numbers_agree
-from feedsim.errors import OutputError
-from feedsim.identify.friction_file import open_loop_line
-from feedsim.identify.result import Balance, Correlation, Identification
+from feedsim.estimation.identify.friction_file import open_loop_line
+from feedsim.estimation.identify.result import Balance, Correlation, Identification
+from feedsim.foundation.errors import OutputError
 from feedsim.jobs.identify import IdentifyResult
 from feedsim.report.chart import Grid
 from feedsim.report.identify import headline, rigid_line, table_lines, terminal_warnings

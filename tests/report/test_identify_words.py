@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.identify import Options, stages
-from feedsim.identify.result import Estimate, Identification, Stationary
+from feedsim.estimation.identify import Options, stages
+from feedsim.estimation.identify.result import Estimate, Identification, Stationary
 from feedsim.report.chart import Curve, Panel
-from feedsim.report.content import Report, Tile
+from feedsim.report.content import Picture, Report, Tile
 from feedsim.report.formatting import counted
 from feedsim.report.identify import headline
 from feedsim.report.identify.report import report_of
 from feedsim.report.identify.stribeck_plots import speeds_of, stribeck_picture, stribeck_title
 from feedsim.report.identify.summary import summary
 from feedsim.report.page import html
-from feedsim.report.picture import Picture
 from identification_helpers import I_P, TRUE, J, curve, identification, identified, records
 from report_helpers import Page
 

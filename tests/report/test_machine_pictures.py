@@ -15,12 +15,23 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from feedsim import cli
-from feedsim.errors import InputError
-from feedsim.report.machine.model import MODE_DEFLECTION, Model, model, motion, solids, turned
-from feedsim.report.machine.projection import FRONT, OBLIQUE, SIDE, TOP, view
+from feedsim.foundation.errors import InputError
+from feedsim.report.machine.record import (
+    FRONT,
+    MODE_DEFLECTION,
+    OBLIQUE,
+    SIDE,
+    TOP,
+    Model,
+    model,
+    motion,
+    solids,
+    turned,
+    view,
+)
 from feedsim.report.machine.report import FRAMES, telling_view
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.build import Built, build
 from feedsim.structure.geometry.outline import node_motion
 

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, judge
 from feedsim.cli import main
-from feedsim.errors import InputError
-from feedsim.judge import judged
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.page import html
 from feedsim.report.run.files import summary
 from feedsim.report.run.report import report_of
 from feedsim.scenario import Machine
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.simulation import cosim, judge
+from feedsim.simulation.judge import judged
 from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.pose_change import LARGE_SHIFT, MAX_MODE_FREQUENCY, PoseChange, pose_change, warnings
 from report_helpers import positioning_run
@@ -208,7 +208,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     ],
 )
 def test_cells_that_are_refused(texts: list[str], message: str) -> None:
-    from feedsim.arguments import as_options, pairs
+    from feedsim.foundation.arguments import as_options, pairs
     from feedsim.jobs.export import POSITIONS_EXAMPLE, grid_axes
 
     with pytest.raises(InputError) as caught, as_options():

@@ -22,18 +22,18 @@ import pytest
 
 from feedsim.analysis import Figure, evaluate
 from feedsim.cli.terminal import finish, warn
-from feedsim.findings import Note, Wrong
+from feedsim.files.trace import read_csv
+from feedsim.foundation.errors import Note, Wrong
 from feedsim.jobs.check import Checked
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.model import embedded
 from feedsim.report.content import Tile
+from feedsim.report.formatting import PAGE_COLOURS
 from feedsim.report.page import script
 from feedsim.report.run.files import summary
 from feedsim.report.run.report import HEADER, moved_words, real_time_factor, tile
-from feedsim.report.style import PAGE_COLOURS
-from feedsim.trace import read_csv
 from report_helpers import Page, circle_run, contents, positioning_run, run_of
 from scenario_helpers import scenario
 

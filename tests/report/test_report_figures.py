@@ -12,11 +12,11 @@ from feedsim.analysis import Figure, PositioningTask, evaluate, tasks
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.report import chart
 from feedsim.report.chart import Polar
-from feedsim.report.picture import LARGEST_SVG
+from feedsim.report.content import LARGEST_SVG
+from feedsim.report.formatting import SIMULATED
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import ring_step
 from feedsim.report.run.report import draw
-from feedsim.report.style import SIMULATED
 from feedsim.scenario import Axis, CircleTest, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run
 from scenario_helpers import default_machine, scenario

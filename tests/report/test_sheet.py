@@ -14,9 +14,9 @@ import pytest
 
 import feedsim as fs
 from command_helpers import feedsim, summary_of
-from feedsim import extras
+from feedsim.foundation import installation
+from feedsim.report.run.files import _name
 from feedsim.report.run.sheet import FAILS, NO_LIMIT_TEXT, OPEN, PASSES, judged
-from feedsim.report.run.workbook import _name
 
 ROOT = Path(__file__).resolve().parents[2]
 CYCLE = """
@@ -178,10 +178,10 @@ def test_the_workbook_has_the_numbers_of_the_table(fmus: Path, tmp_path: Path) -
 def test_a_workbook_without_its_package_is_refused_before_the_run(
     fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(extras.EXTRAS, "xlsx", ("no_such_package",))
+    monkeypatch.setitem(installation.EXTRAS, "xlsx", ("no_such_package",))
     machine = ROOT / "scenarios" / "machines" / "test_centre"
     (tmp_path / "s.yaml").write_text(CYCLE.format(machine=machine, sheet=", sheet: {xlsx: true}"), encoding="utf-8")
-    with pytest.raises(extras.MissingPackage, match=r'pip install "feedsim\[xlsx\]"'):
+    with pytest.raises(installation.MissingPackage, match=r'pip install "feedsim\[xlsx\]"'):
         fs.run(tmp_path / "s.yaml", fmus=fmus, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
-from feedsim.report.chart.layout import NARROWEST
+from feedsim.report.chart.model import NARROWEST
 from feedsim.report.chart.scales import ticks
 from feedsim.report.chart.svg import WIDTH, svg
-from feedsim.report.content import Report
+from feedsim.report.content import Picture, Report
 from feedsim.report.page import drawing, html
-from feedsim.report.picture import Picture
 from svg_helpers import drawn_panels
 
 SAME_PLACE = 1.0  # pixels

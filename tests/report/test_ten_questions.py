@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from feedsim.analysis import evaluate
-from feedsim.arguments import Call, calling
-from feedsim.findings import Wrong
+from feedsim.foundation.arguments import Call, calling
+from feedsim.foundation.errors import Wrong
 from feedsim.jobs.parameters import command_line
 from feedsim.report import run as report
 from feedsim.report.content import FOLDER, Report, Step, typed

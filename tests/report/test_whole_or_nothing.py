@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import evaluate
-from feedsim.errors import OutputError
-from feedsim.outputs import replacing
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import OutputError
+from feedsim.foundation.outputs import replacing
 from feedsim.report import run as report
 from feedsim.report.content import Report
 from feedsim.report.results import write_report
-from feedsim.trace import Trace
 from report_helpers import FakeRun, circle_run, contents, positioning_run, small_run
 
 # -- whole or not at all ----------------------------------------------------------------------------------------------

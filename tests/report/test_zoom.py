@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import evaluate
+from feedsim.files.trace import read_csv
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.model import BLOCK_ROWS, embedded, steps
 from feedsim.report.chart.scales import ticks
-from feedsim.report.content import Report
+from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
-from feedsim.report.picture import Picture
-from feedsim.trace import read_csv
 from kinds_helpers import KINDS, Kinds
 from report_helpers import circle_run
 

@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from feedsim.errors import InputError
-from feedsim.files.columns import Columns, Signal, load_columns
-from feedsim.files.spellings import is_rms, spelled
+from feedsim.files.columns import Columns, Signal, is_rms, load_columns, spelled
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from command_helpers import feedsim
-from feedsim import units, variables
-from feedsim.control import CONTROLS, known, names_of
-from feedsim.control.names import table
-from feedsim.errors import InputError
+from feedsim.files.control import CONTROLS, known, names_of
+from feedsim.files.control.names import table
+from feedsim.foundation import units, variables
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import CONTROL_CHOICES
 from feedsim.scenario import load, load_machine
 

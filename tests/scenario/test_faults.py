@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import load, load_machine
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"

@@ -12,9 +12,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feedsim.errors import InputError, OutputError
-from feedsim.findings import Note, Wrong
-from feedsim.identify.friction_file import Line, friction_text
+from feedsim.estimation.identify.friction_file import Line, friction_text
+from feedsim.foundation.errors import InputError, Note, OutputError, Wrong
 from feedsim.scenario import Friction, load, load_machine
 from feedsim.scenario.load import read_friction
 from feedsim.scenario.schema import json_schema

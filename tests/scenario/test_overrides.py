@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Move
 from feedsim.scenario import Friction, Scenario, load
 

@@ -8,8 +8,8 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from feedsim import units, variables
-from feedsim.fields import Quantity, is_multiple
+from feedsim.files.fields import Quantity, is_multiple
+from feedsim.foundation import units, variables
 from feedsim.motions import Arc, Circle, Column, Dwell, MeasuredSetpoints, Move
 from feedsim.scenario import (
     CircleTest,

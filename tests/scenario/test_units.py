@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from feedsim import units
-from feedsim.errors import InputError
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from feedsim import units
+from feedsim.foundation import units
 from pint_registry import Registry
 
 # Dimensions in the base units of pint.

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import variables
-from feedsim.errors import InputError
+from feedsim.foundation import variables
+from feedsim.foundation.errors import InputError
 from feedsim_packager import cli
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.errors import InputError
 from feedsim.files import source
 from feedsim.files.source import MAX_VALUES, Place, _brackets, parse, read
+from feedsim.foundation.errors import InputError
 
 
 def values(text: str) -> object:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import scenario, ssp
+from feedsim import scenario
+from feedsim.simulation import ssp
 from ssp_helpers import short_scenario
 
 

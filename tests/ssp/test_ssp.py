@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import ssp_helpers
-from feedsim import analysis, cosim, nc, scenario, ssp
-from feedsim.findings import Wrong
-from feedsim.judge import JudgedRun, judged
-from feedsim.scenario.structure.load import load_structure
-from feedsim.ssp.opened import Opened
+from feedsim import analysis, scenario
+from feedsim.foundation.errors import Wrong
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.simulation import cosim, nc, ssp
+from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.ssp.opened import Opened
 from ssp_helpers import ROOT, STRUCTURE, edited, run_ssp, short_scenario
 
 
@@ -298,7 +299,7 @@ def test_every_stop_time_can_be_run(exported: Path, tmp_path: Path) -> None:
 
 def test_the_rest_that_an_evaluation_needs() -> None:
     from feedsim.analysis.positioning import MIN_REST_TIME
-    from feedsim.ssp import setpoints
+    from feedsim.simulation.ssp import setpoints
 
     assert setpoints.EVALUATED_REST == MIN_REST_TIME
 
@@ -314,10 +315,10 @@ def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
 
 def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> None:
     """At instants just ahead of rows, for steps of several lengths: with the unit's own slack."""
-    from feedsim.cosim.archive import Archive
-    from feedsim.cosim.operations import Interpreter, do_step
-    from feedsim.cosim.unit import Unit
-    from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, read_setpoints
+    from feedsim.simulation.cosim.archive import Archive
+    from feedsim.simulation.cosim.operations import Interpreter, do_step
+    from feedsim.simulation.cosim.unit import Unit
+    from feedsim.simulation.ssp.setpoints import SETPOINTS_IN_ARCHIVE, read_setpoints
 
     file = tmp_path / "setpoint.fmu"
     file.write_bytes(ssp_helpers.contents(exported)["resources/setpoint.fmu"])

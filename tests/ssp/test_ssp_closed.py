@@ -16,9 +16,9 @@ import pytest
 
 from audit_helpers import outside, watched
 from feedsim import cli
-from feedsim.errors import InputError
-from feedsim.files.references import closed
-from feedsim.ssp import archive
+from feedsim.files.regular import closed
+from feedsim.foundation.errors import InputError
+from feedsim.simulation.ssp import archive
 from feedsim.structure.matrices.calculix import _cards
 from ssp_helpers import STRUCTURE, contents
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import cli, scenario, ssp
-from feedsim.cosim import archive
-from feedsim.errors import InputError, OutputError
+from feedsim import cli, scenario
+from feedsim.foundation.errors import InputError, OutputError
+from feedsim.simulation import ssp
+from feedsim.simulation.cosim import archive
 from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, short_scenario, write
 
 M_A = '<ssd:Connection startElement="controller_Z" startConnector="M_a" endElement="plant" endConnector="Z.M_a" />'

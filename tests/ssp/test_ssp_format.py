@@ -10,7 +10,8 @@ from xml.etree import ElementTree
 import pytest
 
 import ssp_helpers
-from feedsim import scenario, ssp
+from feedsim import scenario
+from feedsim.simulation import ssp
 from ssp_helpers import STRUCTURE
 
 
@@ -129,7 +130,7 @@ def test_sources_are_uris(place: str, source: str, exported: Path, tmp_path: Pat
 def test_names_are_written_as_uris(name: str) -> None:
     from urllib.parse import unquote
 
-    from feedsim.ssp.archive import as_source, inside
+    from feedsim.simulation.ssp.archive import as_source, inside
 
     source = as_source(name)
     assert source.isascii()

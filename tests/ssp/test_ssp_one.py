@@ -9,10 +9,11 @@ from typing import Any
 import fmpy
 import pytest
 
-from feedsim import analysis, cosim, scenario, ssp
+from feedsim import analysis, scenario
 from feedsim.cli import main
-from feedsim.errors import InputError
-from feedsim.judge import judged
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import cosim, ssp
+from feedsim.simulation.judge import judged
 from ssp_helpers import STRUCTURE, altered, contents, edited, short_scenario
 
 MACHINE = "resources/machine.fmu"

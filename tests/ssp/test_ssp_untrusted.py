@@ -12,11 +12,13 @@ from xml.sax.saxutils import escape
 
 import pytest
 
-from feedsim import cli, ssp, units
-from feedsim.cosim import untrusted
-from feedsim.errors import InputError
-from feedsim.ssp import parameter_set, rebuilt
-from feedsim.ssp.opened import _load
+from feedsim import cli
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
+from feedsim.simulation import ssp
+from feedsim.simulation.cosim import unpacked
+from feedsim.simulation.ssp import parameter_set, rebuilt
+from feedsim.simulation.ssp.opened import _load
 from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, write
 
 FRICTION = "resources/friction_Z.ssv"
@@ -122,7 +124,7 @@ def test_a_path_that_no_disk_takes(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_what_nobody_names_is_not_unpacked(exported: Path, tmp_path: Path) -> None:
-    zeros = bytes(untrusted.FREE + 1)
+    zeros = bytes(unpacked.FREE + 1)
     file = write(tmp_path / "x.ssp", contents(exported) | {"extra/zeros": zeros, "resources/recordings/0.csv": zeros})
     with ssp.opened(file) as found:
         assert not (found.fmus / "resources").exists()
@@ -135,8 +137,8 @@ def test_what_nobody_names_is_not_unpacked(exported: Path, tmp_path: Path) -> No
 def test_what_unpacks_to_far_too_much(
     exported: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(untrusted, "RATIO", 1)  # of a file this small the rest is free anyway
-    files = contents(exported) | {name: bytes(untrusted.FREE + 1)}
+    monkeypatch.setattr(unpacked, "RATIO", 1)  # of a file this small the rest is free anyway
+    files = contents(exported) | {name: bytes(unpacked.FREE + 1)}
     if name.endswith(".csv"):
         files[STRUCTURE] = _more(files[STRUCTURE].decode(), name).encode()
     said = refusal(write(tmp_path / "bomb.ssp", files), capsys)
@@ -147,12 +149,12 @@ def test_archives_inside_count_together(
     exported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each of the archives unpacks to less than is allowed, both to more."""
-    monkeypatch.setattr(untrusted, "RATIO", 1)
+    monkeypatch.setattr(unpacked, "RATIO", 1)
     files = contents(exported)
     for unit in ("friction", "controller"):
         inner = tmp_path / f"{unit}.fmu"
         inner.write_bytes(files[f"resources/{unit}.fmu"])
-        half = {"resources/half": bytes(untrusted.FREE * 2 // 3)}
+        half = {"resources/half": bytes(unpacked.FREE * 2 // 3)}
         files[f"resources/{unit}.fmu"] = write(inner, contents(inner) | half).read_bytes()
     assert "unpacks to" in refusal(write(tmp_path / "nested.ssp", files), capsys)
 
@@ -162,7 +164,7 @@ def test_setpoints_deflate_far_less_than_is_allowed() -> None:
     import zlib
 
     rows = "".join(f"{i / 1000!r},0.8,0.0,0.327,0.0,0.1,0.0\n" for i in range(100_000)).encode()
-    assert len(rows) / len(zlib.compress(rows, 9)) < untrusted.RATIO / 4
+    assert len(rows) / len(zlib.compress(rows, 9)) < unpacked.RATIO / 4
 
 
 def test_a_document_type_in_utf_16(exported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,8 +16,8 @@ from fe_models import dense_modes
 from scipy import sparse
 
 from feedsim.cli import main
-from feedsim.errors import InputError
-from feedsim.scenario.structure.load import load_structure
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.build import check
 from feedsim.structure.matrices import ansys
 from feedsim.structure.matrices.build import Imported, import_model

@@ -14,8 +14,8 @@ import pytest
 import yaml
 from fe_models import STRUCTURES, dense_modes
 
-from feedsim.errors import InputError
-from feedsim.scenario.structure.load import load_structure
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.build import check
 from feedsim.structure.matrices.build import Imported, import_model
 

@@ -10,8 +10,8 @@ import pytest
 from fe_models import assembly, chain, geometry
 from scipy import sparse
 
-from feedsim.errors import InputError
-from feedsim.scenario.structure.matrices import SI, UnitSystem
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.parts import SI, UnitSystem
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.build import check, frequency_warnings
 

@@ -10,10 +10,9 @@ import pytest
 import yaml
 from fe_models import ROOT, STRUCTURES, dense_modes
 
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.matrices.build import import_model
-from feedsim.structure.matrices.raw import FREEDOM_NAMES
-from feedsim.structure.matrices.tables import BY_NODE, NODE_COLUMNS, read_table
+from feedsim.structure.matrices.tables import BY_NODE, FREEDOM_NAMES, NODE_COLUMNS, read_table
 
 TEXT = (ROOT / "docs" / "fe-import.md").read_text(encoding="utf-8")
 BLOCKS = {kind: re.findall(rf"^```{kind}\n(.*?)^```", TEXT, re.M | re.S) for kind in ("yaml", "csv")}

@@ -8,8 +8,9 @@ import machines
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario
-from feedsim.judge import judged
+from feedsim import scenario
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import judged
 from feedsim.structure import checked_modes
 
 

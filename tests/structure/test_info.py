@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from feedsim.scenario import load_machine
-from feedsim.scenario.described import load_described
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.load import load_described
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure import read_modes
 from feedsim.structure.build import Built, build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table

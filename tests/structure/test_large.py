@@ -11,9 +11,9 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, diags_array
 
 from eigen_models import TWO_PERCENT, Floats, error_bounds, given, lattice
-from feedsim.errors import FeedsimError
+from feedsim.foundation.errors import FeedsimError
 from feedsim.structure import eigenpairs
-from feedsim.structure.factor import SparseFactor
+from feedsim.structure.eigenpairs import SparseFactor
 from feedsim.structure.solve import solve
 
 SIDE, SPRING, GROUND, MASS = 14, 2e8, 3e6, 5.0

@@ -12,8 +12,8 @@ import pytest
 import yaml
 from fe_models import STRUCTURES, chain, dense_modes, write_market
 
-from feedsim.errors import InputError
-from feedsim.scenario.structure.load import load_structure
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.build import check
 from feedsim.structure.matrices.build import Imported, import_model

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim import scenario
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.structure import checked_modes, read_modes
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"

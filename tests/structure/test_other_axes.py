@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cli, cosim, scenario
-from feedsim.cosim.archive import Archive
-from feedsim.cosim.plant import axes_of, open_plant
-from feedsim.errors import InputError, OutputError
+from feedsim import cli, scenario
+from feedsim.foundation.errors import InputError, OutputError
 from feedsim.scenario import load_machine
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.plant import axes_of, open_plant
 from feedsim.structure import read_modes
 from feedsim.structure.build import build
 from feedsim.structure.modes import write_modes

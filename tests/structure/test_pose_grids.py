@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from feedsim.errors import InputError, OutputError
-from feedsim.scenario.structure.load import load_structure
+from feedsim.foundation.errors import InputError, OutputError
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.geometry.assemble import Assembler
 from feedsim.structure.modes import read_modes
-from feedsim.structure.poses import check_common, grid_axis, pose_grid
-from feedsim.structure.poses_file import GridAxis, read_grid, write_poses
+from feedsim.structure.poses import GridAxis, check_common, grid_axis, pose_grid, read_grid, write_poses
 from structure_helpers import GIVEN_POSE, MACHINES, default_structure, dense_modes
 
 STRUCTURE = default_structure()

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.geometry.assemble import Assembler, assemble
 from structure_helpers import GIVEN_POSE, Floats, default_structure

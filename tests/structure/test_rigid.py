@@ -11,7 +11,7 @@ from scipy.linalg import qr
 from scipy.sparse import block_diag, csc_array
 
 from eigen_models import DEFAULT_DAMPING, LEAD, TWO_PERCENT, Floats, chain, drives, given, stiffened
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.eigenpairs import dense
 from feedsim.structure.geometry.assemble import assemble

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from eigen_models import DEFAULT_DAMPING, TWO_PERCENT, chain, error_bounds, given
-from feedsim.errors import InputError, OutputError
+from feedsim.foundation.errors import InputError, OutputError
 from feedsim.structure.modes import Modes, read_modes, write_modes
 from feedsim.structure.solve import Solution, damping_ratio, solve
 from structure_helpers import MACHINES

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.scenario.structure.load import load_structure
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.checks import load_structure
 from structure_helpers import one_axis_text
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import yaml
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.schema import json_schema
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.geometry.assemble import Assembler
 from structure_helpers import MACHINES, default_structure, geometry, one_axis_data, one_axis_text
 

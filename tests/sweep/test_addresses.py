@@ -5,8 +5,8 @@ from __future__ import annotations
 import distributed
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.sweep import cluster
+from feedsim.design.sweep import cluster
+from feedsim.foundation.errors import InputError
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Base, Change, load
 
 ROOT = Path(__file__).resolve().parents[2]

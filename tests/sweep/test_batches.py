@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from feedsim.sweep.design import Outcome, Task
-from feedsim.sweep.engine import AIM, DEATHS, DEEP, Batch, Batches
+from feedsim.design.sweep.design import Outcome, Task
+from feedsim.design.sweep.engine import AIM, DEATHS, DEEP, Batch, Batches
 
 
 def outcomes(batch: Batch, seconds: float, count: int | None = None) -> list[Outcome]:

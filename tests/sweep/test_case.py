@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from feedsim import analysis, cosim
+from feedsim import analysis
 from feedsim.cli import main
-from feedsim.errors import InputError
+from feedsim.design.sweep import Table
+from feedsim.design.sweep.bundle import case, scenario_of
+from feedsim.design.sweep.study import run
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.study import load_study
-from feedsim.sweep import Table
-from feedsim.sweep.case import case, scenario_of
-from feedsim.sweep.study import run
+from feedsim.simulation import cosim
 
 Write = Callable[..., Path]
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from feedsim.design.sweep import design
+from feedsim.design.sweep.design import quantile
 from feedsim.scenario.study import Distribution, load_study
-from feedsim.sweep import design
-from feedsim.sweep.design import quantile
 
 Write = Callable[..., Path]
 PARAMETERS = (

@@ -16,9 +16,9 @@ import pytest
 
 from command_helpers import PATIENCE
 from engine_helpers import Chore, Chores, chore
-from feedsim.errors import InputError
-from feedsim.sweep.design import Outcome
-from feedsim.sweep.engine import Engine, open_engine
+from feedsim.design.sweep.design import Outcome
+from feedsim.design.sweep.engine import Engine, open_engine
+from feedsim.foundation.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -149,7 +149,7 @@ SCRIPT = """
 import sys
 sys.path[:0] = [{tests!r}, {master!r}]
 from engine_helpers import Chore, Chores, chore
-from feedsim.sweep.engine import open_engine
+from feedsim.design.sweep.engine import open_engine
 def study():
     with open_engine(Chores("script", {notes!r}), workers=2) as engine:
         print("open", flush=True)
@@ -244,7 +244,7 @@ def test_wrong_requests() -> None:
 
 
 def test_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
-    from feedsim.sweep import cluster
+    from feedsim.design.sweep import cluster
 
     monkeypatch.setattr(cluster, "ANSWER", 1.0)
     with pytest.raises(InputError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1: .*tcp://host:8786"):  # noqa: SIM117

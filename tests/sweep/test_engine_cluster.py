@@ -16,10 +16,10 @@ import pytest
 
 from cluster_helpers import Cluster, scheduler
 from engine_helpers import Chores, chore
-from feedsim.errors import InputError, SimulationError
-from feedsim.sweep import cluster, engine, provenance, worker
-from feedsim.sweep.design import Outcome, Task
-from feedsim.sweep.engine import open_engine
+from feedsim.design.sweep import cluster, engine, provenance
+from feedsim.design.sweep.design import Outcome, Task
+from feedsim.design.sweep.engine import open_engine
+from feedsim.foundation.errors import InputError, SimulationError
 
 
 @pytest.fixture
@@ -90,16 +90,16 @@ class Kept:
 
 def test_a_place_is_kept_as_long_as_anybody_needs_it(tmp_path: Path) -> None:
     work, host = Kept(), SimpleNamespace(address="tcp://here:1", local_directory=str(tmp_path))
-    first, second = (worker.Carrier(work, provenance.versions()) for _ in range(2))
+    first, second = (engine.Carrier(work, provenance.versions()) for _ in range(2))
     for carrier in (first, second):
         carrier.setup(host)
-        assert len(worker.work_batch(carrier.key, (chore(0),), 1.0).outcomes) == 1
+        assert len(engine.work_batch(carrier.key, (chore(0),), 1.0).outcomes) == 1
     assert work.opened == 1
     for carrier, closed in ((first, 0), (second, 1)):
         carrier.teardown(host)
-        worker._clear(work.digest)  # as its thread does
+        engine._clear(work.digest)  # as its thread does
         assert work.closed == closed
-    assert worker._carried.keys().isdisjoint({first.key, second.key})
+    assert engine._carried.keys().isdisjoint({first.key, second.key})
 
 
 def test_a_result_that_dies_with_its_worker_is_waited_for(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,10 +125,12 @@ def test_a_result_that_dies_with_its_worker_is_waited_for(a_cluster: Cluster, mo
     assert sorted(outcome.run for outcome in found if outcome.error is None) == [0, 1, 2]
 
 
-OTHER = "import feedsim.sweep.provenance as p; own = dict(p.versions(), feedsim='0.0.0'); p.versions = lambda: own"
+OTHER = (
+    "import feedsim.design.sweep.provenance as p; own = dict(p.versions(), feedsim='0.0.0'); p.versions = lambda: own"
+)
 OTHERS = {
     "that says so": OTHER,
-    "that takes other batches": f"{OTHER}; import feedsim.sweep.worker as worker; worker.work_batch = len",
+    "that takes other batches": f"{OTHER}; import feedsim.design.sweep.engine as worker; worker.work_batch = len",
 }
 
 

@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 from cluster_helpers import scheduler
-from feedsim import analysis, cosim, units
-from feedsim.judge import judged
+from feedsim import analysis
+from feedsim.design.sweep.bundle import Bundle
+from feedsim.design.sweep.design import Outcome, Task
+from feedsim.design.sweep.engine import open_engine
+from feedsim.foundation import units
 from feedsim.scenario import Base, Change, load
-from feedsim.sweep.bundle import Bundle
-from feedsim.sweep.design import Outcome, Task
-from feedsim.sweep.engine import open_engine
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import judged
 from feedsim_packager import exchange, toolchain
 
 ROOT = Path(__file__).resolve().parents[2]

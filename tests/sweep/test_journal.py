@@ -15,9 +15,9 @@ from random import Random
 
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.sweep.design import Outcome
-from feedsim.sweep.study import JOURNAL_NAME, Journal
+from feedsim.design.sweep.design import Outcome
+from feedsim.design.sweep.study import JOURNAL_NAME, Journal
+from feedsim.foundation.errors import InputError
 
 HEAD = {"study": "S", "fingerprint": "abc", "parts": {"plant.fmu": "1", "parameters": "2"}}
 RUNS = 50
@@ -131,8 +131,8 @@ def test_a_run_that_is_written_is_counted(tmp_path: Path, monkeypatch: pytest.Mo
 def test_one_process_at_a_time(tmp_path: Path) -> None:
     code = f"""
         from pathlib import Path
-        from feedsim.sweep.study import Journal
-        from feedsim.errors import OutputError
+        from feedsim.design.sweep.study import Journal
+        from feedsim.foundation.errors import OutputError
         try:
             Journal(Path({str(tmp_path)!r}), {HEAD!r}, {RUNS})
         except OutputError as error:
@@ -155,7 +155,7 @@ def test_killed_while_it_is_written(tmp_path: Path) -> None:
         from pathlib import Path
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from test_journal import HEAD, outcome
-        from feedsim.sweep.study import Journal
+        from feedsim.design.sweep.study import Journal
         with Journal(Path({str(tmp_path)!r}), HEAD, 10**6) as journal:
             for run in journal.missing():
                 journal.add(outcome(run))

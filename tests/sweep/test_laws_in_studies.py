@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from feedsim.design.sweep.bundle import Bundle
+from feedsim.design.sweep.design import design
+from feedsim.design.sweep.provenance import fingerprint, parts
+from feedsim.design.sweep.study import run
 from feedsim.scenario.study import load_study
-from feedsim.sweep.bundle import Bundle
-from feedsim.sweep.design import design
-from feedsim.sweep.provenance import fingerprint, parts
-from feedsim.sweep.study import run
 
 Write = Callable[..., Path]
 VALUES = "sigma_0: 300 N.m/rad, sigma_1: 0.8 N.m.s/rad, sigma_2: 0.006 N.m.s/rad, F_C: 1.6 N.m, F_S: 2.1 N.m"

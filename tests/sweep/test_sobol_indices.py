@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from feedsim.sweep.sensitivity import LEAST_POINTS, MOST_LEFT_OUT, Indices, beyond, sobol_indices, trends
+from feedsim.design.sweep.sensitivity import LEAST_POINTS, MOST_LEFT_OUT, Indices, beyond, sobol_indices, trends
 
 Array = NDArray[np.float64]
 

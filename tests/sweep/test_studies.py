@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import analysis, cosim
+from feedsim import analysis
+from feedsim.design.sweep.design import Design, design
 from feedsim.scenario.study import load_study
-from feedsim.sweep.design import Design, design
+from feedsim.simulation import cosim
 
 ROOT = Path(__file__).resolve().parents[2]
 STUDIES = sorted((ROOT / "scenarios" / "studies").glob("*.yaml"))

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.design.sweep.design import quantile
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import load
 from feedsim.scenario.study import load_study
 from feedsim.scenario.study.parameter import outside
 from feedsim.scenario.study.study import Distribution
-from feedsim.sweep.design import quantile
 
 Write = Callable[..., Path]
 HEAD = "name: S\nscenario: short.yaml\nsampling: {method: sobol, runs: 8}\nparameters:\n"

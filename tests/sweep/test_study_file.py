@@ -12,10 +12,10 @@ import pytest
 import yaml
 
 from feedsim.cli import main
-from feedsim.errors import InputError
+from feedsim.design.sweep import design
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.schema import json_schema
 from feedsim.scenario.study import load_study
-from feedsim.sweep import design
 
 Write = Callable[..., Path]
 HEAD = "name: S\nscenario: short.yaml\nsampling: {method: sobol, runs: 8}\nparameters:\n"

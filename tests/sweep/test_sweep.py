@@ -19,13 +19,15 @@ from random import Random
 import pytest
 
 from command_helpers import rows_of
-from feedsim import analysis, cosim, units
+from feedsim import analysis
 from feedsim.cli import main
-from feedsim.errors import InputError, OutputError, SimulationError
+from feedsim.design.sweep import read_table
+from feedsim.design.sweep.study import Progress, run
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError, OutputError, SimulationError
 from feedsim.scenario import load
 from feedsim.scenario.study import load_study
-from feedsim.sweep import read_table
-from feedsim.sweep.study import Progress, run
+from feedsim.simulation import cosim
 
 Write = Callable[..., Path]
 
@@ -150,7 +152,7 @@ def test_a_table_that_cannot_be_written_leaves_the_end_as_it_is(
     def full(*_: object) -> None:
         raise OutputError("no space left")
 
-    monkeypatch.setattr("feedsim.sweep.study.write_table", full)
+    monkeypatch.setattr("feedsim.design.sweep.study.write_table", full)
     with pytest.raises(SystemExit):
         run(load_study(study()), tmp_path / "out", workers=0, fmus=fmus, progress=stop)
     assert "no table of the runs that are done: no space left" in caplog.text

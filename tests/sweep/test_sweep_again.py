@@ -11,10 +11,10 @@ import pytest
 
 from command_helpers import rows_of
 from feedsim.cli import main
-from feedsim.errors import InputError
+from feedsim.design.sweep import design, read_table
+from feedsim.design.sweep.study import Progress, run
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.study import load_study
-from feedsim.sweep import design, read_table
-from feedsim.sweep.study import Progress, run
 
 Write = Callable[..., Path]
 SENSITIVITY = ("sobol, runs: 16", "sensitivity, runs: 4")
@@ -122,7 +122,7 @@ def test_restart_leaves_nothing_of_what_was_there(
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("feedsim.sweep.study.open_engine", interrupted)
+    monkeypatch.setattr("feedsim.design.sweep.study.open_engine", interrupted)
     other = study(study().read_text().replace("seed: 7", "seed: 8"))
     assert main(["sweep", str(other), *arguments, "--restart"]) == 130
     left = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from feedsim.design.sweep.design import Outcome, design
+from feedsim.design.sweep.table import FAILED, LEVEL, OK, end_chance, span_chance, table_of
 from feedsim.report.chart import Panel
 from feedsim.report.sweep.account import Account, measures
 from feedsim.report.sweep.figure_plots import scatter_picture
 from feedsim.scenario.study import load_study
-from feedsim.sweep.design import Outcome, design
-from feedsim.sweep.failures import LEVEL, end_chance, span_chance
-from feedsim.sweep.table import FAILED, OK, table_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMETERS = """

@@ -13,19 +13,18 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from feedsim.findings import WRONG, Wrong
+from feedsim.design.sweep.design import Design, Outcome, design
+from feedsim.design.sweep.table import Table
+from feedsim.design.sweep.table import table_of as made
+from feedsim.foundation.errors import WRONG, Wrong
 from feedsim.report import sweep as report
-from feedsim.report.chart.file import EDGE
+from feedsim.report.chart.svg import EDGE
 from feedsim.report.formatting import scale
 from feedsim.report.page import html
-from feedsim.report.sweep.account import Account, quantile_interval
+from feedsim.report.sweep.account import Account, quantile_interval, summary
 from feedsim.report.sweep.figure_plots import running_median
 from feedsim.report.sweep.report import pictures_of, report_of
-from feedsim.report.sweep.summary import summary
 from feedsim.scenario.study import Study, load_study
-from feedsim.sweep.design import Design, Outcome, design
-from feedsim.sweep.table import Table
-from feedsim.sweep.table import table_of as made
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -244,7 +243,7 @@ def test_running_median() -> None:
      ("N.m", 3.0, "N.m"), ("1/s", 66.7, "(m/min)/mm"), ("rad", 0.04, "rad"), ("1", 0.3, "1")],
 )  # fmt: skip
 def test_units_for_people(unit: str, largest: float, shown: str) -> None:
-    from feedsim import units
+    from feedsim.foundation import units
 
     found = scale(unit, np.array([np.nan, -largest, 0.0]))
     assert found.unit == shown

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError, OutputError
+from feedsim.design.sweep import Design, Outcome, Table, design, read_table, write_table
+from feedsim.design.sweep.table import table_of
+from feedsim.foundation.errors import InputError, OutputError
 from feedsim.scenario.study import load_study
-from feedsim.sweep import Design, Outcome, Table, design, read_table, write_table
-from feedsim.sweep.table import table_of
 
 
 @pytest.fixture

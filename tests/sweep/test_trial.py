@@ -9,13 +9,13 @@ from time import sleep
 
 import pytest
 
-from feedsim import nc
 from feedsim.cli import main
+from feedsim.design.sweep import design
+from feedsim.design.sweep.study import run
+from feedsim.design.sweep.trial import ENOUGH, spread, trial
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import load_study
-from feedsim.sweep import design
-from feedsim.sweep.study import run
-from feedsim.sweep.trial import ENOUGH, spread, trial
+from feedsim.simulation import nc
 
 Write = Callable[..., Path]
 
@@ -39,7 +39,7 @@ def test_the_time_told_is_that_of_runs_of_the_study(
         sleep(takes)
         return nc.plan(scenario)
 
-    monkeypatch.setattr("feedsim.sweep.bundle.plan", slowly)
+    monkeypatch.setattr("feedsim.design.sweep.bundle.plan", slowly)
     text = study().read_text() + "  feed: {key: motions.0.feed, from: 1 m/min, to: 3 m/min}\n"
     loaded = load_study(study(text))
     found = trial(loaded, design(loaded), fmus)

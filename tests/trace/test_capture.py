@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from capture_helpers import CYCLE, ROWS, SIGNALS, axis_signals, content
-from feedsim.errors import InputError
-from feedsim.identify import read_records
-from feedsim.trace import convert, read_csv, read_recording
+from feedsim.estimation.identify import read_records
+from feedsim.files.trace import convert, read_csv, read_recording
+from feedsim.foundation.errors import InputError
 
 
 def written(tmp_path: Path, data: object) -> Path:

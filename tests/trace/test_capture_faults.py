@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from capture_helpers import CYCLE, ROWS, SIGNALS, axis_signals, content
-from feedsim.errors import InputError
+from feedsim.estimation.identify import read_records
 from feedsim.files.columns import Columns
-from feedsim.identify import read_records
-from feedsim.trace import capture, read_recording
-from feedsim.trace import capture as json_stream
-from feedsim.trace.recording import Recording
+from feedsim.files.trace import capture, read_recording
+from feedsim.files.trace import capture as json_stream
+from feedsim.files.trace.recording import Recording
+from feedsim.foundation.errors import InputError
 
 Signals = dict[str, Any]
 
@@ -191,7 +191,7 @@ def test_a_file_is_read_row_by_row(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("chunk", [1, 2, 7, 64, 1000])
 def test_a_file_is_cut_anywhere(tmp_path: Path, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    from feedsim.trace import capture as json_stream
+    from feedsim.files.trace import capture as json_stream
 
     sound = read_recording(written(tmp_path, noisy()))
     expected = {name: sound.read([name])[name] for name in sound.names}

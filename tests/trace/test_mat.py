@@ -23,9 +23,9 @@ import scipy
 from scipy.io import loadmat, savemat
 
 from command_helpers import PATIENCE
-from feedsim.errors import InputError
-from feedsim.trace import read_recording
-from feedsim.trace.mat import Other, flat, read_mat
+from feedsim.files.trace import read_recording
+from feedsim.files.trace.mat import Other, flat, read_mat
+from feedsim.foundation.errors import InputError
 
 CONTENT: dict[str, Any] = {
     "t": np.arange(500) / 500,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from command_helpers import feedsim
-from feedsim.errors import InputError
-from feedsim.trace import convert, read_recording, read_series
+from feedsim.files.trace import convert, read_recording, read_series
+from feedsim.foundation.errors import InputError
 from mat_helpers import hdf5, modelica, save
 
 T = np.arange(40) * 1e-3

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import pyuff
 
-from feedsim.errors import InputError, OutputError
-from feedsim.trace import response_files as uff
-from feedsim.trace.response import FrequencyResponse, quotient_unit
-from feedsim.trace.response_files import read_overlay, read_response, read_response_csv, write_response
+from feedsim.files.trace import response_files as uff
+from feedsim.files.trace.response import FrequencyResponse, quotient_unit
+from feedsim.files.trace.response_files import read_overlay, read_response, read_response_csv, write_response
+from feedsim.foundation.errors import InputError, OutputError
 
 F = np.array([1.0, 2.5, 10.0, 1000 / 3])
 H = 1 / (0.0164 * 2j * np.pi * F) * np.exp(-1j * F / 100)

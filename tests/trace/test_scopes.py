@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.identify import read_records
-from feedsim.trace import convert, read_csv, read_recording
-from feedsim.trace.recording import Recording
+from feedsim.estimation.identify import read_records
+from feedsim.files.trace import convert, read_csv, read_recording
+from feedsim.files.trace.recording import Recording
+from feedsim.foundation.errors import InputError
 
 PROJECT = [
     "Name\tScope Project\t",

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
-from feedsim.trace import read_recording
-from feedsim.trace.response_files import read_response
+from feedsim.files.trace import read_recording
+from feedsim.files.trace.response_files import read_response
+from feedsim.foundation.errors import InputError
 from sinumerik_xml_helpers import STEP, TRACE, N, measured
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.errors import InputError
+from feedsim.design.sweep.table import read_table
+from feedsim.files.trace import convert, read_csv, read_recording, read_series
+from feedsim.foundation.errors import InputError
 from feedsim.structure.modes import read_modes
-from feedsim.sweep.table import read_table
-from feedsim.trace import convert, read_csv, read_recording, read_series
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 VALUES = [1.25, 2.5, 4.0]

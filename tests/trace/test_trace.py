@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from feedsim.errors import InputError, OutputError
-from feedsim.trace import Trace, convert, read_csv, read_signals, write_csv, written_whole
-from feedsim.trace.csv import shortest
+from feedsim.files.trace import Trace, convert, read_csv, read_signals, write_csv, written_whole
+from feedsim.files.trace.files import shortest
+from feedsim.foundation.errors import InputError, OutputError
 
 
 def trace(rows: int = 5) -> Trace:

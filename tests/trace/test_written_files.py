@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.errors import OutputError
-from feedsim.ssp import archive as ssp_archive
-from feedsim.trace import written_whole
+from feedsim.files.trace import written_whole
+from feedsim.foundation.errors import OutputError
+from feedsim.simulation.ssp import archive as ssp_archive
 from feedsim_packager import archive
 from feedsim_packager import errors as packager_errors
 
@@ -114,7 +114,7 @@ def test_standard_output(kind: str, tmp_path: Path) -> None:
     link = tmp_path / "stdout"
     link.symlink_to("/proc/self/fd/1")
     code = (
-        "import sys; from pathlib import Path; from feedsim.trace import written_whole\nprint('before')\n"
+        "import sys; from pathlib import Path; from feedsim.files.trace import written_whole\nprint('before')\n"
         "with written_whole(Path(sys.argv[1])) as file: file.write(b'content\\n')\nprint('after')"
     )
     command = [sys.executable, "-c", code, str(link)]

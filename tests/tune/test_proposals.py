@@ -12,16 +12,10 @@ import numpy as np
 import pytest
 
 from command_helpers import feedsim
-from feedsim import analysis, cosim
+from feedsim import analysis
 from feedsim.cli import main
-from feedsim.judge import judged
-from feedsim.linear.judgement import judge
-from feedsim.linear.system import LinearSystem
-from feedsim.report.changes import changes_part, changes_section
-from feedsim.scenario import Machine, Scenario, load
-from feedsim.structure import checked_modes
-from feedsim.tune import Proposal, of_circle, of_run
-from feedsim.tune.proposals import (
+from feedsim.design.tune import Proposal, of_circle, of_run
+from feedsim.design.tune.proposals import (
     COMPENSATION,
     GAIN_MARGIN,
     PHASE_MARGIN,
@@ -32,6 +26,13 @@ from feedsim.tune.proposals import (
     model_gain,
     torque_response,
 )
+from feedsim.linear.judgement import judge
+from feedsim.linear.system import LinearSystem
+from feedsim.report.changes import changes_part, changes_section
+from feedsim.scenario import Machine, Scenario, load
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import judged
+from feedsim.structure import checked_modes
 
 PROJECT = Path(__file__).resolve().parents[2]
 CIRCLE = PROJECT / "scenarios" / "xz_circle.yaml"

@@ -14,13 +14,13 @@ import yaml
 
 from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
+from feedsim.design.tune import circles as circles_module
+from feedsim.design.tune import compensators as compensation
+from feedsim.design.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
+from feedsim.design.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, pulse, score, tune
+from feedsim.design.tune.knobs import compensated, effects_of, frictionless
 from feedsim.scenario import Machine, load
 from feedsim.structure import checked_modes
-from feedsim.tune import circles as circles_module
-from feedsim.tune import compensators as compensation
-from feedsim.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
-from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, pulse, score, tune
-from feedsim.tune.effects import compensated, effects_of, frictionless
 from identified_sets import write_set
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
@@ -76,7 +76,7 @@ def test_a_compensation_that_the_machine_has_is_taken_off_first(monkeypatch: pyt
 def test_the_law_is_that_of_the_given_archives(monkeypatch: pytest.MonkeyPatch, fmus: Path) -> None:
     scenario = load(CIRCLE)
     circles = Circles.of(scenario, PLANE, [Pair(0.005, 1.0 / 60)])
-    monkeypatch.setattr("feedsim.cosim.friction_law.fmus_directory", lambda: Path("nowhere"))
+    monkeypatch.setattr("feedsim.simulation.cosim.friction_law.fmus_directory", lambda: Path("nowhere"))
     assert set(compensation._feedforward(circles, scenario.machine, ("Z",), fmus)) == {"Z"}
 
 

@@ -15,17 +15,15 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
-from feedsim.linear.candidates import Candidates
-from feedsim.linear.judgement import judge
+from feedsim.design.tune.circles import Pair
+from feedsim.design.tune.drive import CHOSEN, HELD, SEARCHED, Limits, _Search, changed_values, least, tune_drive
+from feedsim.design.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
+from feedsim.design.tune.knobs import Knobs, matched, with_drives
+from feedsim.design.tune.proposals import axis_lag, loop_lag
+from feedsim.linear.judgement import Candidates, judge
 from feedsim.scenario import Drive, Machine, load, load_machine
 from feedsim.structure import Modes, checked_modes
 from feedsim.structure.modes import read_modes
-from feedsim.tune.circles import Pair
-from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, _Search, least, tune_drive
-from feedsim.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
-from feedsim.tune.drive_result import Limits, changed_values
-from feedsim.tune.knobs import Knobs, matched, with_drives
-from feedsim.tune.proposals import axis_lag, loop_lag
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 Z = SCENARIOS / "z_positioning.yaml"

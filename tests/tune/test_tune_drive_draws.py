@@ -12,18 +12,17 @@ import yaml
 
 from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
-from feedsim.errors import SimulationError
-from feedsim.linear.candidates import Candidates
+from feedsim.design.tune import compensators as compensation
+from feedsim.design.tune import drive
+from feedsim.design.tune.circles import Circles, Contour
+from feedsim.design.tune.drive import Limits, judges_of, margins_of
+from feedsim.design.tune.drive_program import DriveProgram
+from feedsim.design.tune.knobs import with_drives
+from feedsim.design.uncertainty import cloud_of, torque_scale, typed_on
+from feedsim.foundation.errors import SimulationError
+from feedsim.linear.judgement import Candidates
 from feedsim.scenario import load
 from feedsim.structure import Modes, checked_modes
-from feedsim.tune import compensators as compensation
-from feedsim.tune import drive
-from feedsim.tune.circles import Circles, Contour
-from feedsim.tune.drive import judges_of, margins_of
-from feedsim.tune.drive_program import DriveProgram
-from feedsim.tune.drive_result import Limits
-from feedsim.tune.knobs import with_drives
-from feedsim.uncertainty import cloud_of, torque_scale, typed_on
 from identified_sets import CIRCLE, write_set
 
 ONE = Path(__file__).resolve().parents[2] / "scenarios" / "one_axis.yaml"

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from command_helpers import feedsim
-from feedsim import cosim
 from feedsim.analysis import circularity, tasks
+from feedsim.design.uncertainty import cloud_of, curves_of, of_run
 from feedsim.scenario import load
-from feedsim.uncertainty import cloud_of, of_run
-from feedsim.uncertainty.draws import curves_of
+from feedsim.simulation import cosim
 from identified_sets import CIRCLE, write_set
 
 SHORT = ("motions.0.radius=5 mm",)

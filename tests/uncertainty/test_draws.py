@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
-from feedsim import cosim, nc
-from feedsim.errors import InputError, SimulationError
+from feedsim.design import uncertainty as drawing
+from feedsim.design.uncertainty import cloud_of, interval, of_run, on_draw, share_of, torque_scale
+from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.jobs.tune_feedforward import _open_of as open_values
 from feedsim.scenario import Friction, GmsFriction, load
 from feedsim.scenario.load import read_friction
-from feedsim.uncertainty import cloud_of, interval, of_run, share_of, torque_scale
-from feedsim.uncertainty import draws as drawing
-from feedsim.uncertainty.draws import on_draw
+from feedsim.simulation import cosim, nc
 from identified_sets import CIRCLE, VALUES, write_set
 
 
@@ -114,7 +113,7 @@ def test_a_draw_that_fails_says_so(tmp_path: Path, fmus: Path, monkeypatch: pyte
     def fail(*args: object, **named: object) -> None:
         raise SimulationError("unit Z.friction: no")
 
-    monkeypatch.setattr("feedsim.uncertainty.draws.run", fail)
+    monkeypatch.setattr("feedsim.design.uncertainty.run", fail)
     with pytest.raises(SimulationError, match=r"^draw 1 of 19 of the machine: unit Z\.friction: no"):
         of_run(nominal, cloud_of(scenario.machine), 19, progress=lambda what, done, total: None)
 

@@ -24,8 +24,7 @@ from feedsim.analysis.evaluate import (
     tasks,
 )
 from feedsim.analysis.figures import Figure, Figures, Named
-from feedsim.analysis.positioning import Approach, deviation, positioning
-from feedsim.analysis.positioning_accuracy import Accuracy
+from feedsim.analysis.positioning import Accuracy, Approach, deviation, positioning
 
 __all__ = [
     "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "ContourError", "ContourTask", "Diagnosis",

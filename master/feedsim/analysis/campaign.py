@@ -11,12 +11,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.cosim.excite import Measurement, measure, usual_rms
-from feedsim.errors import InputError
-from feedsim.nc.excitation import Excitation, binary_sequence, multisine
+from feedsim.files.trace import Trace
+from feedsim.files.trace.response import FrequencyResponse, quotient_unit
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Coupling, Machine
-from feedsim.trace import Trace
-from feedsim.trace.response import FrequencyResponse, quotient_unit
+from feedsim.simulation.cosim.excite import Measurement, measure, usual_rms
+from feedsim.simulation.nc.excitation import Excitation, binary_sequence, multisine
 
 # --- Frequency responses and coherence from time series ---------------------------------------------------------------
 # With output y, input u and, in a closed loop, the excitation r that is independent of all disturbances, cross

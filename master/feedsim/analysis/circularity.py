@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Array, Figure, column, window
-from feedsim.errors import InputError
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError
 from feedsim.motions.circular import Circular
 from feedsim.motions.setpoints import Recorded
-from feedsim.nc import Program, Segment
-from feedsim.trace import Trace
+from feedsim.simulation.nc import Program, Segment
 
 QUARTER = math.pi / 2
 
@@ -257,3 +257,22 @@ def fitted_circle(x: Array, y: Array) -> tuple[tuple[float, float], float]:
         step = np.linalg.lstsq(normal, distance - radius, rcond=None)[0]
         p, q, radius = p + step[0], q + step[1], radius + float(step[2])
     return (origin[0] + float(p), origin[1] + float(q)), radius
+
+
+# --- What a signal is made of, by frequency ---------------------------------------------------------------------------
+
+
+def amplitude_spectrum(values: Array, interval: float, rows: int | None = None) -> tuple[Array, Array]:
+    """Frequency [Hz] and amplitude spectrum of ``values`` (N,), sampled every ``interval`` [s], by Hann's window.
+
+    A sine of amplitude A on a line stands there as A. rows: of the stretches, half over each other, whose spectra are
+    averaged by power; None: one, of all rows. Stretches lose their mean.
+    """
+    size = min(rows or len(values), len(values))
+    window = np.hanning(size)
+    power = []
+    for first in range(0, len(values) - size + 1, max(size // 2, 1)):
+        part = values[first : first + size]
+        power.append((2 * np.abs(np.fft.rfft((part - np.mean(part)) * window)) / np.sum(window)) ** 2)
+    frequency = np.fft.rfftfreq(size, interval)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(np.sqrt(np.mean(power, axis=0)), dtype=np.float64)

@@ -11,15 +11,14 @@ import numpy as np
 from feedsim.analysis.circularity import Contour, Turn, circularity, contour, quadrant
 from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.analysis.figures import Array, Figure
-from feedsim.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
-from feedsim.cosim.friction_law import FrictionLaws
-from feedsim.cosim.run import run
-from feedsim.errors import InputError
-from feedsim.findings import Note, Wrong
-from feedsim.judge import JudgedRun, judged
-from feedsim.nc import Program
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import InputError, Note, Wrong
 from feedsim.scenario import CircleTest, FrictionParameters, Machine, Recording, Scenario
-from feedsim.trace import Trace
+from feedsim.simulation.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
+from feedsim.simulation.cosim.friction_law import FrictionLaws
+from feedsim.simulation.cosim.run import run
+from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.nc import Program
 
 # --- What a friction compensation leaves on a circle: with errors in it, and on a machine that is another one ---------
 
@@ -250,8 +249,8 @@ def compensate(
     Args:
         frictions: axis -> parameters for the compensation; the machine's own for the other axes. The machine keeps its
             friction.
-        delays: axis -> delay [s] of the feedforward; by :func:`feedsim.cosim.feedforward.lag_of` for the other axes.
-        table: with the runs that show what errors cost, and what the compensation does on `machines`.
+        delays: axis -> delay [s] of the feedforward; by :func:`feedsim.simulation.cosim.feedforward.lag_of` for the
+        other axes. table: with the runs that show what errors cost, and what the compensation does on `machines`.
         machines: words, behind "with" -> changed machines of the same axes.
         fmus: folder of the archives.
         progress: called with (what is done, cycles done, cycles in all).

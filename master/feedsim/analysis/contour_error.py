@@ -18,18 +18,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import cosim
 from feedsim.analysis.figures import Array, Figure, column
-from feedsim.cosim import Run
-from feedsim.cosim.loop import Progress
-from feedsim.fields import Quantity
+from feedsim.files.fields import Quantity
+from feedsim.files.trace import Trace
+from feedsim.motions.part_program.moves import Motion
+from feedsim.motions.planner.nearest import Feet
 from feedsim.motions.program import Programmed
-from feedsim.nc import Program, Segment
-from feedsim.part_program.moves import Motion
-from feedsim.path.nearest import Feet
 from feedsim.scenario import Drive, ForeignUnit, Machine
-from feedsim.scenario.parameter_group import ParameterGroup
-from feedsim.trace import Trace
+from feedsim.scenario.axis_units import ParameterGroup
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim import Run
+from feedsim.simulation.cosim.loop import Progress
+from feedsim.simulation.nc import Program, Segment
 
 Integers = NDArray[np.int64]
 

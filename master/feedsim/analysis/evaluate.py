@@ -24,11 +24,9 @@ from feedsim.analysis.circularity import (
 )
 from feedsim.analysis.contour_error import ContourError, contour_error
 from feedsim.analysis.figures import Array, Figure
-from feedsim.analysis.positioning import MIN_REST_TIME, Approach, positioning
-from feedsim.analysis.positioning_accuracy import Accuracy, readings
-from feedsim.cosim.plant import plant_modes
-from feedsim.errors import InputError
-from feedsim.findings import Note
+from feedsim.analysis.positioning import MIN_REST_TIME, Accuracy, Approach, positioning, readings
+from feedsim.files.trace import Trace, matches
+from feedsim.foundation.errors import InputError, Note
 from feedsim.linear.loops import measuring_error, position_reference
 from feedsim.linear.system import LinearSystem
 from feedsim.motions.circular import Circular
@@ -36,9 +34,9 @@ from feedsim.motions.move import Straight
 from feedsim.motions.positioning_cycle import Visits
 from feedsim.motions.program import Programmed
 from feedsim.motions.setpoints import Recorded
-from feedsim.nc import Program, Segment
 from feedsim.scenario import CircleTest, ContourTest, Machine, Positioning, PositioningAccuracy, Scenario
-from feedsim.trace import Trace, matches
+from feedsim.simulation.cosim.plant import plant_modes
+from feedsim.simulation.nc import Program, Segment
 
 # --- Figures that need more of a circle than its radii: why it is not round, and both directions together -------------
 # Definitions: docs/figures.md. Here recorded turns meet feedsim.analysis.circle, which takes them apart.

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError, UnknownName
-from feedsim.trace import Trace
-from feedsim.trace.trace import suggest
+from feedsim.files.trace import Trace
+from feedsim.files.trace.trace import suggest
+from feedsim.foundation.errors import InputError, UnknownName
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class Named(dict[str, Figure]):
 
     >>> Named({"Z.overshoot": Figure(3.1, "um", "")})["Z.overshot"]
     Traceback (most recent call last):
-    feedsim.errors.UnknownName: no figure 'Z.overshot'; did you mean 'Z.overshoot'?
+    feedsim.foundation.errors.UnknownName: no figure 'Z.overshot'; did you mean 'Z.overshoot'?
     """
 
     def __missing__(self, name: str) -> Figure:

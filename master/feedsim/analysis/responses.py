@@ -15,14 +15,13 @@ from feedsim.analysis import linear
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.truncation import Truncation
-from feedsim.errors import InputError
-from feedsim.findings import Note
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.files.trace.response_files import read_overlay
+from feedsim.foundation.errors import InputError, Note
 from feedsim.linear.loops import figure_key, response, unit_of
 from feedsim.linear.plant import Floats
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
-from feedsim.trace.response import FrequencyResponse
-from feedsim.trace.response_files import read_overlay
 
 # Measured responses are held against the closed form where they are known.
 COHERENT, COMPARED = 0.99, (5.0, 500.0)
@@ -105,8 +104,8 @@ def zero_notes(closed: FrequencyResponse) -> list[Note]:
 def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
     """Curves of a file that are to be laid over, and warnings.
 
-    text: as feedsim.trace.response_files.read_overlay takes it. known: responses that are shown; a file read as a whole
-    may hold more.
+    text: as feedsim.files.trace.response_files.read_overlay takes it. known: responses that are shown; a file read as a
+    whole may hold more.
 
     Raises:
         InputError: what the reader refuses, a file without any of the known responses, a unit of another dimension.

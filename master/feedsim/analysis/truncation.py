@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from feedsim.analysis.figures import Figure
-from feedsim.errors import InputError
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.foundation.errors import InputError
 from feedsim.linear import loops
 from feedsim.linear.plant import TOOL_DIRECTIONS, Floats, ModalPlant
 from feedsim.scenario.structure import Structure
 from feedsim.structure import Modes
 from feedsim.structure.build import assemble
 from feedsim.structure.solve import solve
-from feedsim.trace.response import FrequencyResponse
 
 # What lies within this share of the cut-off is the reduced model's own; next to it, the dropped modes show.
 TRUSTED = 0.9

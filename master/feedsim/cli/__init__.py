@@ -30,7 +30,7 @@ from feedsim.cli.terminal import (
     shown_streams,
     watching,
 )
-from feedsim.signals import end_program
+from feedsim.foundation.owned import end_program
 
 EPILOG = """exit codes:
   0 done    1 internal error, or with --strict a result that is WRONG    2 bad input or usage
@@ -61,7 +61,7 @@ class _Version(argparse.Action):
         super().__init__(nargs=0, **words)
 
     def __call__(self, parser: argparse.ArgumentParser, *given: object) -> None:
-        from feedsim.installation import version
+        from feedsim.foundation.installation import version
 
         print(f"feedsim {version('feedsim') or '(run from its sources, not installed)'}")
         parser.exit()
@@ -88,8 +88,8 @@ def _main(given: Sequence[str]) -> int:
     # To look for plugins of pydantic, it reads what all installed packages say of themselves; none is used here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
-    from feedsim.errors import FeedsimError
-    from feedsim.extras import missing
+    from feedsim.foundation.errors import FeedsimError
+    from feedsim.foundation.installation import missing
 
     try:
         code = _done(command, options)
@@ -130,9 +130,9 @@ def _code(command: Command, code: int) -> int:
 
 def _done(command: Command, options: argparse.Namespace) -> int:
     """Do what the command asks for, and print what came out."""
-    from feedsim.arguments import as_options
-    from feedsim.extras import ask
-    from feedsim.outputs import replacing
+    from feedsim.foundation.arguments import as_options
+    from feedsim.foundation.installation import ask
+    from feedsim.foundation.outputs import replacing
 
     ask(options.called, *command.declared.needs, *(["figures"] if getattr(options, "figures", ()) else []))
     refuse_missing_files(command, options)

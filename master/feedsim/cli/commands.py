@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
-from feedsim.errors import InputError, nearest, no_such_file
+from feedsim.foundation.errors import InputError, nearest, no_such_file
 from feedsim.jobs.parameters import COMMANDS, Argument, Declaration, Option, Parameter, declared
 
 GROUPS = {
@@ -283,8 +283,8 @@ def _words(parameter: Parameter, option: Option) -> tuple[list[str], dict[str, A
 
 def _kinds(text: str) -> tuple[str, ...]:
     """Kinds of files of figures."""
-    from feedsim.arguments import listed
-    from feedsim.report.picture import PICTURE_FORMATS
+    from feedsim.foundation.arguments import listed
+    from feedsim.report.content import PICTURE_FORMATS
 
     asked = listed(text)
     if not asked or any(kind not in PICTURE_FORMATS for kind in asked):

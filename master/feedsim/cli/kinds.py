@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feedsim.errors import InputError
 from feedsim.files.regular import json_file
+from feedsim.foundation.errors import InputError
 
 NO_RECORD = "a folder of results without a record (result.csv)"
 # Kind of a summary -> the command that makes it, where they differ.

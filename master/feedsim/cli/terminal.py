@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, TextIO
 from unicodedata import category
 
-from feedsim.findings import WRONG, Note, ranked, severity
-from feedsim.jobs.watch import Watch
+from feedsim.foundation.errors import WRONG, Note, ranked, severity
+from feedsim.jobs.result import Watch
 
 STANDARD_OUTPUT = "standard output"  # what an error calls it
 
@@ -258,7 +258,7 @@ def _plain_lines(result: Any) -> list[str]:
         return ["all there already"]
     if isinstance(result[0], Path):
         return [visible(str(path)) for path in result]
-    from feedsim.examples import table
+    from feedsim.jobs.examples import table
 
     return table(result)
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from feedsim.errors import InputError
 from feedsim.estimation.least_squares import LeastSquares, Model
 from feedsim.estimation.parameter import Array, Parameter, Prior
+from feedsim.foundation.errors import InputError
 
 # A direction of the scaled parameters that the residuals answer to this much less than to the strongest one determines
 # nothing: below it lies the error of the differences that the Jacobian is made of.

@@ -9,7 +9,7 @@ from math import exp, inf, isfinite, log
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -4,27 +4,66 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
     Field,
+    PlainValidator,
     PrivateAttr,
+    StrictBool,
     StrictFloat,
     StrictInt,
     StrictStr,
     ValidationInfo,
+    WithJsonSchema,
     field_validator,
 )
 from pydantic import model_validator as whole
 
-from feedsim import units
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, Model, Quantity, fault
-from feedsim.files.checked import checked, read_group
+from feedsim.files.checked import checked, read_checked, read_group
+from feedsim.files.fields import AxisName, Model, Quantity, brief, fault
 from feedsim.files.source import Place
-from feedsim.files.spellings import spelled
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
+
+# --- Units as drives and people spell them ----------------------------------------------------------------------------
+
+
+# What drives write that is no unit of its own: a whole unit -> the unit, and what to know about it.
+SPELLINGS: dict[str, str] = {
+    "increment": "1", "increments": "1", "inc": "1", "incs": "1", "count": "1", "counts": "1", "digits": "1",
+    "inch": "in", "inches": "in", "turn": "rev", "turns": "rev", "revs": "rev", "revolutions": "rev",
+    "r/min": "rpm", "u/min": "rpm", "upm": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
+    "a rms": "A", "arms": "A", "a(rms)": "A", "a_rms": "A", "aeff": "A", "a eff": "A",
+}  # fmt: skip
+RMS = ("a rms", "arms", "a(rms)", "a_rms", "aeff", "a eff")
+
+
+def spelled(unit: str) -> str:
+    """A unit as drives write it in the spelling of feedsim.foundation.units: "U/min" is rpm, "increments" a plain
+    number."""
+    return SPELLINGS.get(" ".join(unit.split()).lower(), unit)
+
+
+def is_rms(unit: str) -> bool:
+    """Whether a unit says that a current is an effective value."""
+    return " ".join(unit.split()).lower() in RMS
+
+
+def known_unit(unit: str) -> bool:
+    """Whether text is a unit at all."""
+    try:
+        units.unit(spelled(unit))
+    except InputError:
+        return False
+    return True
+
+
+# --- Mapping files: which columns of a recorded drive trace are what, in which unit and with which sign ---------------
+
 
 # role -> units of the dimensions that its values may have, the usual one first
 DIMENSIONS: dict[str, tuple[str, ...]] = {
@@ -271,3 +310,80 @@ def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place
         return
     if getattr(signal, "at", None) == "scale" and target.startswith("rad"):
         yield (role, "at"), "the values are angles, which are the motor's; a scale measures lengths"
+
+
+# --- Tolerance files: how far a result may be from a reference, per variable in value and in time ---------------------
+
+
+Time = Annotated[float, Quantity("s", minimum=0, example="1 ms")]
+EXAMPLE = "2 nm, or 1e-3 for a thousandth of the reference's range"
+
+
+def _amount(value: Any) -> tuple[float, str]:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise fault(f"{brief(value)} is no tolerance; write for example {EXAMPLE}")
+    if not isinstance(value, str):
+        number, unit = float(value) if abs(value) < 1e308 else inf, ""
+    else:
+        match = re.fullmatch(rf"\s*({units.NUMBER})\s*(.*)", value, re.DOTALL)
+        if not match:
+            raise fault(f"{value!r} is no tolerance; write for example {EXAMPLE}")
+        number, unit = float(match[1]), match[2].strip()
+        if unit == "%":
+            number, unit = number / 100, ""
+        try:
+            units.unit(unit or "1")
+        except InputError as error:
+            raise fault(f"{value!r}: {error}") from None
+    if not (isfinite(number) and number >= 0):
+        raise fault(f"{value} is outside the allowed range: 0 or more")
+    return number, unit
+
+
+# A number (share of the range), or a number with any unit; becomes (value, unit), unit "" for a share.
+_TEXT = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2 nm", "0.1 %"]}
+_NUMBER = {"type": "number", "minimum": 0}
+Amount = Annotated[tuple[float, str], PlainValidator(_amount), WithJsonSchema({"anyOf": [_NUMBER, _TEXT]})]
+
+
+class VariableTolerance(Model):
+    """Tolerance of the variables of a pattern; what is left out is that of an earlier pattern, else of the file."""
+
+    value: Amount | None = Field(
+        default=None, description="In value: 2 nm; a bare number is a share of the reference's range"
+    )
+    time: Time | None = Field(default=None, description="In time: 1 ms")
+    hold: StrictBool | None = Field(
+        default=None,
+        description="Whether values hold between rows instead of running straight to the next; left out: where the "
+        "reference is 0 and 1 alone",
+    )
+    ignore: Literal[True] | None = Field(default=None, description="Not compared at all")
+
+    @whole(mode="before")
+    @classmethod
+    def _in_short(cls, value: Any) -> Any:
+        if value == "ignore":
+            return {"ignore": True}
+        if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+            return {"value": value}
+        return value
+
+
+class ToleranceFile(Model):
+    """A tolerance file."""
+
+    name: StrictStr = Field(default="", description="Name in reports")
+    note: StrictStr = Field(default="", description="Why the tolerances are what they are")
+    value: Amount | None = Field(
+        default=None, description="In value, of all variables: a share of the reference's range"
+    )
+    time: Time | None = Field(default=None, description="In time, of all variables")
+    variables: dict[StrictStr, VariableTolerance] = Field(
+        default={}, description="Pattern of names (*.x_a) -> tolerance; later ones count more"
+    )
+
+
+def load_tolerances(path: str | Path) -> ToleranceFile:
+    """Read and check a tolerance file. InputError lists every problem with file and line."""
+    return read_checked(path, ToleranceFile)

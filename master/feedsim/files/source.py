@@ -16,8 +16,8 @@ from typing import Any
 
 import yaml
 
-from feedsim.errors import InputError
 from feedsim.files.regular import content
+from feedsim.foundation.errors import InputError
 
 Place = tuple[str | int, ...]
 

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from feedsim import analysis, judge
-from feedsim.arguments import spelt
-from feedsim.errors import InputError
+from feedsim import analysis
 from feedsim.files.source import is_study
-from feedsim.findings import severity
+from feedsim.foundation.arguments import spelt
+from feedsim.foundation.errors import InputError, severity
 from feedsim.jobs.parameters import Archives, Argument, File, MachineChoice, Option, Settings, job
+from feedsim.jobs.result import NO_WATCH, Watch, announce
 from feedsim.jobs.subject import on_machine, opened
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.scenario import Scenario
+from feedsim.simulation import judge
 
 if TYPE_CHECKING:
+    from feedsim.design.sweep import Design
     from feedsim.scenario.study import Study
-    from feedsim.sweep import Design
 
 
 @dataclass(frozen=True)
@@ -103,9 +103,9 @@ def _study(
     file: Path, changes: list[str], runs: int | None, trial: bool, row: int | None, fmus: Path | None, watch: Watch
 ) -> Checked:
     """A study, its scenario, and a run from the middle; with `trial` some that are made; or the command of one run."""
+    from feedsim.design.sweep import design
+    from feedsim.design.sweep import trial as trials
     from feedsim.scenario.study import load_study
-    from feedsim.sweep import design
-    from feedsim.sweep import trial as trials
 
     if trial and row is not None:
         raise InputError(f"{spelt('trial')} and {spelt('row')} {row}: one of them; a row is not made, but named")
@@ -136,8 +136,8 @@ def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
 
 def _trial(study: Study, planned: Design, fmus: Path | None) -> Checked:
     """What the study is, and how long it would take by the durations of some runs."""
-    from feedsim.sweep.table import chosen
-    from feedsim.sweep.trial import trial
+    from feedsim.design.sweep.table import chosen
+    from feedsim.design.sweep.trial import trial
 
     lines = [f"{study.name}: {planned.runs} runs ({study.sampling.method}) of {study.scenario}"]
     for i, parameter in enumerate(planned.parameters):

@@ -13,13 +13,12 @@ from feedsim.analysis.circle import diagnose, further
 from feedsim.analysis.circle.changed import Change
 from feedsim.analysis.circle.records import SAME_FEED, RecordedCircle, read_circle
 from feedsim.analysis.circularity import axis_letters
-from feedsim.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
-from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
+from feedsim.foundation.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.report.circle import report as page
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.report import circle as page
 from feedsim.report.content import Report
 from feedsim.report.page import sheet_html
 from feedsim.report.results import Content

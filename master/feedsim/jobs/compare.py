@@ -11,29 +11,29 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from feedsim import units
-from feedsim.arguments import Value, amount, spelt
-from feedsim.compare.between import bounds_of
-from feedsim.compare.compare import compare as compared
-from feedsim.compare.files import compare_series, lines_of, pairs_of, tolerances_of, unusable
-from feedsim.compare.likeness import Comparison, Variable, Verdict
-from feedsim.compare.options import Options, no_match
-from feedsim.compare.shift import estimated_shift
-from feedsim.compare.tolerance import Tolerances
-from feedsim.errors import InputError
+from feedsim.comparison.between import bounds_of
+from feedsim.comparison.compare import compare as compared
+from feedsim.comparison.files import compare_series, lines_of, pairs_of, tolerances_of, unusable
+from feedsim.comparison.likeness import Comparison, Variable, Verdict
+from feedsim.comparison.options import Options, no_match
+from feedsim.comparison.shift import estimated_shift
+from feedsim.comparison.tolerance import Tolerances
+from feedsim.files.trace import Series, Trace, as_series, read_series
+from feedsim.foundation import units
+from feedsim.foundation.arguments import Value, amount, spelt
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.outputs import forced, replacing
 from feedsim.jobs.parameters import Argument, Force, Option, job
 from feedsim.jobs.result import Result
-from feedsim.outputs import forced, replacing
-from feedsim.report.compare import report as page
+from feedsim.report import compare as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content
-from feedsim.trace import Series, Trace, as_series, read_series
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
-    from feedsim.cosim import Run
+    from feedsim.files.trace import Array
     from feedsim.jobs.run import RunResult
-    from feedsim.trace import Array
+    from feedsim.simulation.cosim import Run
 
 File = str | Path
 # What a record's signals are called here, and their units.
@@ -461,8 +461,8 @@ def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | No
 
     Between the pieces of a record with gaps stands a row without numbers, so that nothing is compared there.
     """
+    from feedsim.estimation.identify.read import read_records
     from feedsim.files.columns import load_columns
-    from feedsim.identify.read import read_records
     from feedsim.scenario import load_subject
 
     subject = load_subject(machine) if machine is not None else None

@@ -9,21 +9,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from feedsim import cosim
 from feedsim.analysis import Figure, Named
-from feedsim.analysis.alignment import aligned
-from feedsim.analysis.side_by_side import Source, differing, named_apart, read_sources
-from feedsim.errors import InputError
+from feedsim.analysis.side_by_side import Source, aligned, differing, named_apart, read_sources
+from feedsim.design.sweep.bundle import case, scenario_of
 from feedsim.files.columns import Columns, load_columns
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
 from feedsim.jobs.run import RunResult
-from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.judge import judged
-from feedsim.owned import TemporaryFolder
+from feedsim.report import show as page
 from feedsim.report.content import Report
-from feedsim.report.show import report as page
-from feedsim.sweep.case import case, scenario_of
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import judged
 
 Shown = str | Path | RunResult
 

@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from feedsim import cosim, judge, nc, scenario, ssp, units
+from feedsim import scenario
 from feedsim.analysis import check
-from feedsim.arguments import Changes, Pairs, Value, by_name, listed, pairs, settings, spelt
-from feedsim.cosim.one_unit import UNIT, pack_whole
-from feedsim.errors import InputError
 from feedsim.files.source import is_ssp
+from feedsim.foundation import units
+from feedsim.foundation.arguments import Changes, Pairs, Value, by_name, listed, pairs, settings, spelt
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.outputs import archive_with, begins_with, same
+from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.machine import positions
 from feedsim.jobs.parameters import (
     Archives,
@@ -26,29 +28,26 @@ from feedsim.jobs.parameters import (
     job,
     out_file,
 )
-from feedsim.jobs.result import Kind, Made
+from feedsim.jobs.result import NO_WATCH, Kind, Made, Watch, announce_archive
 from feedsim.jobs.subject import on_machine
-from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
-from feedsim.judge import judged
-from feedsim.outputs import archive_with, begins_with, same
-from feedsim.owned import TemporaryFolder
-from feedsim.page.content import content
-from feedsim.page.html import MARK, page
+from feedsim.report.live_page.content import content
+from feedsim.report.live_page.html import MARK, page
 from feedsim.report.provenance import input_paths
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.described import load_described
-from feedsim.scenario.load import load
-from feedsim.scenario.structure.load import load_structure
-from feedsim.ssp import Exported
-from feedsim.ssp.archive import STRUCTURE
+from feedsim.scenario.load import load, load_described
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.simulation import cosim, judge, nc, ssp
+from feedsim.simulation.cosim.whole import UNIT, pack_whole
+from feedsim.simulation.judge import judged
+from feedsim.simulation.ssp import Exported
+from feedsim.simulation.ssp.archive import STRUCTURE
 from feedsim.structure import checked_modes
 from feedsim.structure import pack as archive
 from feedsim.structure.build import build
 from feedsim.structure.geometry.assemble import movable
 from feedsim.structure.modes import read_modes, write_modes
 from feedsim.structure.mounts import MOUNTS_FILE, table_of, write_mounts
-from feedsim.structure.poses import grid_axis, pose_grid
-from feedsim.structure.poses_file import GridAxis, write_poses
+from feedsim.structure.poses import GridAxis, grid_axis, pose_grid, write_poses
 from feedsim.structure.table_check import table_mismatch
 
 # Ending of the file -> the options that it has besides those of all.

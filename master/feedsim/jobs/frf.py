@@ -11,10 +11,10 @@ from feedsim.analysis import Figure, Named, linear, responses, truncation
 from feedsim.analysis.campaign import Plan, run_campaign
 from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
 from feedsim.analysis.truncation import Truncation
-from feedsim.arguments import Band, Value, between, listed, quantity, settings, spelt
-from feedsim.cosim.plant import plant_modes
-from feedsim.errors import FeedsimError, InputError
-from feedsim.findings import severity
+from feedsim.files.trace import Array
+from feedsim.files.trace.response import Complexes, FrequencyResponse
+from feedsim.foundation.arguments import Band, Value, between, listed, quantity, settings, spelt
+from feedsim.foundation.errors import FeedsimError, InputError, severity
 from feedsim.jobs.parameters import (
     Archives,
     FigureKinds,
@@ -26,18 +26,16 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
-from feedsim.judge.run import control as control_findings
+from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content
 from feedsim.scenario import Coupling, Machine, Subject, load_subject
-from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.structure.checks import load_structure
+from feedsim.simulation.cosim.plant import plant_modes
+from feedsim.simulation.judge import control as control_findings
 from feedsim.structure.table_check import table_mismatch
-from feedsim.trace import Array
-from feedsim.trace.response import Complexes, FrequencyResponse
 
 REALISATIONS_WITH_FRICTION = 4
 DEFAULT_LOWEST, DEFAULT_HIGHEST = 1.0, 1000.0  # [Hz]; the band where none is given

@@ -16,25 +16,23 @@ import numpy as np
 
 from feedsim.analysis import Figure, Named
 from feedsim.analysis.history import Array, Scatter, Series, changes, crossing, scatter
-from feedsim.arguments import Pairs, Value, amount, given, listed, pairs, settings, spelt
-from feedsim.errors import InputError, few, nearest
+from feedsim.estimation.identify.friction_file import fleet_yaml
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.files.regular import json_file
-from feedsim.findings import Note
-from feedsim.identify.friction_file import fleet_yaml
+from feedsim.files.trace.trace import MAX_MAGNITUDE
+from feedsim.foundation.arguments import Pairs, Value, amount, given, listed, pairs, settings, spelt
+from feedsim.foundation.errors import InputError, Note, few, nearest
+from feedsim.foundation.outputs import read_rows
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
 from feedsim.jobs.run import run
 from feedsim.jobs.subject import load
-from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.report import history as page
 from feedsim.report.content import Report
-from feedsim.report.history import report as page
-from feedsim.report.history.report import Entry, Followed, History
+from feedsim.report.history import Entry, Followed, History
 from feedsim.report.results import SUMMARY, Content
 from feedsim.scenario import Friction, GmsFriction
 from feedsim.scenario.roles import GMS
-from feedsim.sheets import read_rows
-from feedsim.trace.trace import MAX_MAGNITUDE
 
 FORM = "YYYY-MM-DD or YYYY-MM-DDThh:mm"
 COMPENSATIONS = ("friction_pulse", "friction_table")  # groups of a drive that compensate friction

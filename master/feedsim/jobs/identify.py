@@ -9,25 +9,24 @@ from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
 
-from feedsim import cosim
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
-from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.errors import InputError
+from feedsim.estimation.identify import STAGES, Asked, Estimate, Identification, Identified, named_apart, read_traces
+from feedsim.estimation.identify.friction_file import FRICTION_FILE, read_fleet
+from feedsim.estimation.identify.parameters import PARAMETER_KINDS
+from feedsim.estimation.identify.stages import identify as identified_from
 from feedsim.estimation.parameter import Prior
 from feedsim.files.columns import load_columns
-from feedsim.identify import STAGES, Asked, Estimate, Identification, Identified, named_apart, read_traces
-from feedsim.identify.friction_file import FRICTION_FILE, read_fleet
-from feedsim.identify.parameters import PARAMETER_KINDS
-from feedsim.identify.stages import identify as identified_from
+from feedsim.foundation.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
 from feedsim.report import identify as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content
 from feedsim.scenario import Friction, load_subject
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 ESTIMATE = "estimate"  # of inertia and delay: whatever mapping and machine say
 AXIS = "{axis}"  # in the name of a folder: the axis, in small letters

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Value, quantity, spelt
-from feedsim.errors import InputError
+from feedsim.estimation.replay.identified import identify_drives
+from feedsim.estimation.replay.machine_files import MOST_MODES
+from feedsim.foundation.arguments import Value, quantity, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
     Archives,
     ControlName,
@@ -28,10 +30,7 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
-from feedsim.replay.elastic import MOST_MODES
-from feedsim.replay.identified import identify_drives
+from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
 from feedsim.report.content import Report
 from feedsim.report.replay import drive as page
 from feedsim.report.replay.drive import DriveReport
@@ -160,7 +159,7 @@ def identify_drive(
     >>> import feedsim as fs
     >>> fs.identify_drive("log.csv", "Z", "machines/nowhere")
     Traceback (most recent call last):
-    feedsim.errors.InputError: no such file: machines/nowhere
+    feedsim.foundation.errors.InputError: no such file: machines/nowhere
     """
     asked = Asked.of(record, machine, axes, columns, window, set)
     path = asked.recording.path

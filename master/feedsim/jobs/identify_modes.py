@@ -8,21 +8,20 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Band, Value, between, quantity, settings, spelt
-from feedsim.errors import InputError
-from feedsim.fields import no_axis
+from feedsim.estimation.modal.measured import Channel, from_responses, from_signals
+from feedsim.estimation.modal.rational import MOST_MODES, AxisModes
+from feedsim.estimation.modal.rational import identify_modes as identified
+from feedsim.files.fields import no_axis
+from feedsim.files.trace.response_files import read_response
+from feedsim.foundation.arguments import Band, Value, between, quantity, settings, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.modal.measured import Channel, from_responses, from_signals
-from feedsim.modal.rational import MOST_MODES, AxisModes
-from feedsim.modal.rational import identify_modes as identified
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.report import modal as page
 from feedsim.report.content import Report
-from feedsim.report.modal import report as page
 from feedsim.report.results import Content
 from feedsim.scenario import Machine, load_subject
 from feedsim.structure import checked_modes
-from feedsim.trace.response_files import read_response
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,7 +134,7 @@ def identify_modes(
     >>> import feedsim as fs
     >>> fs.identify_modes("z_positioning.yaml", "machines/test_centre", "B")
     Traceback (most recent call last):
-    feedsim.errors.InputError: axes B: the machine has no axis 'B'; it has X, Y, Z
+    feedsim.foundation.errors.InputError: axes B: the machine has no axis 'B'; it has X, Y, Z
     """
     texts = settings(set)
     subject = load_subject(machine, texts)

@@ -12,8 +12,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Value, lengths, pairs, quantity, spelt
-from feedsim.errors import InputError
+from feedsim.foundation.arguments import Value, lengths, pairs, quantity, spelt
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.outputs import begins_with, forced, replacing
 from feedsim.jobs.parameters import (
     AxisPositions,
     CouplingStep,
@@ -27,17 +28,14 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.outputs import begins_with, forced, replacing
-from feedsim.report.content import Report
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.report.content import PICTURE_FORMATS, Report
 from feedsim.report.machine import record as shown
-from feedsim.report.picture import PICTURE_FORMATS
 from feedsim.report.provenance import to_json
 from feedsim.report.results import Content, check_place, write_results, write_text
-from feedsim.scenario.described import Described, load_described
+from feedsim.scenario.load import Described, load_described
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.parts import GeometryStructure
 from feedsim.structure.build import build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
 from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
@@ -431,7 +429,7 @@ def _listed(modes: int | str | None) -> int | None:
 
 def _mode(asked: int | str, modes: Modes) -> int:
     """Number of the mode that is meant."""
-    from feedsim import units
+    from feedsim.foundation import units
 
     count, text = len(modes.frequency), str(asked)
     option = f"{spelt('mode')} {text}"

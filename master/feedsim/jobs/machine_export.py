@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import listed, pairs, spelt
-from feedsim.control import names_of
-from feedsim.control.archive import Archive
-from feedsim.control.reading import Value
-from feedsim.control.writing import Written, changed
-from feedsim.errors import InputError
+from feedsim.files.control import names_of
+from feedsim.files.control.archive import Archive
+from feedsim.files.control.reading import Value
+from feedsim.files.control.writing import Written, changed
+from feedsim.foundation.arguments import listed, pairs, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.machine_import import assumed, axes_of, inputs_of, read_files
 from feedsim.jobs.parameters import (
     Argument,
@@ -28,8 +28,7 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
 from feedsim.report.content import Report
 from feedsim.report.control_files import exported as page
 from feedsim.report.results import Content

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import listed, pairs, spelt
-from feedsim.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
-from feedsim.control.formats import opened
-from feedsim.control.reading import Reading, read
-from feedsim.errors import InputError, no_such_file
+from feedsim.files.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
+from feedsim.files.control.formats import opened
+from feedsim.files.control.reading import Reading, read
 from feedsim.files.regular import content
+from feedsim.foundation.arguments import listed, pairs, spelt
+from feedsim.foundation.errors import InputError, no_such_file
 from feedsim.jobs.parameters import (
     Argument,
     AssumedValues,
@@ -29,8 +29,7 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
 from feedsim.report.content import Report
 from feedsim.report.control_files import imported as page
 from feedsim.report.results import Content

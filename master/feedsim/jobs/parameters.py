@@ -19,7 +19,7 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from feedsim.arguments import Call, Changes, Pairs, Value, calling, settings
+from feedsim.foundation.arguments import Call, Changes, Pairs, Value, calling, settings
 
 F = TypeVar("F", bound=Callable[..., Any])
 File = str | Path
@@ -110,7 +110,7 @@ COMMANDS = {
     "tune drive": "jobs.tune_drive:tune_drive",
     "tune compensation": "jobs.tune_compensation:tune_compensation",
     "tune feedforward": "jobs.tune_feedforward:tune_feedforward",
-    "tune proposals": "jobs.tune_proposals:tune_proposals",
+    "tune proposals": "jobs.tune_drive:tune_proposals",
     "diff": "jobs.diff:diff",
     "history": "jobs.history:history",
     "compare": "jobs.compare:compare",
@@ -243,7 +243,7 @@ def out_file(value: str, help: str) -> Option:
 
 def _shown(template: str) -> str:
     """A name of a folder as the help shows it: "circle_{records}" is circle_RECORDS."""
-    return re.sub(r"{(\w+)}", lambda found: found[1].upper(), template)
+    return re.sub(r"{(\w+)}", lambda match: match[1].upper(), template)
 
 
 def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from feedsim.arguments import Changes, given, listed, settings, spelt
-from feedsim.errors import InputError, few
-from feedsim.fields import no_axis
+from feedsim.estimation.identify import Recorded
+from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.replay.closed_loop import window as window_of
 from feedsim.files.columns import Columns, load_columns
-from feedsim.findings import Note
-from feedsim.identify import Recorded
+from feedsim.files.fields import no_axis
+from feedsim.files.trace import Mark, Recording, read_recording
+from feedsim.foundation.arguments import Changes, given, listed, settings, spelt
+from feedsim.foundation.errors import InputError, Note, few
 from feedsim.jobs.parameters import File
-from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
-from feedsim.replay.window import window as window_of
 from feedsim.scenario import Machine, Subject, load_subject
-from feedsim.trace import Mark, Recording, read_recording
 
 MOST_NAMED = 20  # columns that a note names
 

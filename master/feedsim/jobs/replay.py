@@ -9,6 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from feedsim.analysis import Figure, Named
+from feedsim.design.tune import Proposal
+from feedsim.design.tune.proposals import of_drives
+from feedsim.estimation.replay.compare import replayed
+from feedsim.estimation.replay.open_loop import driven
+from feedsim.files.trace import Trace, write_csv
 from feedsim.jobs.parameters import (
     Archives,
     ControlName,
@@ -25,19 +30,13 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
-from feedsim.replay.compare import replayed
-from feedsim.replay.open_loop import driven
+from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
 from feedsim.report.content import Report
 from feedsim.report.replay import report as page
 from feedsim.report.replay.report import Replayed
 from feedsim.report.results import Content
 from feedsim.scenario import Drive, Machine
 from feedsim.structure import checked_modes
-from feedsim.trace import Trace, write_csv
-from feedsim.tune import Proposal
-from feedsim.tune.proposals import of_drives
 
 
 @dataclass(frozen=True, eq=False, repr=False)

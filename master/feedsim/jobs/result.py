@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,21 +11,80 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from feedsim.arguments import Call, call, calling
-from feedsim.errors import InputError, OutputError
-from feedsim.findings import severity
+from feedsim.files.trace.files import written_whole
+from feedsim.foundation.arguments import Call, call, calling
+from feedsim.foundation.errors import InputError, OutputError, severity
+from feedsim.foundation.outputs import check_file, forced, replacing
+from feedsim.foundation.owned import claimed
 from feedsim.jobs.parameters import File
-from feedsim.jobs.watch import Watch
-from feedsim.outputs import check_file, forced, replacing
-from feedsim.owned import claimed
-from feedsim.report.content import Report
+from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
-from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, replaced, write_report
-from feedsim.trace.files import written_whole
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
+    from feedsim.scenario import Coupling, Machine
+
+
+# --- Who watches a job: hears how far it is, and what is to be known before it begins ---------------------------------
+
+
+class Watch:
+    """Nobody: every word is lost. The command line has one that shows them.
+
+    command: the command line that was given, for records; empty in Python.
+
+    >>> Watch().progress("reading", 1, 3)
+    """
+
+    command: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
+    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
+        """`done` of `total` steps of `what`; before: steps that an earlier call of the job has done."""
+
+    def of(self, what: str) -> Callable[[int, int], None]:
+        """The same for work that reports (done, total) and not what it is."""
+        return lambda done, total: self.progress(what, done, total)
+
+    def announce(self, sentence: str) -> None:
+        """Whose programs the job executes besides those of feedsim."""
+
+    def note(self, sentence: str) -> None:
+        """What the job will replace."""
+
+    def warn(self, findings: Iterable[str]) -> None:
+        """What is the matter with the files that the job begins with."""
+
+    def say(self, sentence: str) -> None:
+        """What takes longer, and why."""
+
+
+NO_WATCH = Watch()
+
+
+def announce(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> None:
+    """Announce the programs that a run of the machine executes besides those of feedsim.
+
+    coupling: of the run, where a scenario has it.
+    """
+    from feedsim.simulation import cosim
+
+    for sentence in cosim.executed(machine, fmus, coupling):
+        watch.announce(sentence)
+
+
+def announce_archive(watch: Watch, path: Path | None, who: str) -> None:
+    """The same of one archive that a user names, for the part that it plays; None: a shipped one."""
+    from feedsim.simulation import cosim
+
+    for sentence in cosim.executing(path, who) if path is not None else ():
+        watch.announce(sentence)
+
+
+# --- What every job returns: figures, findings, answers, a report and its files ---------------------------------------
 
 
 NOTEBOOK_HEIGHT = 900  # [px] of a report in a notebook; it scrolls
@@ -166,7 +225,7 @@ def in_words_of(control: str) -> AbstractContextManager[None]:
     """Reports in the names of a control; without one their code is not loaded."""
     if not control:
         return nullcontext()
-    from feedsim.report.control import control_names
+    from feedsim.report.changes import control_names
 
     return control_names(control)
 

@@ -11,10 +11,13 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from feedsim import analysis, cosim
+from feedsim import analysis
 from feedsim.analysis import Figure
-from feedsim.arguments import calling
-from feedsim.findings import ranked, severity
+from feedsim.design.tune import Proposal
+from feedsim.files.trace import Array
+from feedsim.foundation.arguments import calling
+from feedsim.foundation.errors import ranked, severity
+from feedsim.foundation.outputs import forced, replacing
 from feedsim.jobs.parameters import (
     Archives,
     Argument,
@@ -29,28 +32,25 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, in_words_of, kept
+from feedsim.jobs.result import NO_WATCH, Result, Watch, in_words_of, kept
 from feedsim.jobs.subject import Opened, on_machine, opened
-from feedsim.jobs.watch import NO_WATCH, Watch
-from feedsim.judge import JudgedRun, judged
-from feedsim.outputs import forced, replacing
 from feedsim.report import run as report
 from feedsim.report.content import Report
 from feedsim.report.formatting import shown, typeset
-from feedsim.report.partial import Partial
+from feedsim.report.page import Partial
 from feedsim.report.results import Content
+from feedsim.report.run.axis_plots import signals_picture
 from feedsim.report.run.files import summary
 from feedsim.report.run.report import HEADER, is_leading, leading
-from feedsim.report.run.signals import signals_picture
 from feedsim.report.uncertainty import answers
 from feedsim.scenario import Scenario
-from feedsim.trace import Array
-from feedsim.tune import Proposal
+from feedsim.simulation import cosim
+from feedsim.simulation.judge import JudgedRun, judged
 
 if TYPE_CHECKING:
     import pandas
 
-    from feedsim.uncertainty import Cloud, Uncertainty
+    from feedsim.design.uncertainty import Cloud, Uncertainty
 
 
 @dataclass(frozen=True, repr=False)
@@ -291,12 +291,12 @@ def run(
             report.workbook_needed()
         cloud = None
         if uncertain:
-            from feedsim.uncertainty import check_count, cloud_of
+            from feedsim.design.uncertainty import check_count, cloud_of
 
             check_count(uncertain)
             cloud = cloud_of(subject.plan.machine)
         if page:
-            from feedsim.page.content import content
+            from feedsim.report.live_page.content import content
 
             content(subject.plan, subject.program, fmus=subject.fmus)  # and so is a page
         inputs = report.input_paths(subject.plan)
@@ -328,7 +328,7 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: 
     done = replace(done, warnings=subject.warnings(done.warnings))
     if not page:
         return RunResult.of(done)
-    from feedsim.page.html import html
+    from feedsim.report.live_page.html import html
 
     return RunResult.of(done, html(done, fmus=subject.fmus))
 
@@ -337,7 +337,7 @@ def _with_draws(result: RunResult, subject: Opened, cloud: Cloud | None, count: 
     """The run with what identification leaves open, where that is asked for."""
     if cloud is None:
         return result
-    from feedsim.uncertainty import of_run
+    from feedsim.design.uncertainty import of_run
 
     return replace(result, uncertainty=of_run(result, cloud, count, fmus=subject.fmus, progress=watch.progress))
 

@@ -7,13 +7,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim import nc, scenario
-from feedsim.arguments import Changes, settings, spelt
-from feedsim.errors import InputError
+from feedsim import scenario
 from feedsim.files.source import is_ssp, is_study
+from feedsim.foundation.arguments import Changes, settings, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import File
-from feedsim.nc import Program
 from feedsim.scenario import Scenario
+from feedsim.simulation import nc
+from feedsim.simulation.nc import Program
 
 
 def load(file: File, set: Changes = None) -> Scenario:
@@ -72,7 +73,7 @@ def opened(given: File | Scenario, changes: Changes = None, fmus: File | None = 
         return
     if archives is not None:
         raise InputError(f"{spelt('fmus')} {fmus}: {file} has its own archives; leave the option out")
-    from feedsim import ssp  # not for runs of scenario files
+    from feedsim.simulation import ssp  # not for runs of scenario files
 
     with ssp.opened(file, texts) as result:
         yield Opened(result.scenario, result.program, result.fmus, texts, result.told, result.named)

@@ -12,22 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import settings
-from feedsim.findings import WRONG, Wrong
+from feedsim.design.sweep.design import design
+from feedsim.design.sweep.study import AllFailed, Progress
+from feedsim.design.sweep.study import run as run_study
+from feedsim.design.sweep.table import RECORD, Format, Table
+from feedsim.foundation.arguments import settings
+from feedsim.foundation.errors import WRONG, Wrong
+from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
-from feedsim.owned import TemporaryFolder
+from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
 from feedsim.report.content import Report
 from feedsim.report.results import Content, discard
 from feedsim.report.sweep import report as page
-from feedsim.report.sweep.account import Account
-from feedsim.report.sweep.summary import summary
+from feedsim.report.sweep.account import Account, summary
 from feedsim.scenario.study import Study, load_study
-from feedsim.sweep.design import design
-from feedsim.sweep.study import AllFailed, Progress
-from feedsim.sweep.study import run as run_study
-from feedsim.sweep.table import RECORD, Format, Table
 
 if TYPE_CHECKING:
     import pandas

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args, overload
 
-from feedsim import trace
-from feedsim.arguments import listed, spelt
-from feedsim.errors import InputError
-from feedsim.examples import Example, copy, examples
+from feedsim.files import trace
+from feedsim.foundation.arguments import listed, spelt
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.outputs import check_file, unchanged
+from feedsim.foundation.owned import TemporaryFolder
+from feedsim.jobs.examples import Example, copy, examples
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out_file
 from feedsim.jobs.result import Kind, Made
-from feedsim.outputs import check_file, unchanged
-from feedsim.owned import TemporaryFolder
 from feedsim.scenario.schema import Kind as FileKind
 from feedsim.scenario.schema import json_schema
 
@@ -27,7 +27,7 @@ def docs(
     Raises:
         InputError: this installation has none.
     """
-    from feedsim.installation import documentation
+    from feedsim.foundation.installation import documentation
 
     page = documentation()
     if page is None:
@@ -149,7 +149,7 @@ def example(
             "NAME",
             "what to copy, with the files that it names; without a name all are listed",
             many=True,
-            complete="examples:names",
+            complete="jobs.examples:names",
         ),
     ] = None,
     to: Annotated[

@@ -10,21 +10,20 @@ from typing import Annotated, Any
 
 from feedsim import scenario as scenarios
 from feedsim.analysis import Figure
-from feedsim.arguments import listed, settings, spelt
-from feedsim.errors import InputError
-from feedsim.fields import no_axis
+from feedsim.design.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, Judged, tune
+from feedsim.design.tune.proposals import check_controlled
+from feedsim.design.uncertainty import check_count, cloud_of
+from feedsim.files.fields import no_axis
+from feedsim.foundation.arguments import listed, settings, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
+from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
 from feedsim.report import tune as page
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
 from feedsim.report.tune.drive import lines_of
 from feedsim.report.tune.report import SETTINGS, SHEET
-from feedsim.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, Judged, tune
-from feedsim.tune.proposals import check_controlled
-from feedsim.uncertainty import check_count, cloud_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)

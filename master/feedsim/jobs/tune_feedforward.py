@@ -8,23 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from feedsim import analysis, nc
+from feedsim import analysis
 from feedsim import scenario as scenarios
 from feedsim.analysis import compensation
 from feedsim.analysis.compensation import Compensation, check_moves, lags_of, moving_axes
-from feedsim.arguments import Pairs, Value, amount, by_name, pairs, settings, spelt
-from feedsim.errors import InputError
-from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.watch import NO_WATCH, Watch, announce
-from feedsim.report import compensate as page
-from feedsim.report import uncertainty as intervals
-from feedsim.report.content import Report
-from feedsim.report.provenance import input_paths
-from feedsim.report.results import Content
-from feedsim.scenario.load import read_friction
-from feedsim.trace import write_csv
-from feedsim.uncertainty import (
+from feedsim.design.uncertainty import (
     Cloud,
     Known,
     Uncertainty,
@@ -34,6 +22,18 @@ from feedsim.uncertainty import (
     known_values,
     of_compensation,
 )
+from feedsim.files.trace import write_csv
+from feedsim.foundation.arguments import Pairs, Value, amount, by_name, pairs, settings, spelt
+from feedsim.foundation.errors import InputError
+from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
+from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.report import compensate as page
+from feedsim.report import uncertainty as intervals
+from feedsim.report.content import Report
+from feedsim.report.provenance import input_paths
+from feedsim.report.results import Content
+from feedsim.scenario.load import read_friction
+from feedsim.simulation import nc
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,7 +216,7 @@ def _open_of(
 
 def _changed(plan: scenarios.Scenario, program: nc.Program) -> dict[str, scenarios.Machine]:
     """Words -> machine with another effect, that the compensation is tried on, too."""
-    from feedsim.tune.effects import effects_of  # without the table nobody needs it
+    from feedsim.design.tune.knobs import effects_of  # without the table nobody needs it
 
     return {effect.words: machine for effect, machine in effects_of(plan.machine, moving_axes(program))}
 

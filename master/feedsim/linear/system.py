@@ -20,12 +20,12 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.files.trace.response import FrequencyResponse, quotient_unit
+from feedsim.foundation.errors import InputError
 from feedsim.linear.drive import LinearDrive, OperatingPoint
 from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
-from feedsim.trace.response import FrequencyResponse, quotient_unit
 
 # Which loops of an axis are closed: position and speed; speed alone (K_v = k_ffw = 0); none (the torque is an input).
 Closed = Literal["position", "speed", "none"]

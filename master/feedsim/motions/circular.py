@@ -12,11 +12,10 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, StrictInt, field_validator, model_validator
 
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, Quantity, fault
-from feedsim.motions.kind import Array, Course, Geometry, Peaks, Start, whole_cycles
-from feedsim.motions.path import Path, PathMotion, Position, steady
-from feedsim.motions.points import Held, Joined
+from feedsim.files.fields import AxisName, Quantity, fault
+from feedsim.foundation.errors import InputError
+from feedsim.motions.kind import Array, Course, Geometry, Held, Joined, Peaks, Start, whole_cycles
+from feedsim.motions.move import Path, PathMotion, Position, steady
 from feedsim.motions.profile import Profile
 
 Direction = Literal["counterclockwise", "clockwise"]

@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, StrictInt, Tag, model_validator
 
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, Model, Quantity, fault
+from feedsim.files.fields import AxisName, Model, Quantity, fault
+from feedsim.foundation.errors import InputError
 from feedsim.motions.kind import LIST_OR_RANGE, Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
 from feedsim.motions.profile import Profile, rest_to_rest
 

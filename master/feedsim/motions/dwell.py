@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from feedsim.fields import Quantity
+from feedsim.files.fields import Quantity
 from feedsim.motions.kind import Course, MotionKind, Start, whole_cycles
 
 

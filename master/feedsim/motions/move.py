@@ -3,16 +3,115 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Annotated, Literal, Protocol, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from feedsim.fields import AxisName, fault
-from feedsim.motions.kind import Array, Geometry, Peaks
-from feedsim.motions.path import Path, PathMotion, Position, steady
-from feedsim.motions.profile import Profile
+from feedsim.files.fields import AxisName, Quantity, fault
+from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, whole_cycles
+from feedsim.motions.profile import Profile, rest_to_rest
+
+# --- Motions along a path that the NC plans from rest to rest: what a straight line and a circle have in common -------
+
+
+Position = Annotated[float, Quantity("m")]
+Feed = Annotated[float, Quantity("m/s", above=0)]
+
+
+class Path(Protocol):
+    """A path in the space of the axes, over its own length."""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that the path names, those that stand among them."""
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Axes that the path moves."""
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+
+    def position(self, s: Array) -> dict[str, Array]:
+        """Axis positions [m] at path lengths ``s`` (N,) [m]."""
+
+    def peaks(self, profile: Profile, step: float) -> dict[str, Peaks]:
+        """Peaks of every axis; ``step`` [s] is the cycle of the interpolator."""
+
+    def geometry(self, profile: Profile, start: float) -> Geometry:
+        """What is handed on of a path that begins at ``start`` [s]."""
+
+
+class PathMotion(MotionKind):
+    """A motion along a path that the NC plans from rest to rest."""
+
+    feed: Feed = Field(description="Programmed speed along the path")
+    acceleration: Annotated[float, Quantity("m/s^2", above=0)] | None = Field(
+        default=None, description="Highest acceleration along the path in place of the machine's"
+    )
+    jerk: Annotated[float, Quantity("m/s^3", above=0)] | None = Field(
+        default=None, description="Highest jerk along the path in place of the machine's"
+    )
+
+    @abstractmethod
+    def path(self, position: Mapping[str, float]) -> Path:
+        """Path from the positions ``position`` [m]; InputError where there is none."""
+
+    def target(self, path: Path) -> dict[str, float]:
+        """Axis -> position [m] at the end of its path, of those that are then elsewhere."""
+        return {axis: float(x[0]) for axis, x in path.position(np.array([path.length])).items()}
+
+    @property
+    def at_feed(self) -> str:
+        """The programmed speed as reports show it."""
+        return f"at {self.feed * 6e4:.6g} mm/min"
+
+    def plan(self, start: Start) -> Course:
+        path = self.path(start.position)
+        profile = rest_to_rest(path.length, self.feed, self.acceleration or start.acceleration, self.jerk or start.jerk)
+        cycles = whole_cycles(profile.duration, start.T_ipo)
+        return Course(
+            duration=profile.duration,
+            cycles=cycles,
+            points={axis: Along(path, profile, axis, start.T_ipo, cycles) for axis in path.axes},
+            # Looking at all of a path that is too long for the program would take long.
+            peaks=path.peaks(profile, start.T_ipo) if cycles <= start.most else {},
+            target=self.target(path),
+            moving=path.moving,
+            geometry=path.geometry(profile, start.time),
+        )
+
+
+@dataclass(frozen=True)
+class Along:
+    """An axis of a path: point i is where the path is (i + 1) ``cycle`` [s] after the start of its profile."""
+
+    path: Path
+    profile: Profile
+    axis: str
+    cycle: float
+    count: int
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, rows: slice) -> Array:
+        wanted = range(self.count)[rows]
+        at = np.arange(wanted.start + 1, wanted.stop + 1, dtype=np.float64) * self.cycle
+        return self.path.position(self.profile.at(at)[0])[self.axis]
+
+
+def steady(profile: Profile, start: float) -> tuple[float, float] | None:
+    """Begin and end of the constant-speed phase [s] of a profile that begins at ``start``; None where there is none."""
+    return None if profile.steady is None else (start + profile.steady[0], start + profile.steady[1])
+
+
+# --- A straight move of one or several axes ---------------------------------------------------------------------------
 
 
 class Move(PathMotion):

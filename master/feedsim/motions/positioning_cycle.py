@@ -10,9 +10,9 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, StrictInt, Tag, model_validator
 
-from feedsim.fields import AxisName, Model, Quantity, fault
+from feedsim.files.fields import AxisName, Model, Quantity, fault
 from feedsim.motions.kind import LIST_OR_RANGE, Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
-from feedsim.motions.path import Position
+from feedsim.motions.move import Position
 from feedsim.motions.profile import rest_to_rest
 
 

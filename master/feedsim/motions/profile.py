@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feedsim.errors import InputError
-from feedsim.extras import need
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.installation import need
 from feedsim.motions.kind import Array
 
 if TYPE_CHECKING:  # files are read, and schemas printed, without it

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, StrictBool, StrictStr
 
-from feedsim.errors import InputError
-from feedsim.fields import File, Quantity
+from feedsim.files.fields import File, Quantity
+from feedsim.foundation.errors import InputError
 from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Start, whole_cycles
 
 if TYPE_CHECKING:
-    from feedsim.part_program import Moves
-    from feedsim.path import Limits, PlannedPath
-    from feedsim.path.nearest import ProgrammedPath
+    from feedsim.motions.part_program import Moves
+    from feedsim.motions.planner import Limits, PlannedPath
+    from feedsim.motions.planner.nearest import ProgrammedPath
 
 # Blocks that are named one by one where they leave the travel; of a program with more their number follows.
 MAX_BLOCKS_NAMED = 100
@@ -66,8 +66,8 @@ class PartProgram(MotionKind):
 
     def moves(self, start: Start) -> Moves:
         """What the program commands from ``start`` on, with the overrides. Raises InputError with file and line."""
-        from feedsim.part_program import Blending, Motion, read_program
-        from feedsim.part_program.reading import TOLERANCE
+        from feedsim.motions.part_program import Blending, Motion, read_program
+        from feedsim.motions.part_program.reading import TOLERANCE
 
         axes = tuple(start.position)
         here = [start.position[axis] for axis in axes]
@@ -87,7 +87,7 @@ class PartProgram(MotionKind):
 
     def _slowed(self, moves: Moves, limits: Limits) -> Moves:
         """The moves with rapids at their override as lines at a feed: of what the slowest of their axes allows."""
-        from feedsim.part_program import Motion
+        from feedsim.motions.part_program import Motion
 
         rapid = moves.motion == Motion.RAPID
         if self.rapid_override == 1 or not rapid.any():
@@ -106,8 +106,8 @@ class PartProgram(MotionKind):
         Raises InputError: a program that cannot be read, that does not move, or that leaves the travel, every block
         with file and line; or one that lasts too long.
         """
-        from feedsim.path import plan_moves
-        from feedsim.path.nearest import ProgrammedPath
+        from feedsim.motions.planner import plan_moves
+        from feedsim.motions.planner.nearest import ProgrammedPath
 
         moves = self.moves(start)
         programmed = ProgrammedPath.of(moves)
@@ -184,7 +184,7 @@ class Programmed(Geometry):
     @cached_property
     def limits(self) -> list[str]:
         """What held each block back for most of its time, in words: "F", "acceleration X"."""
-        from feedsim.path import Acts
+        from feedsim.motions.planner import Acts
 
         words = {kind: "" if kind == Acts.NOTHING else "F" if kind == Acts.FEED else kind.name.lower() for kind in Acts}
         names = [*self.moves.axes, "path"]  # axis -1 is the path

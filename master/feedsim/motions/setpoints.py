@@ -13,9 +13,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, StrictBool, StrictStr, ValidationInfo, field_validator, model_validator
 
-from feedsim import units
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, File, Model, Quantity, fault
+from feedsim.files.fields import AxisName, File, Model, Quantity, fault
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
 from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Start, whole_cycles
 from feedsim.motions.profile import SpeedChange, speed_change
 
@@ -86,7 +86,7 @@ class MeasuredSetpoints(MotionKind):
         # Loaded where a recording is read: splines take longer to load than all of the fields.
         from scipy.interpolate import CubicSpline
 
-        from feedsim.trace import read_signals
+        from feedsim.files.trace import read_signals
 
         rows = read_signals(
             self.file,

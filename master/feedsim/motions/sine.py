@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, StrictInt
 
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, Model, Quantity
+from feedsim.files.fields import AxisName, Model, Quantity
+from feedsim.foundation.errors import InputError
 from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
 
 # Points of the interpolator per period. With 10 of them the spline's amplitude is (2 pi/10)^4/384 = 4e-4 off.

@@ -7,19 +7,139 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from feedsim.arguments import call
-from feedsim.findings import ranked, severity
-from feedsim.report.formatting import minus, shown
-from feedsim.report.picture import Picture
+import numpy as np
+
+from feedsim.analysis import Figure
+from feedsim.foundation.arguments import call
+from feedsim.foundation.errors import InputError, OutputError, ranked, severity
+from feedsim.report.chart import Chart, Panel
+from feedsim.report.chart.svg import png, standalone, svg
+from feedsim.report.formatting import REMARK, display_unit, minus, shown, typeset
+from feedsim.report.provenance import InputFile, archives, axis_parameters, software
+from feedsim.scenario import Machine
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
     from feedsim.report.chart import Chart
+
+
+# --- A figure of a report, for its page and as a file of its own ------------------------------------------------------
+
+
+# An SVG above this size [bytes] is put into the page as PNG instead.
+LARGEST_SVG = 400_000
+# Files that a drawing is written as.
+PICTURE_FORMATS = ("png", "svg")
+
+
+@dataclass(frozen=True, repr=False)
+class Picture:
+    """A figure: file stem, title, caption (plain text), and what it shows: a chart, or what draws it.
+
+    A chart is drawn by the page, and once as SVG; of what is no chart the page holds the drawing. worded: title and
+    caption stand above a chart in a file of its own.
+    """
+
+    stem: str
+    title: str
+    caption: str
+    shows: Chart | Callable[[], str]
+    worded: bool = False
+    remark: str = field(default_factory=lambda: REMARK.get())
+
+    @property
+    def chart(self) -> Chart | None:
+        """What it shows as data; None where it is no chart."""
+        return self.shows if isinstance(self.shows, Chart) else None
+
+    @cached_property
+    def svg(self) -> str:
+        """The drawing as text of an SVG within a page."""
+        return svg(self.shows, self.stem, self.title) if isinstance(self.shows, Chart) else self.shows()
+
+    @property
+    def is_light(self) -> bool:
+        """Whether a page holds the SVG; one above LARGEST_SVG it holds as PNG."""
+        return len(self.svg) <= LARGEST_SVG
+
+    @cached_property
+    def png(self) -> bytes:
+        """The drawing as PNG."""
+        return png(self._file)
+
+    @property
+    def _file(self) -> str:
+        """The drawing as text of an SVG that is a file of its own."""
+        return standalone(self.svg, self.title, self.caption if self.worded else "", self.remark)
+
+    def first_rows(self, most: int) -> Picture:
+        """The picture itself, or one of its first rows of panels where it has more than `most`."""
+        if self.chart is None or len(rows := list(self.chart.rows())) <= most:
+            return self
+        first = [panel for row in rows[:most] for panel in row]
+        return replace(self, stem=f"{self.stem}-first", shows=Chart(first, self.chart.widths))
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as .png or .svg, which the name shows; returns the path. Raises InputError, OutputError."""
+        path = Path(path)
+        kind = path.suffix.lower().removeprefix(".")
+        if kind not in PICTURE_FORMATS:
+            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{name}' for name in PICTURE_FORMATS)}")
+        try:
+            path.write_bytes(self.content(kind))
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from None
+        return path
+
+    def content(self, kind: str) -> bytes:
+        """What a file of one of PICTURE_FORMATS holds."""
+        return self.png if kind == "png" else self._file.encode()
+
+    def on(self, ax: Any) -> Any:
+        """Draw it on axes of matplotlib, and return them: the first panel on one, a panel on each of several.
+
+        Axes get quantity and unit. A circle is drawn over its angle. Raises InputError: it is no chart, or has fewer
+        panels.
+        """
+        panels = [part for part in self.chart.panels if isinstance(part, Panel)] if self.chart is not None else []
+        several = list(np.ravel(ax)) if isinstance(ax, list | tuple | np.ndarray) else [ax]
+        if len(panels) < len(several):
+            raise InputError(f"{self.title}: has {len(panels)} panels with axes, {len(several)} are needed")
+        for one, panel in zip(several, panels, strict=False):
+            for curve in panel.curves:
+                style = {"": "-", "dashed": "--", "dotted": ":"}[curve.dash]
+                words = {"color": curve.colour, "linewidth": curve.width, "label": curve.name}
+                one.plot(curve.x, curve.y, "." if curve.dots else style, **words)
+            for level in panel.levels:
+                (one.axvline if level.upright else one.axhline)(level.at, color="0.5", linewidth=0.8, linestyle=":")
+            one.set_xscale("log" if panel.x.log else "linear")
+            one.set_yscale("log" if panel.y.log else "linear")
+            if panel.x.span is not None:
+                one.set_xlim(*panel.x.span)
+            if panel.y.span is not None:
+                one.set_ylim(*panel.y.span)
+            one.set_xlabel(panel.x.title)
+            one.set_ylabel(panel.y.title)
+            one.set_title(panel.title or self.title)
+            if len({curve.name for curve in panel.curves}) > 1:
+                one.legend()
+        return ax
+
+    def __repr__(self) -> str:
+        return f"Picture {self.stem!r}: {self.title}"
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+# --- What a report says, as values: a kind of report fills a `Report`, `feedsim.report.page` sets it as HTML ----------
+
 
 # Significant digits of a tile; the table has more.
 TILE_DIGITS = 3
@@ -186,7 +306,7 @@ class Report:
 
     Attributes:
         answer: what the result is and what it means; only what is wrong stands ahead of it.
-        warnings: what is wrong first (`feedsim.findings`). notes: what the numbers are worth, each once.
+        warnings: what is wrong first (`feedsim.foundation.errors`). notes: what the numbers are worth, each once.
         tiles: leading numbers, the weightiest first: of these TILES stand on the first screen.
         action: the value to type, right below the answer.
         lead: the picture of the first screen; None: the first one of `main`. next_step: what to do, with a command.
@@ -267,3 +387,75 @@ def _pictures(parts: Sequence[Part | None]) -> Iterator[Picture]:
             yield part
         elif isinstance(part, Section):
             yield from _pictures(part.parts)
+
+
+# --- Sections and tables that reports of several kinds have: figures, and where the numbers come from -----------------
+
+
+FIGURES_ANCHOR = "figures"
+
+
+def figures_section(figures: Mapping[str, Figure]) -> Section | None:
+    """Every derived figure with unit and meaning."""
+    if not figures:
+        return None
+    rows = [(code(name), *shown(figure), typeset(figure.meaning)) for name, figure in figures.items()]
+    table = Table("lrlp", ("Figure", "Value", "Unit", "Meaning"), rows)
+    return Section("Derived figures", [table], FIGURES_ANCHOR)
+
+
+def figures_footer(rest: str, documents: str = "docs/figures.md") -> Text:
+    """Text that leads to :func:`figures_section` and to its definitions, and goes on with ``rest``."""
+    return (
+        "What each figure means stands beside it in the table ",
+        Span("Derived figures", "link", FIGURES_ANCHOR),
+        f"; the full definitions come with the software ({documents}). {rest}",
+    )
+
+
+def provenance_section(
+    rows: Iterable[tuple[str, str]], files: Iterable[InputFile], *further: Part | None, software_of: str = "Software"
+) -> Section:
+    """Where the numbers come from: what and what it is, the software, input files with their hashes, and further."""
+    used = ", ".join(f"{name} {text}" for name, text in software().items())
+    return Section(
+        "Where the numbers come from", [pairs_table([*rows, (software_of, used)]), files_table(files), *further]
+    )
+
+
+def pairs_table(rows: Sequence[tuple[str, str]]) -> Table:
+    """A table without heads: what, and what it is."""
+    return Table("hl", (), rows)
+
+
+def files_table(files: Iterable[InputFile]) -> Table:
+    """Input files with their hashes."""
+    rows = [(f.role, f.name, code(f.sha256 or "not readable")) for f in files]
+    return Table("lll", ("Input file", "Name", "SHA-256"), rows)
+
+
+def archives_table(units: Mapping[str, Mapping[str, str]]) -> Table | None:
+    """The archives of a run's units (instance -> GUID and version); none without units."""
+    rows = [(a.name, a.version, code(a.guid), ", ".join(a.instances)) for a in archives(units)]
+    return Table("llll", ("Unit", "Version", "GUID", "Instances"), rows) if rows else None
+
+
+def parameters_section(machine: Machine) -> Section:
+    """Drive and friction parameters in SI: one row per parameter, one column per axis."""
+    by_axis = {name: axis_parameters(axis) for name, axis in machine.axes.items()}
+    keys = dict.fromkeys((g, n) for groups in by_axis.values() for g, names in groups.items() for n in names)
+    rows: list[tuple[Text, ...]] = []
+    for group, name in keys:
+        result = [groups[group].get(name) for groups in by_axis.values()]
+        unit = next(pair[1] for pair in result if pair is not None)
+        values = (_value(pair[0]) if pair else "–" for pair in result)
+        rows.append((group, code(name), display_unit(unit), *values))
+    heads = ("Group", "Parameter", "SI unit", *by_axis)
+    note = "A parameter that is not listed has the start value of its unit."
+    return Section("Parameters of the axes", [Table("lll" + "r" * len(by_axis), heads, rows, note)])
+
+
+def _value(value: float | int | bool | str) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return minus(f"{value:.6g}") if isinstance(value, float) else str(value)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from feedsim.errors import InputError
-from feedsim.fields import Quantity
+from feedsim.files.fields import Quantity
 from feedsim.files.regular import digest
-from feedsim.installation import version
+from feedsim.foundation.errors import InputError
+from feedsim.foundation.installation import version
 from feedsim.scenario import Axis, Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 from feedsim.scenario.roles import LUGRE
 

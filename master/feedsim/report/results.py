@@ -10,15 +10,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim.errors import InputError, OutputError
 from feedsim.files.regular import json_file
-from feedsim.outputs import forced, same
-from feedsim.owned import TemporaryFolder, claimed
-from feedsim.report.content import Report
+from feedsim.foundation.errors import InputError, OutputError
+from feedsim.foundation.outputs import forced, same
+from feedsim.foundation.owned import TemporaryFolder, claimed, held
+from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
-from feedsim.report.picture import Picture
 from feedsim.report.provenance import sha256, to_json
-from feedsim.signals import held
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 SCRATCH = ".feedsim-"  # how the folder begins in which files are made

@@ -9,19 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.estimation.interval import NORMAL_95
+from feedsim.foundation import outputs
 from feedsim.report.chart import Axis, Band, Chart, Curve, Panel
-from feedsim.report.content import Part, Report, Section, Table, Text, code
-from feedsim.report.formatting import display_unit, minus, typeset
-from feedsim.report.picture import Picture
+from feedsim.report.content import Part, Picture, Report, Section, Table, Text, code
+from feedsim.report.formatting import SIMULATED, display_unit, minus, typeset
 from feedsim.report.provenance import quantity
-from feedsim.report.style import SIMULATED
 
 if TYPE_CHECKING:
-    from feedsim.uncertainty import Band as Spread
-    from feedsim.uncertainty import Cloud, Known, Uncertainty
+    from feedsim.design.uncertainty import Band as Spread
+    from feedsim.design.uncertainty import Cloud, Known, Uncertainty
 
 BANDS = "bands.csv"
 
@@ -49,7 +47,7 @@ def intervals_section(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -
 
 def drawn_values(cloud: Cloud, sets: Mapping[str, Known] | None = None) -> Table:
     """What was drawn. sets: axis -> what is known of the set that compensates, where that is drawn too."""
-    from feedsim.uncertainty.draws import unit_of  # a run without draws does not load them
+    from feedsim.design.uncertainty import unit_of  # a run without draws does not load them
 
     rows: list[tuple[Text, ...]] = []
     known_ones = [
@@ -112,12 +110,12 @@ def bands_csv(uncertainty: Uncertainty) -> str:
         at = np.degrees(band.at) if band.kind == "contour" else 1e3 * band.at
         for row in zip(at, *(1e6 * values for values in (band.nominal, band.low, band.high)), strict=True):
             rows.append([band.prefix, band.kind, *(f"{value:.6g}" for value in row)])
-    return sheets.text_of(rows)
+    return outputs.text_of(rows)
 
 
 def summary_part(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -> dict[str, Any]:
     """Of summary.json."""
-    from feedsim.uncertainty.draws import unit_of
+    from feedsim.design.uncertainty import unit_of
 
     return {
         "draws": uncertainty.count,

@@ -6,12 +6,12 @@ Start with load.py: ``load``.
 
 from feedsim.scenario.axis_units import CurrentController, Drive, Filter, Friction, FrictionParameters, GmsFriction
 from feedsim.scenario.base import Base, Change
-from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.machine import Axis, Cycles, Machine
 from feedsim.scenario.model import (
     CircleTest,
     ContourTest,
+    Coupling,
     Delay,
     Level,
     Logging,

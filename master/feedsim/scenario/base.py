@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from feedsim.files import shape
+from feedsim.files.changes import expected, names_file
 from feedsim.files.checked import fetch
 from feedsim.files.source import Mark, Place, Source, at, places
 from feedsim.scenario.load import Draft, Setting, drafted
@@ -148,7 +148,7 @@ def _named_files(source: Source, place: Place) -> Iterator[tuple[Place, str]]:
     elif isinstance(data, list):
         for i in range(len(data)):
             yield from _named_files(source, (*place, i))
-    elif isinstance(data, str) and shape.is_file(shape.expected(Scenario, source.data, place)):
+    elif isinstance(data, str) and names_file(expected(Scenario, source.data, place)):
         yield place, data
 
 

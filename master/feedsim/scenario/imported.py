@@ -13,14 +13,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from feedsim.control.reading import Reading, Refused, Taken
-from feedsim.errors import InputError
-from feedsim.fields import Quantity
-from feedsim.files.checked import check, fetch, read_group
-from feedsim.files.problems import in_order
+from feedsim.files.checked import check, fetch, in_order, read_group
+from feedsim.files.control.reading import Reading, Refused, Taken
+from feedsim.files.fields import Quantity
 from feedsim.files.source import Mark, Place, Source, copied
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.axis_units import Drive, Filter
-from feedsim.scenario.control_keys import translate
+from feedsim.scenario.load import translate
 from feedsim.scenario.machine import Axis, Machine
 
 # Switches of the machine file follow from what was taken.

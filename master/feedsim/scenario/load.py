@@ -2,23 +2,120 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, Any
 
-from feedsim.arguments import spelt
-from feedsim.errors import InputError, no_such_file
-from feedsim.fields import brief
+from pydantic import ConfigDict, Field, StrictStr
+
 from feedsim.files import changes
-from feedsim.files.checked import check, checked, fetch, read_group
-from feedsim.files.problems import describe, in_order
+from feedsim.files.checked import check, checked, describe, dotted, fetch, in_order, read_group
+from feedsim.files.control import Name, known
+from feedsim.files.fields import AxisName, File, Model, Quantity, brief
 from feedsim.files.source import Mark, Place, Source, is_program, places, read
+from feedsim.foundation.arguments import spelt
+from feedsim.foundation.errors import InputError, no_such_file
 from feedsim.scenario.axis_units import Friction, FrictionParameters, GmsFriction
-from feedsim.scenario.control_keys import translate, translated
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.model import Scenario, contradictions
 from feedsim.scenario.roles import GMS
+from feedsim.scenario.structure import Structure
+from feedsim.scenario.structure.checks import STRUCTURE_FILE, load_structure
+from feedsim.scenario.structure.parts import FiniteElements, GeometryStructure
+
+# --- Keys and values of a control in scenario and machine files: MD32200: 4 in place of K_v: 4 (m/min)/mm -------------
+
+
+def translated(key: str, value: Source) -> tuple[str, Source]:
+    """A change by a control's number as one by our name; any other as it is.
+
+    "machine.axes.Z.drive.MD32200", "Z.MD32200" and "MD32200" (all axes) mean the same parameter. InputError: the
+    number's unit is not confirmed, or the value is no number.
+    """
+    prefix, _, number = key.rpartition(".")
+    name = known(number)
+    if name is None:
+        return key, value
+    where = prefix.removesuffix(".drive")
+    if name.parameter.startswith("cycles."):
+        where = "machine"
+    elif "axes" not in where.split("."):
+        where = f"machine.axes.{where or '*'}"
+    text = _text(name, value.data, f"{value.mark(()).where}: ")
+    return f"{where}.{name.parameter}", Source(text, {(): value.mark(())})
+
+
+def translate(source: Source, axes: Place, faults: list[str]) -> None:
+    """Replace a control's numbers below the axes (a place of the tree) by our names, in axes and in their drives."""
+    groups: Any = source.data
+    for key in axes:
+        groups = groups.get(key) if isinstance(groups, dict) else None
+    for axis, group in groups.items() if isinstance(groups, dict) else ():
+        for place in ((*axes, axis), (*axes, axis, "drive")):
+            inner = group if place[-1] == axis else group.get("drive") if isinstance(group, dict) else None
+            for key in [*inner] if isinstance(inner, dict) else ():
+                if (name := known(key)) is not None:
+                    _rename(source, (*axes, axis), (*place, key), name, faults)
+
+
+def _rename(source: Source, axis: Place, place: Place, name: Name, faults: list[str]) -> None:
+    mark = source.mark(place)
+    parent: Any = source.data
+    for key in place[:-1]:
+        parent = parent[key]
+    value = parent.pop(place[-1])
+    source.forget(place)
+    at = axis
+    group: Any = source.data
+    for key in axis:
+        group = group[key]
+    *way, last = name.parameter.split(".")
+    for step in way:
+        at = (*at, step)
+        if not isinstance(group.get(step), dict):
+            if step in group:
+                faults.append(describe(source, at, f"has no {name.number} inside"))
+                return
+            group[step] = {}
+            source.marks[at] = mark
+        group = group[step]
+    if last in group:
+        faults.append(f"{mark.where}: {name.number} is {name.parameter}, which is given as well; give one of them")
+        return
+    try:
+        group[last] = _text(name, value, f"{mark.where}: ")
+    except InputError as error:
+        faults += error.problems
+        group[last] = value
+    source.marks[(*at, last)] = mark
+
+
+def _text(name: Name, value: Any, where: str) -> Any:
+    """The value in SI as our files have it."""
+    ours = name.parameter.rpartition(".")[2]
+    if not name.confirmed:
+        raise InputError(
+            f"{where}{name.number} is {ours}, but its unit is not confirmed by a public source ({name.source}); "
+            f"give {ours} with its unit"
+        )
+    if name.codes:
+        known = {code: ours for code, ours in name.codes}
+        if isinstance(value, bool) or value not in known:
+            raise InputError(f"{where}{name.number} is {brief(value)}; of {', '.join(map(str, known))}")
+        return known[value]
+    if not name.si and name.unit != "1" and value in (0, 1, False, True):
+        return bool(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(
+            f"{where}{name.number} is {brief(value)}; a number in the control's unit, {name.unit}, is expected"
+        )
+    return value if not name.si else f"{name.ours(value)!r} {name.si}"
+
+
+# --- Scenario file -> Scenario: read, fetch the files it names, apply changes, check; every problem with its line -----
+
 
 Setting = tuple[str, Source]  # dotted key, value
 
@@ -277,3 +374,177 @@ def _collecting(faults: list[str]) -> Iterator[None]:
         yield
     except InputError as error:
         faults += error.problems
+
+
+# --- A machine as far as its files describe it: its structure must be had before the rest of the machine is
+#     complete
+
+
+# Lengths that are typed twice are the same where they differ by less [m].
+SAME_LENGTH = 1e-9
+
+
+class _Beginning(Model):
+    """Of a machine file that is not complete: its structure and the pose. Other keys stay unread."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    name: StrictStr = Field(default="", description="Name in reports")
+    note: StrictStr = Field(default="", description="Remark shown wherever the machine's numbers are shown")
+    structure: File | None = Field(default=None, description="Structure file to compute the modes from")
+    pose: dict[AxisName, Annotated[float, Quantity("m", example="800 mm")]] = Field(
+        default={}, description="Axis positions at the start, to which the modes belong"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """What there is of a machine.
+
+    Attributes:
+        structure: None where the machine has a table of modes alone.
+        machine: None where there is a structure file alone, or the machine file is not complete.
+        modes: table of modes; None where there is none (yet).
+        pose: axis -> position [m]; empty where the files give none.
+        files: what was read, each with what it is; the table of modes is not among them.
+        gaps: what the machine file lacks, or is wrong in it, if that does not concern the structure.
+    """
+
+    name: str
+    note: str
+    structure: Structure | None
+    machine: Machine | None
+    modes: Path | None
+    pose: Mapping[str, float]
+    files: tuple[tuple[str, Path], ...]
+    gaps: tuple[str, ...]
+
+
+def load_described(path: str | Path) -> Described:
+    """Read a machine file, a structure file, a folder with either, or a scenario's machine.
+
+    A machine file need not be complete, nor its table of modes be there, if it names a structure.
+
+    Raises:
+        InputError: neither is there; what is there is wrong; machine and structure contradict one another.
+    """
+    path = Path(path)
+    if path.is_dir():
+        paths = [path / name for name in (Machine.IN_FOLDER, STRUCTURE_FILE) if (path / name).is_file()]
+        if not paths:
+            raise InputError(f"{path}: no {Machine.IN_FOLDER} and no {STRUCTURE_FILE} in this folder")
+        path = paths[0]
+    source = read_group(path)
+    if "kind" in source.data or path.name == STRUCTURE_FILE:
+        return _alone(path)
+    if "machine" in source.data:
+        return _of_scenario(path)
+    return _of_machine(path, source)
+
+
+def _alone(path: Path) -> Described:
+    structure = load_structure(path)
+    pose = structure.pose if isinstance(structure, FiniteElements) else {}
+    name = structure.name or path.stem
+    return Described(name, structure.note, structure, None, None, dict(pose), (("structure", path),), ())
+
+
+def _of_scenario(path: Path) -> Described:
+    """Without a look for contradictions: a scenario may change single values of its machine on purpose."""
+    scenario = load(path)
+    machine = scenario.machine
+    files = [(place or "scenario", file) for place, file in scenario.files]
+    structure = None
+    if machine.structure is not None:
+        structure = load_structure(machine.structure)
+        files.append(("structure", machine.structure))
+    return Described(
+        machine.name, machine.note, structure, machine, machine.modes, dict(machine.pose), tuple(files), ()
+    )
+
+
+def _of_machine(path: Path, source: Source) -> Described:
+    # A table that is yet to be built is no fault of the file: any file that is there stands in for it.
+    data = source.data
+    table = path.parent / data["modes"] if isinstance(data.get("modes"), str) and data["modes"] else None
+    there = table is not None and table.is_file()
+    if not there and isinstance(data.get("modes", ""), str):
+        data["modes"] = path.name
+    faults: list[str] = []
+    fetch(source, Machine, (), faults)
+    machine = check(source, Machine, faults)
+    faults = in_order(faults)
+    modes = table if there else None
+    if machine is None or faults:
+        return _incomplete(path, modes, faults)
+    if machine.structure is None:
+        if modes is None:
+            missing = f"no such file: {table}" if table else "missing"
+            raise InputError(
+                f"{path}: modes: {missing}; and there is no key structure, from whose file it could be computed"
+            )
+        files: tuple[tuple[str, Path], ...] = (("machine", path),)
+        return Described(machine.name, machine.note, None, machine, modes, dict(machine.pose), files, ())
+    file = machine.structure
+    structure = load_structure(file)
+    if problems := list(_contradictions(source, machine, structure, file)):
+        raise InputError.of(f"{path}: contradicts its structure", problems)
+    machine = machine.model_copy(update={"modes": table} if table is not None else {})
+    machine._directory = path.parent
+    files = (("machine", path), ("structure", file))
+    return Described(machine.name, machine.note, structure, machine, modes, dict(machine.pose), files, ())
+
+
+def _incomplete(path: Path, modes: Path | None, gaps: list[str]) -> Described:
+    """Of a machine file that is not complete the structure and the pose, which then must be right."""
+    source, faults = read_group(path), list[str]()
+    source.data = {key: value for key, value in source.data.items() if key in _Beginning.model_fields}
+    fetch(source, _Beginning, (), faults)
+    beginning = check(source, _Beginning, faults)
+    if beginning is None or faults or beginning.structure is None:
+        raise InputError.of(str(path), in_order(faults) or gaps)
+    structure = load_structure(beginning.structure)
+    return Described(
+        name=beginning.name or structure.name or path.stem,
+        note=beginning.note or structure.note,
+        structure=structure,
+        machine=None,
+        modes=modes,
+        pose=dict(beginning.pose),
+        files=(("machine", path), ("structure", beginning.structure)),
+        gaps=tuple(gaps),
+    )
+
+
+def _contradictions(source: Source, machine: Machine, structure: Structure, file: Path) -> Iterator[str]:
+    """What machine file and structure file both say, and do not say alike; both places are named."""
+    other = read_group(file)
+
+    def both(place: Place, here: str, there_place: Place, there: str) -> str:
+        return (
+            f"{source.mark(place).where}: {dotted(place)}: {here}; "
+            f"{other.mark(there_place).where}: {dotted(there_place)}: {there}"
+        )
+
+    axes = tuple(structure.axes) if isinstance(structure, (GeometryStructure, FiniteElements)) else ()
+    if tuple(machine.axes) != axes:
+        same = sorted(machine.axes) == sorted(axes)
+        what = "another order" if same else "other axes"
+        yield both(("axes",), ", ".join(machine.axes), ("axes",), f"{', '.join(axes) or 'none'} ({what})")
+    if not isinstance(structure, GeometryStructure):
+        return
+    for name, axis in machine.axes.items():
+        theirs = structure.axes.get(name)
+        if theirs is None:
+            continue
+        if abs(axis.pitch - theirs.drive.pitch) > SAME_LENGTH:
+            yield both(
+                ("axes", name, "pitch"), _mm(axis.pitch), ("axes", name, "drive", "pitch"), _mm(theirs.drive.pitch)
+            )
+        if any(abs(a - b) > SAME_LENGTH for a, b in zip(axis.travel, theirs.travel, strict=True)):
+            place = ("axes", name, "travel")
+            yield both(place, _mm(*axis.travel), place, _mm(*theirs.travel))
+
+
+def _mm(*lengths: float) -> str:
+    return " to ".join(f"{1e3 * length:.9g}" for length in lengths) + " mm"

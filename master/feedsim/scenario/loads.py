@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, StrictBool, StrictInt, field_validator, model_validator
 
-from feedsim.fields import AxisName, File, Model, Quantity, fault
+from feedsim.files.fields import AxisName, File, Model, Quantity, fault
 from feedsim.motions import Column
 
 MotionIndex = Annotated[StrictInt, Field(ge=0)]

@@ -18,10 +18,10 @@ from pydantic import (
     field_validator,
 )
 
-from feedsim import variables
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, File, Model, Quantity, fault, is_multiple, parameter
-from feedsim.path import Limits
+from feedsim.files.fields import AxisName, File, Model, Quantity, fault, is_multiple, parameter
+from feedsim.foundation import variables
+from feedsim.foundation.errors import InputError
+from feedsim.motions.planner import Limits
 from feedsim.scenario.axis_units import (
     CONTROLLER_TABLE,
     LEAD_POWERS,
@@ -34,10 +34,12 @@ from feedsim.scenario.axis_units import (
     GmsFriction,
     Guide,
     Hysteresis,
+    Parameter,
+    ParameterGroup,
     Transmission,
     friction_filled,
+    group,
 )
-from feedsim.scenario.parameter_group import Parameter, ParameterGroup, group
 from feedsim.scenario.roles import ANOTHER_LAW, FOREIGN, SHIPPED, ForeignUnit, filled
 
 

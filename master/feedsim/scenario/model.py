@@ -23,15 +23,62 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
-from feedsim import units
-from feedsim.errors import InputError
-from feedsim.fields import AxisName, Model, Quantity, Reading, did_you_mean, fault, is_multiple, no_axis
+from feedsim.files.fields import AxisName, Model, Quantity, Reading, did_you_mean, fault, is_multiple, no_axis
 from feedsim.files.source import Place
+from feedsim.foundation import units, variables
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, MeasuredSetpoints, Motion, PartProgram, PositioningCycle
-from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
+
+# --- How plant and friction are exchanged within a control cycle: the schemes, and what a scenario says of it ---------
+# The schemes are rows of src/machine_fmu/cycle.h, which says what their columns mean; feedsim.simulation.cosim.schedule
+# makes operations of them.
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How the units see each other within a step."""
+
+    number: int
+    name: str
+    stable_share: float
+    speed: str
+    torque_ramp: bool
+    friction_ramp: bool
+    passes: int
+    friction_first: bool
+
+    @property
+    def speed_ramp(self) -> bool:
+        """Whether friction is given the slope of its speed."""
+        return self.speed in ("within", "extrapolated")
+
+
+SCHEMES = {scheme.name: scheme for scheme in (Scheme(*row) for row in variables.cycle()["SCHEMES"])}
+
+
+class Coupling(Model):
+    """How plant and friction are exchanged."""
+
+    scheme: Literal[tuple(SCHEMES)] = Field(  # type: ignore[valid-type]
+        default="extrapolated", description="Order of the units and use of input slopes within an exchange step"
+    )
+    substeps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
+        default=1, description="Exchange steps of plant and friction per control cycle"
+    )
+    call_limit: Annotated[float, Quantity("s", above=0, example="60 s")] = Field(
+        default=60.0, description="Time after which a call of another maker's unit is ended"
+    )
+    units: Literal["separate", "one"] = Field(
+        default="separate",
+        description="Structure, drives and friction as units of their own, or as one unit (machine.fmu), same results",
+    )
+
+
+# --- A scenario: a machine, its motions, how the units are coupled, what is recorded and what is evaluated ------------
+
 
 # --- What an acceptance sheet needs besides the readings: limits, the uncertainty of the measurement, conditions ------
 

@@ -19,8 +19,8 @@ from pydantic import (
     model_validator,
 )
 
-from feedsim import variables
-from feedsim.fields import File, Model, brief, fault
+from feedsim.files.fields import File, Model, brief, fault
+from feedsim.foundation import variables
 
 SHIPPED, FOREIGN, ANOTHER_LAW = "[shipped]", "[foreign]", "[law]"  # tags of unions, in brackets, being no keys
 LUGRE = "lugre"  # the law of friction.fmu

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from feedsim import units
+from feedsim.foundation import units
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -20,8 +20,7 @@ def json_schema(kind: Kind = "scenario") -> dict[str, Any]:
     It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
     to be seen together. What it refuses, load() refuses too.
     """
-    from feedsim.files.columns import Columns
-    from feedsim.files.tolerances import ToleranceFile
+    from feedsim.files.columns import Columns, ToleranceFile
     from feedsim.scenario.machine import Machine
     from feedsim.scenario.model import Scenario
     from feedsim.scenario.study.file import StudyFile
@@ -64,7 +63,7 @@ def _structure_schema() -> dict[str, Any]:
     """One of the kinds; which is for `kind` to say."""
     from pydantic.json_schema import models_json_schema
 
-    from feedsim.scenario.structure.load import STRUCTURE_KINDS
+    from feedsim.scenario.structure.checks import STRUCTURE_KINDS
 
     references, schema = models_json_schema([(model, "validation") for model in STRUCTURE_KINDS.values()])
     options = [references[model, "validation"] for model in STRUCTURE_KINDS.values()]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import errors
-from feedsim.scenario.structure.matrices import SI, UnitSystem
+from feedsim.foundation import errors
+from feedsim.scenario.structure.parts import SI, UnitSystem
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -12,11 +12,10 @@ from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse.csgraph import connected_components
 
-from feedsim import units
-from feedsim.errors import InputError
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.scenario.structure.matrices import FiniteElements
+from feedsim.scenario.structure.parts import FiniteElements, GeometryStructure
 from feedsim.structure.assembly import (
     DEGREES,
     MAX_SHOWN_LABELS,
@@ -28,7 +27,7 @@ from feedsim.structure.assembly import (
     few,
     translating_mass,
 )
-from feedsim.structure.factor import symmetric_factors
+from feedsim.structure.eigenpairs import symmetric_factors
 from feedsim.structure.geometry.assemble import assemble as assemble_geometry
 from feedsim.structure.matrices.build import import_model
 from feedsim.structure.solve import Solution, solve

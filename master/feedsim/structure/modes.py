@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.files.trace.cells import named_columns, twice
+from feedsim.files.trace.files import written_whole
+from feedsim.foundation.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import Floats
 from feedsim.structure.mounts import MountTable, factored, friction_cycle, read_mounts, viscous_cycle
-from feedsim.trace.files import written_whole
-from feedsim.trace.layout import named_columns, twice
 
 MODE, FREQUENCY, DAMPING = "mode", "frequency [Hz]", "damping ratio [1]"
 TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")

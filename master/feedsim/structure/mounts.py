@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.errors import InputError
+from feedsim.files.trace.files import written_whole
+from feedsim.foundation.errors import InputError
 from feedsim.structure.assembly import Assembly, Floats
-from feedsim.trace.files import written_whole
 
 MOUNTS_FILE = "mounts.csv"
 

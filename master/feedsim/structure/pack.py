@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.errors import InputError, OutputError
-from feedsim.owned import TemporaryFolder
+from feedsim.foundation.errors import InputError, OutputError
+from feedsim.foundation.owned import TemporaryFolder
 
 if TYPE_CHECKING:
-    from feedsim.nc import Program
+    from feedsim.simulation.nc import Program
     from feedsim_packager.machine_tables import MachineTables
     from feedsim_packager.resources import Resources
     from feedsim_packager.setpoints import Setpoints

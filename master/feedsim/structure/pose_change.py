@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.cache import cached
-from feedsim.errors import FeedsimError
+from feedsim.foundation.cache import cached
+from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario import Machine
-from feedsim.structure.file import CODE, State, digest_of, state_of
+from feedsim.structure.eigenpairs import CODE, State, digest_of, state_of
 from feedsim.structure.modes import TOOL_PORTS
 
 if TYPE_CHECKING:
@@ -352,7 +352,7 @@ def _compliances(axis: str, ends: tuple[_End, _End, _End]) -> tuple[Compliance, 
 
 def _static(axis: str, assembly: Assembly, solution: Solution) -> list[float]:
     """Displacements under unit loads, less the rigid motion that they accelerate."""
-    from feedsim.structure.factor import SparseFactor
+    from feedsim.structure.eigenpairs import SparseFactor
 
     rigid = solution.shapes[:, solution.modes.rigid]
     moved = assembly.mass @ rigid

@@ -14,11 +14,10 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure import Damping
 from feedsim.structure.assembly import Assembly, Floats, Integers
-from feedsim.structure.eigenpairs import MASSLESS, Eigenpairs, dense, lanczos
-from feedsim.structure.factor import not_definite
+from feedsim.structure.eigenpairs import MASSLESS, Eigenpairs, dense, lanczos, not_definite
 from feedsim.structure.modes import TOOL_PORTS, Modes
 
 # --- What moves in a mode: the share of its kinetic energy per body, and how the body moves, in words -----------------

@@ -13,7 +13,7 @@ from feedsim_packager.errors import CompilerError, InputError
 
 from .project import PROJECT, files
 
-PLACE = "feedsim/shipped/"  # where feedsim.installation looks
+PLACE = "feedsim/shipped/"  # where feedsim.foundation.installation looks
 SCENARIOS = "scenarios"
 # Folder under binaries/ -> what pip calls a platform that such a binary runs on. glibc 2.17 and macOS 11 as in targets.
 TAGS = {
@@ -107,7 +107,7 @@ def _plain(compiler: Sequence[str]) -> dict[str, bytes]:
     """Scenarios, and what the master knows of the units' variables."""
     tables = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
     result = {PLACE + path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in files(SCENARIOS)}
-    return result | {"feedsim/variables.json": declared.dump(tables)}
+    return result | {"feedsim/foundation/variables.json": declared.dump(tables)}
 
 
 def zig() -> tuple[str, ...]:

@@ -1,5 +1,5 @@
 """Unit expressions -> exponents of the FMI base units and conversion factors: for the tables of the units, and for what
-people write in the master's files (feedsim.units).
+people write in the master's files (feedsim.foundation.units).
 
 Grammar (as in Modelica): factors joined by "." (or "*") and "/", parentheses, integer powers ("m/s2", "m/s^2", "s-1").
 "/" takes the one factor behind it: N.m.s/rad, (m/min)/mm. The angle is a dimension of its own, as FMI has it, hence

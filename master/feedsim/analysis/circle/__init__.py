@@ -1,13 +1,13 @@
 """Why a circle is not round: the radial deviation of one direction or of both taken apart into causes.
 
 May use analysis.figures, analysis.circularity, trace and units. Simulated circles and recorded ones are the same to it.
-Start with model.py, the terms and their fit (estimation/robust.py); diagnosis.py says what share of G each term has.
+Start with model.py, the terms and their fit (estimation/least_squares.py); diagnosis.py says what share of G each term
+has.
 """
 
-from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, diagnose
+from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, Vibration, diagnose
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import separating_radius
-from feedsim.analysis.circle.vibration import Vibration
 from feedsim.analysis.circle.words import answer, further, name, sentence, swinging, worth_telling
 
 __all__ = [

@@ -36,6 +36,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.analysis.circle.doubts import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.circle.geometry import (
     ANGLE_TERMS,
     FEWEST_PITCHES,
@@ -50,10 +51,9 @@ from feedsim.analysis.circle.geometry import (
     undo,
 )
 from feedsim.analysis.circle.setup import Offset, angle_offset, axle_by_clock, form_waves, set_up_moves
-from feedsim.analysis.circle.tails import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.figures import Array
 from feedsim.estimation.interval import pair_quantile, student
-from feedsim.estimation.robust import CHANGE_FLOOR, covariance_of, robust_fit, rounding
+from feedsim.estimation.least_squares import CHANGE_FLOOR, covariance_of, robust_fit, rounding
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
 ANGLE_AHEAD, ANGLES_BEHIND = 2.0, (30.0, 45.0, 60.0)
@@ -181,7 +181,7 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     both which leaves less is taken.
     """
     if not circle.recorded:
-        return _told(circle, paths, {})
+        return _fit_with_lengths(circle, paths, {})
     still = dict.fromkeys(ANGLE_TERMS, (0.0, CHANGE_FLOOR))
     wide = _fit(circle, paths, Left(*np.radians(EDGE_SEARCH_ANGLES)), Shape(known=still))
     lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
@@ -190,10 +190,10 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     offset = angle_offset(paths, wide.angle, signals, [which < 0 for which in wide.reversal], axle)
     angles = (offset.angle, offset.deviation), *zip(offset.axle, offset.axle_deviation, strict=True)
     lengths = [(circle.radius * value, circle.radius * deviation) for value, deviation in angles]
-    return replace(_told(circle, paths, dict(zip(still, lengths, strict=True))), offset=offset)
+    return replace(_fit_with_lengths(circle, paths, dict(zip(still, lengths, strict=True))), offset=offset)
 
 
-def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], known: Known) -> Fit:
+def _fit_with_lengths(circle: CircleUnderTest, paths: Sequence[TurnedPath], known: Known) -> Fit:
     """With what is known of terms beforehand."""
     pitched = _pitched(circle, paths, Shape(known=known))
     moved = sum(math.hypot(pitched[a], pitched[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))

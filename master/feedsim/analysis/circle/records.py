@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import units
 from feedsim.analysis.circle.doubts import (
     OFF_FEED,
     check_feed,
@@ -30,12 +29,12 @@ from feedsim.analysis.circle.doubts import (
 from feedsim.analysis.circle.geometry import CLOSED, CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
-from feedsim.errors import InputError, few
-from feedsim.files.columns import Columns
-from feedsim.files.spellings import spelled
+from feedsim.files.columns import Columns, spelled
+from feedsim.files.trace import Recording, read_recording
+from feedsim.files.trace.recording import mapped
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError, few
 from feedsim.motions.circular import SENSE_WORDS
-from feedsim.trace import Recording, read_recording
-from feedsim.trace.recording import mapped
 
 # --- Radius and feed that an instrument writes ahead of the columns of a circle, such as "Radius: 150 mm" -------------
 # Instruments of several makers, and controls, export circles as text; how their own files are built is not public.

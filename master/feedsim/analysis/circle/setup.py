@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.analysis.circle.doubts import Tails
 from feedsim.analysis.circle.geometry import Moved, TurnedPath
-from feedsim.analysis.circle.tails import Tails
 from feedsim.analysis.figures import Array
 
 # Angles [deg]: over which means are compared for an edge, how far it may be off its place, how far apart places are

@@ -17,6 +17,7 @@ from feedsim.linear.loops import (
     speed_gain,
     speed_reference,
     structure,
+    unstable_poles,
 )
 from feedsim.linear.margins import (
     Bandwidth,
@@ -34,7 +35,6 @@ from feedsim.linear.margins import (
     pairs,
     peak,
 )
-from feedsim.linear.stability import unstable_poles
 from feedsim.linear.system import Closed, LinearSystem
 
 __all__ = [

@@ -10,6 +10,7 @@ import numpy as np
 
 from feedsim.analysis.figures import Figure
 from feedsim.linear import loops
+from feedsim.linear.loops import unstable_poles
 from feedsim.linear.margins import (
     Bandwidth,
     Extreme,
@@ -23,7 +24,6 @@ from feedsim.linear.margins import (
     peak,
 )
 from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
-from feedsim.linear.stability import unstable_poles
 from feedsim.linear.system import LinearSystem
 
 LOWEST_FREQUENCY = 1.0  # [Hz]

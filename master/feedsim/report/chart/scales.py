@@ -10,10 +10,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from feedsim.report.chart.layout import FINER_UNITS, MAX_DIGITS, MIN_TICKS, NARROWEST, PHASES, ROOM
-from feedsim.report.chart.model import Axis, Curve, Panel, spans
-from feedsim.report.formatting import SUPERSCRIPTS, minus
-from feedsim.report.style import Array
+from feedsim.report.chart.model import (
+    FINER_UNITS,
+    MAX_DIGITS,
+    MIN_TICKS,
+    NARROWEST,
+    PHASES,
+    ROOM,
+    Axis,
+    Curve,
+    Panel,
+    spans,
+)
+from feedsim.report.formatting import SUPERSCRIPTS, Array, minus
 
 Range = tuple[float, float]
 EXPONENT_BELOW, EXPONENT_FROM = 1e-4, 1e7  # of a number that is written digit by digit

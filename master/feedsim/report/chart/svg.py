@@ -7,21 +7,28 @@ Start with svg(), which places the panels; panel.py, polar.py and grid.py draw o
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from html import escape
+from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.report.chart.layout import (
+from feedsim.foundation.installation import ask
+from feedsim.report.chart.model import (
     BAND,
     BLOCK,
     BOTTOM,
     CELL_WITH_NAME,
     CELL_WITH_NUMBER,
+    CLOSED,
     DASHES,
     DEPTH,
+    FAINT,
     FILL,
     GAP,
     HEIGHT,
@@ -29,6 +36,8 @@ from feedsim.report.chart.layout import (
     LEFT,
     LETTER,
     LINE_PITCH,
+    NEXT,
+    OUTER,
     RIGHT,
     ROUND,
     ROW,
@@ -39,25 +48,170 @@ from feedsim.report.chart.layout import (
     TICK_HEIGHT,
     TICK_WIDTH,
     TOP,
+    Axis,
+    Band,
+    Chart,
+    Curve,
+    Grid,
+    Level,
+    Mark,
+    Panel,
+    Part,
+    Polar,
+    along,
+    extremes,
 )
 from feedsim.report.chart.model import MOST_ROWS as MOST_IN_PAGE
-from feedsim.report.chart.model import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Part, Polar, along, extremes
-from feedsim.report.chart.polar import (
-    HALO,
-    circle,
-    draw_polar,
-    fill,
-    heading,
-    line,
-    path,
-    rectangle,
-    stroke,
-    text,
-    turned,
-)
-from feedsim.report.chart.scales import Range, Ticks, apart, measured, ranges, tick_text, ticks
-from feedsim.report.formatting import minus, three
-from feedsim.report.style import BLUE, GRID, INK, MUTED, VERMILLION, Array
+from feedsim.report.chart.scales import Range, Ticks, apart, measured, ranges, round_step, tick_text, ticks
+from feedsim.report.formatting import BLUE, GRID, INK, MUTED, PAGE_COLOURS, VERMILLION, Array, minus, named, three
+
+# --- A polar panel of an SVG: deviations about the programmed circle, with rings and the directions of the plane ------
+
+
+# --- Shapes and words of an SVG as text, in pixels, coloured by the page's variables ----------------------------------
+
+
+# Words over curves.
+HALO = 'font-size="11" paint-order="stroke" stroke="var(--ground)" stroke-width="3" stroke-linejoin="round"'
+BOLD = 'font-weight="600"'
+
+
+def fill(colour: str) -> str:
+    """A colour of the palette as a page's variable."""
+    return f"var(--{named(colour)})"
+
+
+def text(x: float, y: float, words: str, look: str = "", colour: str = INK, anchor: str = "start") -> str:
+    """Words with their foot at y; nothing where there are none."""
+    if not words:
+        return ""
+    side = f' text-anchor="{anchor}"' if anchor != "start" else ""
+    return f'<text x="{x:.1f}" y="{y:.1f}" fill="{fill(colour)}"{side} {look}>{escape(words)}</text>'
+
+
+def turned(x: float, y: float, words: str, angle: float, look: str = "") -> str:
+    """Words turned about (x, y)."""
+    place = f'transform="translate({x:.1f} {y:.1f}) rotate({angle:g})"'
+    return f'<text {place} fill="{fill(INK)}" {look}>{escape(words)}</text>' if words else ""
+
+
+def heading(words: str, x: float, room: float) -> str:
+    """The title of a panel, as small as its room makes it."""
+    size = min(12.0, 12 * room / (7.6 * len(words) or 1))
+    return text(x, 15, words, BOLD + (f' font-size="{size:.1f}"' if size < 12 else ""))
+
+
+def line(x1: float, y1: float, x2: float, y2: float, look: str) -> str:
+    """A straight line."""
+    return f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" {look}/>'
+
+
+def circle(x: float, y: float, r: float, look: str) -> str:
+    """A circle, empty unless `look` fills it."""
+    empty = "" if "fill=" in look else ' fill="none"'
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"{empty} {look}/>'
+
+
+def rectangle(x: float, y: float, wide: float, tall: float, look: str) -> str:
+    """A rectangle, empty unless `look` fills it."""
+    empty = "" if "fill=" in look else ' fill="none"'
+    return f'<rect x="{x:.1f}" y="{y:.1f}" width="{wide:.1f}" height="{tall:.1f}"{empty} {look}/>'
+
+
+def path(a: Array, b: Array) -> str:
+    """Lines through points; they break where one is not finite."""
+    known = np.isfinite(a) & np.isfinite(b)
+    begins = known & ~np.concatenate([[False], known[:-1]])
+    return "".join(
+        f"{'M' if begin else 'L'}{x:.1f} {y:.1f}"
+        for x, y, begin, there in zip(a.tolist(), b.tolist(), begins.tolist(), known.tolist(), strict=True)
+        if there
+    )
+
+
+def stroke(curve: Curve, width: float | None = None) -> str:
+    """How a curve is drawn."""
+    dash = f' stroke-dasharray="{DASHES[curve.dash]}"' if curve.dash else ""
+    faint = f' stroke-opacity="{FAINT}"' if curve.faint else ""
+    return f'stroke="{fill(curve.colour)}" stroke-width="{width or curve.width:g}" fill="none"{dash}{faint}'
+
+
+ROWS = 800  # of a turn
+
+
+def draw_polar(panel: Polar, width: float, height: float, clip: str) -> str:
+    """The panel, the circle in the middle; clip: an id of its own."""
+    gap = panel.gap
+    half = min(width, height - 24) / 2 - 20
+    cx, cy, reach = width / 2, 24 + (height - 24) / 2, panel.ring * panel.rings
+    outer = 1 + OUTER * gap * panel.rings
+    one = half / outer
+    step = round_step(reach / 2.4)
+    count = math.floor(reach / step + 1e-9)
+
+    def radius(deviation: float) -> float:
+        return one * (1 + gap * deviation / panel.ring)
+
+    parts = [text(4, 15, panel.title, BOLD)]
+    for k in range(-count, count + 1):
+        look = f'stroke="{fill(GRID)}" stroke-width="0.9"'
+        dashed = f'stroke="{fill(MUTED)}" stroke-width="1.1" stroke-dasharray="7 4"'
+        parts.append(circle(cx, cy, radius(k * step), look if k else dashed))
+    for axis, x, y in ((panel.axes[0], 1.0, 0.0), (panel.axes[1], 0.0, -1.0)):
+        for sign, name in ((1, f"{axis}+"), (-1, f"{axis}−")):
+            a, b = sign * x, sign * y
+            parts.append(line(cx, cy, cx + half * a, cy + half * b, f'stroke="{fill(GRID)}" stroke-width="0.9"'))
+            parts.append(text(cx + (half + 11) * a, cy + (half + 11) * b + 4, name, BOLD, anchor="middle"))
+    parts.append(f'<clipPath id="{clip}"><circle cx="{cx:g}" cy="{cy:g}" r="{half + 8:.1f}"/></clipPath>'
+                 f'<g clip-path="url(#{clip})">')  # fmt: skip
+    for curve in panel.curves:
+        angle, deviation = curve.x, curve.y
+        if len(angle) > ROWS:
+            angle, deviation = angle[rows := extremes(deviation, ROWS)], deviation[rows]
+        if not len(angle):
+            continue
+        away = one * np.clip(1 + gap * deviation / panel.ring, 0.0, 2 * outer)
+        # Not with start or stop in it, and no arc.
+        turned = abs(math.sin((angle[-1] - angle[0]) / 2)) < NEXT
+        closed = "Z" if turned and abs(deviation[-1] - deviation[0]) < CLOSED * reach else ""
+        way = path(cx + away * np.cos(angle), cy - away * np.sin(angle))
+        parts.append(f'<path d="{way}{closed}" {stroke(curve)}/>')
+    parts.append("</g>")
+    for k in range(-count, count + 1):
+        at = radius(k * step) * math.sqrt(0.5)
+        words = f"{'+' if k > 0 else ''}{tick_text(k * step)} µm" if k else "0"
+        parts.append(text(cx + at, cy - at + 4, words, HALO.replace('"11"', '"10.5"', 1), MUTED, "middle"))
+    inside = one * (1 - OUTER * gap)
+    for mark in panel.marks:
+        right, up = math.cos(mark.x), math.sin(mark.x)
+        r = radius(mark.y)
+        a, b = cx + r * right, cy - r * up
+        to = (cx + inside * right, cy - inside * up)
+        if mark.text:
+            parts.append(line(a, b, *to, f'stroke="{fill(mark.colour)}" stroke-width="0.9"'))
+        parts.append(circle(a, b, 4, f'fill="{fill(mark.colour)}"'))
+        side = round(right)
+        words_at = (to[0] - 3 * side, to[1] + 4 + 9 * round(up))
+        parts.append(text(*words_at, mark.text, HALO, anchor=("start", "middle", "end")[side + 1]))
+    for k, words in enumerate(panel.note.split("\n")):
+        parts.append(text(cx, cy - 0.3 * one + 14 * k, words, 'font-size="11"', MUTED, "middle"))
+    if panel.sense:
+        parts.append(_sense(cx, cy + 0.36 * one, 0.16 * one, panel.sense))
+    return "".join(parts)
+
+
+def _sense(x: float, y: float, r: float, sense: int) -> str:
+    """An arrow that shows which way the circle is driven."""
+    first, last = (math.radians(angle) for angle in ((50, 130) if sense > 0 else (130, 50)))
+    (a, b), (c, d) = ((x + r * math.cos(angle), y - r * math.sin(angle)) for angle in (first, last))
+    arc = f"M{a:.1f} {b:.1f}A{r:.1f} {r:.1f} 0 0 {0 if sense > 0 else 1} {c:.1f} {d:.1f}"
+    tip = f"M{c:.1f} {d:.1f}l{7 * sense} -1l{-2.5 * sense} -5.5Z"
+    return (f'<path d="{arc}" fill="none" stroke="{fill(MUTED)}" stroke-width="1.3"/>'
+            f'<path d="{tip}" fill="{fill(MUTED)}"/>')  # fmt: skip
+
+
+# --- A chart as text of an SVG, as the page draws it at first: for readers without script, for print, and for PNG -----
+
 
 # --- Words within a panel, where no curve is: what curves and words cover, in small squares, and the place of each word
 # Sizes are pixels. The page's script places words by the same rules.
@@ -541,3 +695,63 @@ def _sample(curve: Curve | Band, x: float, y: float) -> str:
     if curve.dots:
         return circle(x + 11, y, max(2.4, curve.width), f'fill="{fill(curve.colour)}"')
     return line(x, y, x + 22, y, stroke(curve, max(1.6, curve.width)))
+
+
+# --- A drawing as a file of its own: SVG with colours as numbers, a size, and words above it; and PNG drawn from
+#     that
+# The package resvg_py draws the PNG, with the font of this room (a part of DejaVu Sans): text looks alike wherever it
+# is drawn.
+
+
+FONT = 'system-ui, "Segoe UI", Arial, "DejaVu Sans", sans-serif'
+EDGE = 10.0  # pixels about the drawing
+FONTS = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf")
+PIXELS = 1.75  # of a PNG for one of the SVG
+REMARK_SIZE, CAPTION_SIZE = 8.0, 9.5
+CAPTION_WIDTH = 170  # letters of a line
+
+
+def standalone(drawn: str, title: str, caption: str = "", remark: str = "") -> str:
+    """An SVG of a page as text of a file. caption: stands above it, below the title; without it there is neither."""
+    words: list[str] = []
+    y = 4.0
+    for line in remark.split("\n") if remark else ():
+        y += REMARK_SIZE + 2
+        words.append(text(WIDTH, y, line, f'font-size="{REMARK_SIZE:g}"', MUTED, "end"))
+    if caption:
+        y += 18
+        words.append(text(0, y, title, f'{BOLD} font-size="14"'))
+        for line in textwrap.wrap(caption, CAPTION_WIDTH):
+            y += CAPTION_SIZE + 4
+            words.append(text(0, y, line, f'font-size="{CAPTION_SIZE:g}"', MUTED))
+        y += 8
+    inside = drawn[drawn.index(">") + 1 : -len("</svg>")]
+    known = re.search(r'viewBox="0 0 [\d.]+ ([\d.]+)" (font-size="[\d.]+")', drawn)
+    assert known
+    wide, tall = WIDTH + 2 * EDGE, float(known[1]) + y + 2 * EDGE
+    size = f'width="{wide:g}" height="{tall:g}" viewBox="0 0 {wide:g} {tall:g}" {known[2]}'
+    head = (f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" {size} '
+            f'font-family="{escape(FONT)}">')  # fmt: skip
+    ground = rectangle(0, 0, wide, tall, 'fill="var(--ground)"')
+    body = f'{ground}<g transform="translate({EDGE:g} {EDGE:g})">{"".join(words)}<g transform="translate(0 {y:g})">'
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{coloured(head + body + inside)}</g></g></svg>\n'
+
+
+def coloured(drawn: str) -> str:
+    """An SVG with colours as numbers."""
+    return re.sub(r"var\(--(\w+)\)", lambda match: PAGE_COLOURS[match[1]], drawn)
+
+
+def png(drawn: str, pixels: float = PIXELS) -> bytes:
+    """An SVG file as PNG, with so many pixels for one of it. Raises MissingPackage."""
+    ask("a drawing", "figures")
+    from resvg_py import svg_to_bytes
+
+    family = "DejaVu Sans"
+    with ExitStack() as stack:
+        folder = resources.files("feedsim.report") / "fonts"
+        fonts = [str(stack.enter_context(resources.as_file(folder / name))) for name in FONTS]
+        return bytes(svg_to_bytes(
+            svg_string=drawn, zoom=pixels, skip_system_fonts=True, font_files=fonts, font_family=family,
+            sans_serif_family=family,
+        ))  # fmt: skip

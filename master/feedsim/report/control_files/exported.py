@@ -6,18 +6,46 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim import sheets
 from feedsim.analysis import Figure
-from feedsim.control.archive import Archive
-from feedsim.control.writing import Written
-from feedsim.findings import Note
-from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code
-from feedsim.report.control_files.sources import sources_section
+from feedsim.files.control import Name
+from feedsim.files.control.archive import Archive
+from feedsim.files.control.writing import Written
+from feedsim.foundation import outputs
+from feedsim.foundation.errors import Note
+from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import counted, minus, plain_unit
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.sections import provenance_section
 from feedsim.scenario.machine import Machine
+
+# --- Which public source says what a number of a control means, and in which unit -------------------------------------
+
+
+NOTE = (
+    "Confirmed: a public source that was opened states meaning and unit. Of all others the unit is supposed: they are "
+    "taken and written only where --checked names them, or where the file states the unit."
+)
+
+
+def sources_section(names: Iterable[Name]) -> Section | None:
+    """A row for every name, confirmed ones first."""
+    each_once = sorted(dict.fromkeys(names), key=lambda name: not name.confirmed)
+    rows: list[tuple[Text, ...]] = [
+        (
+            code(name.number),
+            name.name,
+            name.unit or "–",
+            "confirmed" if name.confirmed else "not confirmed",
+            name.source,
+        )
+        for name in each_once
+    ]
+    heads = ("Number", "Name", "Unit", "Unit and meaning", "Source")
+    return Section("Where names and units come from", [Table("llllp", heads, rows, NOTE)], "sources") if rows else None
+
+
+# --- The report of an export to a control's files: what was changed, what is to be typed, old and new values ----------
+
 
 KIND = "machine export"
 SHEET = "sheet.csv"
@@ -95,7 +123,7 @@ def sheet(written: Written) -> str:
          "yes" if change.name.confirmed else "no", "yes" if change.written else "no", change.reason, change.where)
         for change in written.changes
     )  # fmt: skip
-    return sheets.text_of((heads, *rows))
+    return outputs.text_of((heads, *rows))
 
 
 def report_of(

@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from feedsim import sheets
 from feedsim.analysis import Figure
-from feedsim.control.archive import Archive
-from feedsim.control.reading import Reading, Refused, Taken
-from feedsim.findings import Note
-from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code
-from feedsim.report.control_files.sources import sources_section
+from feedsim.files.control.archive import Archive
+from feedsim.files.control.reading import Reading, Refused, Taken
+from feedsim.foundation import outputs
+from feedsim.foundation.errors import Note
+from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code, provenance_section
+from feedsim.report.control_files.exported import sources_section
 from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
-from feedsim.report.sections import provenance_section
 from feedsim.scenario.imported import Imported, place_of, written
 from feedsim.scenario.machine import Machine
 
@@ -122,7 +121,7 @@ def sheet(reading: Reading, made: Imported) -> str:
          gone.reason, gone.where)
         for gone in (*reading.refused, *made.refused)
     )  # fmt: skip
-    return sheets.text_of((heads, *taken, *refused))
+    return outputs.text_of((heads, *taken, *refused))
 
 
 def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inputs: Sequence[Path]) -> Report:

@@ -4,7 +4,7 @@ May use the report's core and the analyses.
 Start with report.py.
 """
 
+from feedsim.report.frf.bode import answers
 from feedsim.report.frf.report import FILES, draw, files_of, report_of, summary
-from feedsim.report.frf.words import answers
 
 __all__ = ["FILES", "answers", "draw", "files_of", "report_of", "summary"]

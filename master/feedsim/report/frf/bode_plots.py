@@ -19,6 +19,7 @@ from feedsim.analysis.responses import Responses
 from feedsim.linear.loops import COMPLIANCE, LOOP_QUANTITIES
 from feedsim.linear.margins import Bandwidth, Margins, Pair
 from feedsim.linear.plant import TOOL_DIRECTIONS
+from feedsim.report.content import Picture
 from feedsim.report.frf.bode import (
     Column,
     Curve,
@@ -29,7 +30,6 @@ from feedsim.report.frf.bode import (
     margin_marks,
     pair_marks,
 )
-from feedsim.report.picture import Picture
 
 Columns = Mapping[str, Sequence[Curve]]  # by axis or direction
 Span = tuple[float, float] | None  # frequencies shown [Hz]; None: all

@@ -13,24 +13,34 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.analysis.truncation import FULL, Truncation, deviation, structure_responses
+from feedsim.files.trace.response import FrequencyResponse
+from feedsim.files.trace.response_files import write_response
+from feedsim.foundation.units import convert
 from feedsim.linear.judgement import GAIN_MARGIN
 from feedsim.linear.plant import TOOL_DIRECTIONS
-from feedsim.report import sections
+from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
-from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, tile_value
-from feedsim.report.formatting import display_unit, minus, number, typeset
-from feedsim.report.frf.bode import Ordinate
+from feedsim.report.content import FOLDER, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value
+from feedsim.report.formatting import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    Array,
+    display_unit,
+    minus,
+    number,
+    remarked,
+    typeset,
+)
+from feedsim.report.frf.bode import Ordinate, answers
 from feedsim.report.frf.bode_plots import nearest_to_its_limit, pictures_of
-from feedsim.report.frf.words import answers
-from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.results import Content
-from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, remarked
 from feedsim.scenario import Drive, Subject
 from feedsim.structure import Modes
-from feedsim.trace.response import FrequencyResponse
-from feedsim.trace.response_files import write_response
-from feedsim.units import convert
 
 # --- The full finite-element model against what was kept of it: responses and deviations in dB ------------------------
 
@@ -172,9 +182,9 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         tiles=_tiles(responses),
         lead=nearest_to_its_limit(responses),
         next_step=_next(subject, responses),
-        main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
+        main=[*pictures, _resonances(responses), _agreement(responses), content.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),
-        footer=sections.figures_footer(
+        footer=content.figures_footer(
             f"Values in full precision: summary.json; curves: frf.csv{', frf_measured.csv' * bool(responses.campaign)}."
         ),
     )
@@ -274,9 +284,9 @@ def _provenance(subject: Subject, responses: Responses) -> Section:
             for entry in (campaign.excited if campaign else ())
         ),
     ]
-    archives = sections.archives_table(campaign.units) if campaign else None
-    return sections.provenance_section(
-        rows, input_files(subject, responses), archives, sections.parameters_section(responses.machine)
+    archives = content.archives_table(campaign.units) if campaign else None
+    return content.provenance_section(
+        rows, input_files(subject, responses), archives, content.parameters_section(responses.machine)
     )
 
 

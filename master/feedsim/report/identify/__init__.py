@@ -1,6 +1,6 @@
 """The report of an identification of friction: friction.yaml, tables as CSV, summary.json, report.html and figures.
 
-May use the report's core and what `feedsim.identify` found.
+May use the report's core and what `feedsim.estimation.identify` found.
 Start with report.py.
 """
 

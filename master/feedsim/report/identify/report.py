@@ -8,28 +8,27 @@ from typing import Literal
 
 import numpy as np
 
+from feedsim.estimation.identify import Identified, friction_file
+from feedsim.estimation.identify.friction_file import FRICTION_FILE
+from feedsim.estimation.identify.result import Balance, Correlation, Dynamic, Estimate, Identification, Stretch
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import Identified, friction_file
-from feedsim.identify.friction_file import FRICTION_FILE
-from feedsim.identify.result import Balance, Correlation, Dynamic, Estimate, Identification, Stretch
 from feedsim.report.chart import Axis, Chart, Curve, Grid, Level, Panel
-from feedsim.report.content import FOLDER, Bullets, Paragraph, Part, Report, Section, Step, Table, Text, Tile, code
-from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
-from feedsim.report.identify import stribeck_plots as quantities
-from feedsim.report.identify.stribeck_plots import (
-    SPEED_AXIS,
-    TIME_AXIS,
-    TORQUE_AXIS,
-    ZERO,
-    plateaus_picture,
-    stribeck_picture,
+from feedsim.report.content import (
+    FOLDER,
+    Bullets,
+    Paragraph,
+    Part,
+    Picture,
+    Report,
+    Section,
+    Step,
+    Table,
+    Text,
+    Tile,
+    code,
+    provenance_section,
 )
-from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv
-from feedsim.report.picture import Picture
-from feedsim.report.provenance import software
-from feedsim.report.results import Content
-from feedsim.report.sections import provenance_section
-from feedsim.report.style import (
+from feedsim.report.formatting import (
     BLUE,
     GREEN,
     MUTED,
@@ -40,8 +39,25 @@ from feedsim.report.style import (
     SIMULATED,
     VERMILLION,
     Array,
+    counted,
+    display_unit,
+    minus,
+    powers,
     remarked,
+    typeset,
 )
+from feedsim.report.identify import stribeck_plots as quantities
+from feedsim.report.identify.stribeck_plots import (
+    SPEED_AXIS,
+    TIME_AXIS,
+    TORQUE_AXIS,
+    ZERO,
+    plateaus_picture,
+    stribeck_picture,
+)
+from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv
+from feedsim.report.provenance import software
+from feedsim.report.results import Content
 
 # --- The pictures of a report on an identification; those of stage 1 are in stribeck_plots ----------------------------
 

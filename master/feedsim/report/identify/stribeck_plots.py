@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from feedsim.estimation.identify import Identified
+from feedsim.estimation.identify.parameters import torque as motor_torque
+from feedsim.estimation.identify.record import Record
+from feedsim.estimation.identify.result import Estimate, Identification, Plateau, Stationary
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify import Identified
-from feedsim.identify.parameters import torque as motor_torque
-from feedsim.identify.record import Record
-from feedsim.identify.result import Estimate, Identification, Plateau, Stationary
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Panel
-from feedsim.report.formatting import counted, powers
-from feedsim.report.picture import Picture
+from feedsim.report.content import Picture
+from feedsim.report.formatting import ORANGE, OTHERWISE, RECORDED, SIMULATED, Array, counted, powers
 from feedsim.report.provenance import InputFile, hashed
-from feedsim.report.style import ORANGE, OTHERWISE, RECORDED, SIMULATED, Array
 
 # --- What the report of an identification shows: error of the curve, values at the slide, units, files read -----------
 

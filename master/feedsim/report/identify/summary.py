@@ -11,16 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.identify import Identified, friction_file
-from feedsim.identify.friction_file import FRICTION_FILE
-from feedsim.identify.read import recording_day
-from feedsim.identify.result import Balance, Estimate, Identification
-from feedsim.report.formatting import counted
+from feedsim.estimation.identify import Identified, friction_file
+from feedsim.estimation.identify.friction_file import FRICTION_FILE
+from feedsim.estimation.identify.read import recording_day
+from feedsim.estimation.identify.result import Balance, Estimate, Identification
+from feedsim.files.trace.files import quoted, shortest
+from feedsim.report.formatting import Array, counted
 from feedsim.report.identify import stribeck_plots as quantities
 from feedsim.report.identify.stribeck_plots import MM_PER_MIN
 from feedsim.report.provenance import finite, inputs_part, machine_part, quantity, software
-from feedsim.report.style import Array
-from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1
 TABLE_COLUMNS = 118  # columns of the terminal's table

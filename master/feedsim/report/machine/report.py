@@ -12,19 +12,45 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.report.chart.file import png, standalone
-from feedsim.report.chart.polar import BOLD, circle, fill, line, rectangle, text
-from feedsim.report.chart.svg import WIDTH
-from feedsim.report.content import FOLDER, Animation, Paragraph, Report, Section, Step, Table, Text, Tile
-from feedsim.report.formatting import display_unit, minus, number, typeset
-from feedsim.report.machine.model import Model, Motion, extent, model, motion, rotor_disc, solids
-from feedsim.report.machine.projection import FRONT, OBLIQUE, SIDE, TOP, Box, Faces, Field, View, hexadecimal
-from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange, moves
-from feedsim.report.picture import Picture
+from feedsim.report.chart.svg import BOLD, WIDTH, circle, fill, line, png, rectangle, standalone, text
+from feedsim.report.content import (
+    FOLDER,
+    Animation,
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Step,
+    Table,
+    Text,
+    Tile,
+    provenance_section,
+)
+from feedsim.report.formatting import INK, MUTED, PAPER, VERMILLION, Array, display_unit, minus, number, typeset
+from feedsim.report.machine.record import (
+    FRONT,
+    MEANINGS,
+    OBLIQUE,
+    SIDE,
+    TOP,
+    USUAL_EXCHANGE,
+    Box,
+    Faces,
+    Field,
+    Model,
+    Motion,
+    View,
+    exchange,
+    extent,
+    hexadecimal,
+    model,
+    motion,
+    moves,
+    rotor_disc,
+    solids,
+)
 from feedsim.report.provenance import hashed
 from feedsim.report.results import FIGURES, Content
-from feedsim.report.sections import provenance_section
-from feedsim.report.style import INK, MUTED, PAPER, VERMILLION, Array
 from feedsim.scenario.structure import Structure
 from feedsim.structure.build import Built
 from feedsim.structure.geometry.outline import deflection, node_motion

@@ -8,34 +8,44 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
-from feedsim.arguments import spelt
-from feedsim.control import names_of
+from feedsim.estimation.identify import AxisLimits, Provenance
+from feedsim.estimation.identify.friction_file import interval_text, value_text
+from feedsim.estimation.identify.read import recording_day
+from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.findings import Note, Wrong
-from feedsim.identify import AxisLimits, Provenance
-from feedsim.identify.friction_file import interval_text, value_text
-from feedsim.identify.read import recording_day
-from feedsim.identify.result import Estimate
-from feedsim.replay.compare import Comparison
-from feedsim.replay.drive import DriveFound
-from feedsim.replay.elastic import ElasticMode
-from feedsim.replay.identified import DrivesFound
-from feedsim.replay.machine_files import drive_file, friction_file
-from feedsim.replay.moving_lines import in_words
-from feedsim.replay.rivals import ERROR_RATE
-from feedsim.replay.tuning import OtherCycle, decision
-from feedsim.report.content import FOLDER, Paragraph, Report, Section, Step, Table, Text, Tile, code, tile_value
-from feedsim.report.control import asked, control_section
-from feedsim.report.formatting import display_unit, minus, powers, three, typeset
+from feedsim.estimation.replay.compare import Comparison
+from feedsim.estimation.replay.drive import DriveFound
+from feedsim.estimation.replay.identified import DrivesFound
+from feedsim.estimation.replay.machine_files import ElasticMode, drive_file, friction_file
+from feedsim.estimation.replay.moving_lines import in_words
+from feedsim.estimation.replay.tuning import ERROR_RATE, OtherCycle, decision
+from feedsim.files.control import names_of
+from feedsim.files.trace import Mark
+from feedsim.foundation.arguments import spelt
+from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.units import convert
+from feedsim.report.changes import asked, control_section
+from feedsim.report.content import (
+    FOLDER,
+    Paragraph,
+    Report,
+    Section,
+    Step,
+    Table,
+    Text,
+    Tile,
+    code,
+    figures_footer,
+    figures_section,
+    provenance_section,
+    tile_value,
+)
+from feedsim.report.formatting import display_unit, minus, powers, remarked, three, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
-from feedsim.report.replay.plots import pictures_of
+from feedsim.report.replay.report import pictures_of
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.sections import figures_footer, figures_section, provenance_section
-from feedsim.report.style import remarked
 from feedsim.scenario import Drive, Friction, Machine, Subject
-from feedsim.scenario.parameter_group import ParameterGroup
-from feedsim.trace import Mark
-from feedsim.units import convert
+from feedsim.scenario.axis_units import ParameterGroup
 
 # --- Identified values beside those of the machine file that was given, in the control's words too --------------------
 

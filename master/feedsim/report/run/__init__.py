@@ -7,9 +7,9 @@ Start with files.py, then report.py, the page; pose.py has the plant's pose.
 from feedsim.report.changes import action
 from feedsim.report.provenance import input_paths
 from feedsim.report.run.files import check_writable, files_of, growing, page_of, write
+from feedsim.report.run.files import needed as workbook_needed
 from feedsim.report.run.report import answers, changes, first_proposals, summary_line
 from feedsim.report.run.sheet import in_workbook
-from feedsim.report.run.workbook import needed as workbook_needed
 
 __all__ = [
     "action",

@@ -7,10 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from feedsim.analysis import Approach, Figures, deviation
 from feedsim.analysis.positioning import PLATEAU
+from feedsim.files.trace import Trace, release
+from feedsim.foundation.errors import InputError
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Mark, Panel, column_of
-from feedsim.report.formatting import minus
-from feedsim.report.picture import Picture
-from feedsim.report.style import (
+from feedsim.report.content import Picture
+from feedsim.report.formatting import (
     ALLOWED,
     AT_TOOL,
     BLUE,
@@ -24,8 +25,9 @@ from feedsim.report.style import (
     SIMULATED,
     SKY,
     VERMILLION,
+    display_unit,
+    minus,
 )
-from feedsim.trace import Trace, release
 
 TIME = Axis("time", "s")
 TOOL_TITLE, SCALE = "tool point", "linear scale x_a"
@@ -182,3 +184,37 @@ def reversed_note(axes: Iterable[str], signs: Mapping[str, int]) -> str:
 
 def _value(figures: Figures, name: str) -> float:
     return figures[name].value if name in figures else math.nan
+
+
+# --- Recorded signals over time, a row of the picture for each unit ---------------------------------------------------
+
+
+# SI unit -> what signals in it are.
+QUANTITIES = {
+    "m": "position", "rad/s": "speed", "N.m": "torque", "A": "current", "V": "voltage", "N": "force", "rad": "angle",
+    "m/s": "speed", "m/s^2": "acceleration",
+}  # fmt: skip
+MAX_SIGNALS = 12  # signals in a picture
+
+
+def signals_picture(trace: Trace, title: str) -> Picture:
+    """All columns of a trace, those of one unit together. Raises InputError for more than can be distinguished."""
+    if not 0 < len(trace.names) <= MAX_SIGNALS:
+        raise InputError(f"{len(trace.names)} signals in one picture; from 1 to {MAX_SIGNALS} can be distinguished")
+    curves = {
+        name: Curve(name, trace.time, trace[name], OF_AXES[k % len(OF_AXES)], "" if k < len(OF_AXES) else "dashed")
+        for k, name in enumerate(trace.names)
+    }
+    panels = []
+    for unit in dict.fromkeys(trace.unit(name) for name in trace.names):
+        own = [name for name in trace.names if trace.unit(name) == unit]
+        panels.append(
+            Panel(
+                ", ".join(own),
+                TIME,
+                Axis(QUANTITIES.get(unit, "value"), display_unit(unit)),
+                [curves[name] for name in own],
+                linked="t",
+            )
+        )
+    return Picture("signals", title, ", ".join(trace.names), Chart(panels))

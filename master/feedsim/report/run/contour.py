@@ -9,18 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim import sheets
 from feedsim.analysis import ContourError
 from feedsim.analysis.contour_error import SHARE_WORDS
-from feedsim.part_program import Motion
+from feedsim.foundation import outputs
+from feedsim.motions.part_program import Motion
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
 from feedsim.report.chart.model import extremes
-from feedsim.report.content import Section, Table, Text, code
-from feedsim.report.formatting import counted, minus, number
-from feedsim.report.picture import Picture
-from feedsim.report.provenance import quantity
-from feedsim.report.run.axis_plots import TIME, TOOL_TITLE
-from feedsim.report.style import (
+from feedsim.report.content import Picture, Section, Table, Text, code
+from feedsim.report.formatting import (
     AT_TOOL,
     FRICTION,
     GREEN,
@@ -31,7 +27,12 @@ from feedsim.report.style import (
     SKY,
     VERMILLION,
     Array,
+    counted,
+    minus,
+    number,
 )
+from feedsim.report.provenance import quantity
+from feedsim.report.run.axis_plots import TIME, TOOL_TITLE
 
 BLOCKS_FILE = "blocks.csv"
 WORST = 12  # blocks of the report's table
@@ -342,7 +343,7 @@ def blocks_csv(error: ContourError) -> str:
     for row, cells in enumerate(values.tolist()):
         motion = Motion(int(moves.motion[row])).name.lower()
         place = (row, names[moves.file[row]], int(moves.line[row]), moves.text(row), motion, limits[row])
-        words = sheets.text_of([place])
+        words = outputs.text_of([place])
         lines.append(f"{words.rstrip()},{(numbers % tuple(cells)).replace('nan', '')}")
     return "\n".join(lines) + "\n"
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feedsim.judge import PoseUse
-from feedsim.report.content import Paragraph, Part, Section, Table
+from feedsim.report.content import Paragraph, Part, Section, Table, pairs_table
 from feedsim.report.formatting import counted, minus
 from feedsim.report.provenance import quantity
-from feedsim.report.sections import pairs_table
+from feedsim.simulation.judge import PoseUse
 from feedsim.structure.pose_change import (
     COMPLIANCE_SHARE,
     MAX_MODE_FREQUENCY,

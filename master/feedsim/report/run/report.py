@@ -24,33 +24,29 @@ from feedsim.analysis import (
     tasks,
 )
 from feedsim.analysis.circle import worth_telling
-from feedsim.findings import severity
-from feedsim.judge import JudgedRun
-from feedsim.report import sections
-from feedsim.report.changes import action, change_words, changes_section
+from feedsim.design.tune import Proposal, of_run
+from feedsim.design.tune.proposals import rings
+from feedsim.files.trace import Trace
+from feedsim.foundation.errors import severity
+from feedsim.foundation.units import show
+from feedsim.report import content
+from feedsim.report.changes import action, change_words, changes_section, control_section
 from feedsim.report.chart import Chart, Panel
-from feedsim.report.content import FOLDER, Paragraph, Report, Section, Span, Step, Table, Tile, tile_value
+from feedsim.report.content import FOLDER, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
 from feedsim.report.content import TILES as TILES_SHOWN
-from feedsim.report.control import control_section
-from feedsim.report.formatting import counted, duration, number, two, typeset
-from feedsim.report.picture import Picture
+from feedsim.report.formatting import NARROW, counted, duration, number, remarked, two, typeset
 from feedsim.report.provenance import (
     friction_origins,
     input_files,
 )
 from feedsim.report.run import sheet
-from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import OVERSHOOT_TITLE, overview_picture, positioning_picture
-from feedsim.report.run.circle_plots import contour_picture, torque_picture
+from feedsim.report.run.circle_plots import accuracy_picture, accuracy_section, contour_picture, torque_picture
 from feedsim.report.run.contour import contour_pictures, contour_section, contour_words, widened
 from feedsim.report.run.diagnosis import cause_tile, diagnosis_section
 from feedsim.report.run.pose import pose_section
-from feedsim.report.style import NARROW, remarked
 from feedsim.scenario import Drive, Level, Logging
-from feedsim.trace import Trace
-from feedsim.tune import Proposal, of_run
-from feedsim.tune.proposals import rings
-from feedsim.units import show
+from feedsim.simulation.judge import JudgedRun
 
 # --- What a stop and a positioning cycle come to, in a sentence or two: the answer, its meaning, what to do next ------
 
@@ -266,14 +262,14 @@ def report_of(
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
             *(contour_section(prefix, error) for prefix, error in contours(run).items()),
             *accuracy_sections(run),
-            sections.figures_section(figures),
+            content.figures_section(figures),
             motions_section(run),
             loads_section(run),
             pose_section(run.pose),
             control_section(machine),
         ],
         provenance=provenance(run),
-        footer=sections.figures_footer(footer) if figures else footer,
+        footer=content.figures_footer(footer) if figures else footer,
     )
 
 
@@ -473,8 +469,8 @@ def provenance(run: JudgedRun) -> Section:
             + (", inside one unit" if coupling.units == "one" else ""),
         ),
     ]
-    used, parameters = sections.archives_table(run.units), sections.parameters_section(machine)
-    return sections.provenance_section(rows, input_files(scenario), used, _coupling(run.coupling), parameters)
+    used, parameters = content.archives_table(run.units), content.parameters_section(machine)
+    return content.provenance_section(rows, input_files(scenario), used, _coupling(run.coupling), parameters)
 
 
 def _coupling(coupling: Mapping[str, float]) -> Section | None:

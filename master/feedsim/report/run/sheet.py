@@ -13,18 +13,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from feedsim import sheets
 from feedsim.analysis import AccuracyTask, CircleTask, Figure, contour, tasks
 from feedsim.analysis.circularity import Turn
-from feedsim.cosim import Run
+from feedsim.files.trace import Trace
+from feedsim.foundation import outputs as sheets
 from feedsim.motions.circular import SENSE_WORDS
+from feedsim.report.content import Picture
 from feedsim.report.formatting import minus
-from feedsim.report.picture import Picture
-from feedsim.report.run.accuracy import accuracy_picture
-from feedsim.report.run.circle_plots import contour_picture
+from feedsim.report.run.circle_plots import accuracy_picture, contour_picture
 from feedsim.scenario import CircleTest, PositioningAccuracy, Scenario
 from feedsim.scenario.model import OF_CIRCLES, OF_POSITIONING, Sheet
-from feedsim.trace import Trace
+from feedsim.simulation.cosim import Run
 
 HTML, CSV, XLSX = "sheet.html", "sheet.csv", "sheet.xlsx"
 SIMULATED = "Simulated by feedsim. Nothing was measured on a machine."

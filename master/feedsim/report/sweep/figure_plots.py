@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel
-from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILLION, Array
+from feedsim.report.content import Picture
+from feedsim.report.formatting import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILLION, Array
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
 
 MOST_BARS = 14

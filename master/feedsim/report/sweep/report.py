@@ -11,14 +11,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from feedsim.design.sweep.sensitivity import Indices, Trends, is_constant
+from feedsim.design.sweep.table import record_of
 from feedsim.report.chart import Chart, Grid
-from feedsim.report.content import FOLDER, LEAD_ROWS, Paragraph, Part, Report, Section, Step, Table, Text, Tile, code
-from feedsim.report.formatting import counted, minus, number, rounded, three, with_interval
-from feedsim.report.picture import Picture
+from feedsim.report.content import (
+    FOLDER,
+    LEAD_ROWS,
+    Paragraph,
+    Part,
+    Picture,
+    Report,
+    Section,
+    Step,
+    Table,
+    Text,
+    Tile,
+    code,
+    parameters_section,
+    provenance_section,
+)
+from feedsim.report.formatting import NARROW, Array, counted, minus, number, remarked, rounded, three, with_interval
 from feedsim.report.results import write_report
 from feedsim.report.run.report import HEADER, is_leading
-from feedsim.report.sections import parameters_section, provenance_section
-from feedsim.report.style import NARROW, Array, remarked
 from feedsim.report.sweep.account import (
     NOTHING,
     QUANTILES,
@@ -30,16 +44,15 @@ from feedsim.report.sweep.account import (
     Measure,
     Output,
     measures,
+    study_files,
+    summary,
 )
 from feedsim.report.sweep.figure_plots import grid_picture, of_account
-from feedsim.report.sweep.summary import study_files, summary
-from feedsim.sweep.sensitivity import Indices, Trends, is_constant
-from feedsim.sweep.table import record_of
 
 if TYPE_CHECKING:
+    from feedsim.design.sweep.design import Design
+    from feedsim.design.sweep.table import Table as Runs
     from feedsim.scenario.study import Study
-    from feedsim.sweep.design import Design
-    from feedsim.sweep.table import Table as Runs
 
 
 # --- All pictures of a study in the order of the page, and the first of them: which parameter moves which figure ------

@@ -3,7 +3,7 @@ const SPACE = "http://www.w3.org/2000/svg";
 const {
   BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, FINER_UNITS, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
   NARROWEST, NEXT, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP,
-} = LAYOUT; // feedsim.report.chart.layout
+} = LAYOUT; // feedsim.report.chart.model
 const NARROW = 640, COLUMN = 250;
 const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
 

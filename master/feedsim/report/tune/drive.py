@@ -9,19 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from feedsim import sheets
 from feedsim.analysis import Figure
-from feedsim.arguments import spelt
-from feedsim.control import Name, names_of
-from feedsim.findings import Note, Wrong
-from feedsim.replay.machine_files import drive_file, drive_text
-from feedsim.report import sections
+from feedsim.design.tune.drive import NOISE, TORQUE, WORSE, Case, Changed, Margins, Point, Tuned, decibels
+from feedsim.design.tune.knobs import EFFECTS
+from feedsim.design.uncertainty import interval, share_of
+from feedsim.estimation.replay.machine_files import drive_file, drive_text
+from feedsim.files.control import Name, names_of
+from feedsim.foundation import outputs
+from feedsim.foundation.arguments import spelt
+from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.units import convert
+from feedsim.foundation.variables import parameters
+from feedsim.report import content
+from feedsim.report.changes import asked
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import (
     FOLDER,
     Bullets,
     Paragraph,
     Part,
+    Picture,
     Report,
     Section,
     Step,
@@ -31,20 +38,11 @@ from feedsim.report.content import (
     code,
     tile_value,
 )
-from feedsim.report.control import asked
-from feedsim.report.formatting import minus, typeset
-from feedsim.report.picture import Picture
+from feedsim.report.formatting import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, minus, remarked, typeset
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, remarked
 from feedsim.report.uncertainty import drawn_values
 from feedsim.scenario import Scenario
-from feedsim.tune.drive import NOISE, TORQUE
-from feedsim.tune.drive_result import WORSE, Case, Changed, Margins, Point, Tuned, decibels
-from feedsim.tune.effects import EFFECTS
-from feedsim.uncertainty import interval, share_of
-from feedsim.units import convert
-from feedsim.variables import parameters
 
 # --- What the intervals of identified values make of a tuned drive: figures, findings, a sentence and a section -------
 
@@ -166,7 +164,7 @@ def drives(tuned: Tuned) -> dict[str, str]:
 def sheet(tuned: Tuned, control: str = "") -> str:
     """Values to type: old and new, in the control's unit where its name is known."""
     heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter")
-    return sheets.text_of((heads, *rows(tuned, control)))
+    return outputs.text_of((heads, *rows(tuned, control)))
 
 
 def rows(tuned: Tuned, control: str = "") -> Iterator[tuple[str, ...]]:
@@ -438,10 +436,10 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
             _margins(tuned),
             *drawn_section(tuned, figures),
             *(_errors(case) for case in tuned.judged if not tuned.kept),
-            sections.figures_section(shown),
+            content.figures_section(shown),
         ],
-        provenance=sections.provenance_section(facts, input_files(tuned.scenario)),
-        footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
+        provenance=content.provenance_section(facts, input_files(tuned.scenario)),
+        footer=content.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
         next_step=Step("Run with the new values", "run", new_values(tuned.scenario)) if tuned.changes else None,
     )
 

@@ -8,25 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from feedsim import sheets
 from feedsim.analysis import Figure
 from feedsim.analysis.figures import Array
-from feedsim.control import Name, names_of
-from feedsim.findings import Note, Wrong
-from feedsim.report import sections
+from feedsim.design.tune.circles import Pair
+from feedsim.design.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, Judged, amplitude
+from feedsim.design.uncertainty import interval, share_of
+from feedsim.files.control import Name, names_of
+from feedsim.foundation import outputs
+from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.units import convert
+from feedsim.foundation.variables import parameters
+from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
-from feedsim.report.content import Paragraph, Report, Section, Step, Table, Text, Tile, code, tile_value
-from feedsim.report.formatting import minus, typeset
-from feedsim.report.picture import Picture
+from feedsim.report.content import Paragraph, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value
+from feedsim.report.formatting import AFTER, BEFORE, NARROW, minus, remarked, typeset
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
-from feedsim.report.style import AFTER, BEFORE, NARROW, remarked
 from feedsim.report.tune.drive import new_values
 from feedsim.report.uncertainty import drawn_values
-from feedsim.tune.circles import Pair
-from feedsim.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, Judged, amplitude
-from feedsim.uncertainty import interval, share_of
-from feedsim.units import convert
-from feedsim.variables import parameters
 
 DASHES: tuple[Dash, ...] = ("", "dashed", "dotted")  # of axes in one panel
 SETTINGS, SHEET = "settings.yaml", "sheet.csv"
@@ -190,7 +188,7 @@ def sheet(judged: Judged) -> str:
             unit, display = _units(parameter)
             cells = ["", "", *(_shown(x, unit, display) for x in (old, value)), display, ""]
         sheet_rows.append([axis, *cells, parameter])
-    return sheets.text_of(sheet_rows)
+    return outputs.text_of(sheet_rows)
 
 
 def _units(parameter: str) -> tuple[str, str]:
@@ -240,10 +238,10 @@ def report_of(judged: Judged) -> Report:
                 "Circles not used for tuning", judged.held_out, judged.held_errors, judged, judged.held_frictionless
             ),
             _errors("Circles tuned on", judged.tuned, judged.tuned_errors, judged),
-            sections.figures_section(figures),
+            content.figures_section(figures),
         ],
-        provenance=sections.provenance_section(rows_, input_files(judged.scenario)),
-        footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
+        provenance=content.provenance_section(rows_, input_files(judged.scenario)),
+        footer=content.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
         next_step=Step("Run with these values", "run", new_values(judged.scenario)) if judged.found.values else None,
     )
 

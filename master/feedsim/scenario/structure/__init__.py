@@ -2,7 +2,7 @@
 kind gives.
 
 May use files, fields and the scenario's base.
-Start with load.py, which reads them.
+Start with checks.py: load_structure reads them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import Field, StrictStr
 
-from feedsim.fields import Model, Quantity
+from feedsim.files.fields import Model, Quantity
 
 
 class DampingStep(Model):

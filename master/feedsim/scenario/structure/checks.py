@@ -6,13 +6,22 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist, hypot
+from pathlib import Path
 from typing import NamedTuple
 
-from feedsim.errors import InputError
-from feedsim.fields import did_you_mean, no_axis
+from feedsim.files.checked import checked, describe, read_group
+from feedsim.files.fields import brief, did_you_mean, no_axis
 from feedsim.files.source import Place
-from feedsim.scenario.structure.geometry import Body, GeometryStructure
-from feedsim.scenario.structure.parts import FRAME
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure import Structure
+from feedsim.scenario.structure.parts import (
+    FRAME,
+    AnsysStructure,
+    Body,
+    CalculixStructure,
+    GeometryStructure,
+    MatrixMarketStructure,
+)
 
 # --- What the names of nodes in a machine written as geometry stand for -----------------------------------------------
 
@@ -431,3 +440,39 @@ def _shown(direction: Iterable[float]) -> str:
         if vector == known:
             return letter
     return f"[{', '.join(f'{part:.6g}' for part in vector)}]"
+
+
+# --- Structure files: which model each kind is read as, and what is checked of it as a whole --------------------------
+
+
+STRUCTURE_FILE = "structure.yaml"
+STRUCTURE_KINDS: dict[str, type[Structure]] = {
+    "geometry": GeometryStructure,
+    "matrices": MatrixMarketStructure,
+    "ansys": AnsysStructure,
+    "calculix": CalculixStructure,
+}
+
+
+def contradictions_of(structure: Structure) -> Iterator[tuple[Place, str]]:
+    """Place and message of what cannot go together in a structure of any kind."""
+    if isinstance(structure, GeometryStructure):
+        yield from contradictions(structure)
+
+
+def load_structure(path: str | Path) -> Structure:
+    """Read and check a structure: a structure file, or a folder with a structure.yaml, as the model its `kind` names.
+
+    Raises InputError like load().
+    """
+    path = Path(path)
+    path = path / STRUCTURE_FILE if path.is_dir() else path
+    source = read_group(path)
+    kind = source.data.get("kind")
+    if kind is None:
+        raise InputError(describe(source, ("kind",), f"missing key 'kind'; allowed: {', '.join(STRUCTURE_KINDS)}"))
+    if not isinstance(kind, str) or kind not in STRUCTURE_KINDS:
+        raise InputError(
+            describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*STRUCTURE_KINDS])}")
+        )
+    return checked(source, STRUCTURE_KINDS[kind], path, contradictions_of)

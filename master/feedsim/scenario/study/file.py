@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, StrictBool, StrictInt, StrictStr, WithJsonSchema, field_validator
 
-from feedsim import units
-from feedsim.fields import File, Model, brief, fault
+from feedsim.files.fields import File, Model, brief, fault
+from feedsim.foundation import units
 
 Method = Literal["grid", "latin_hypercube", "sobol", "sensitivity"]
 Kind = Literal["uniform", "loguniform", "triangular", "normal", "lognormal"]

@@ -9,12 +9,11 @@ from itertools import combinations
 from math import prod
 from pathlib import Path
 
-from feedsim.errors import InputError
-from feedsim.fields import did_you_mean
 from feedsim.files import changes
-from feedsim.files.checked import check, fetch, read_group
-from feedsim.files.problems import describe, dotted, in_order
+from feedsim.files.checked import check, describe, dotted, fetch, in_order, read_group
+from feedsim.files.fields import did_you_mean
 from feedsim.files.source import Source, at
+from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, MeasuredSetpoints
 from feedsim.scenario.base import Base
 from feedsim.scenario.load import Setting

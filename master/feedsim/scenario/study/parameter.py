@@ -12,13 +12,12 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from feedsim import units
-from feedsim.errors import InputError
-from feedsim.fields import Quantity
-from feedsim.files import changes, shape
-from feedsim.files.checked import reading
-from feedsim.files.problems import describe, dotted, quantity_of
+from feedsim.files import changes
+from feedsim.files.checked import describe, dotted, quantity_of, reading
+from feedsim.files.fields import Quantity
 from feedsim.files.source import Mark, Place, Source, at
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.base import Base, Change, data_files
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.study.file import Kind, ParameterEntry
@@ -227,11 +226,11 @@ class Reader:
             for place in result:
                 if place not in seen:
                     seen.add(place)
-                    parent = shape.expected(Scenario, scratch.data, place[:-1])
-                    annotation = shape.child(parent, place[-1])
-                    if place[-1] in _WORDS and shape.keys(parent) is not None:
+                    parent = changes.expected(Scenario, scratch.data, place[:-1])
+                    annotation = changes.child(parent, place[-1])
+                    if place[-1] in _WORDS and changes.keys(parent) is not None:
                         raise InputError(f"{where}: {dotted(place)} is only shown; it changes no run")
-                    if shape.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
+                    if changes.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
                         raise InputError(f"{where}: {dotted(place[:-1])} has no {place[-1]!r}")
                     yield Target(place, annotation, quantity_of(annotation), _is_whole(annotation))
 

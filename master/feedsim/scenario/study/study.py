@@ -10,8 +10,8 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from feedsim.errors import InputError
 from feedsim.files.source import Source, parse
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.base import Base, Change
 from feedsim.scenario.study.file import Kind, Method
 

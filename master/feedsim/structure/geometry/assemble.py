@@ -12,16 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.checks import contradictions, held, node, nodes, pose_faults, rail
-from feedsim.scenario.structure.geometry import GeometryStructure, Mount
-from feedsim.scenario.structure.load import load_structure
-from feedsim.scenario.structure.parts import Drive
+from feedsim.scenario.structure.checks import contradictions, held, load_structure, node, nodes, pose_faults, rail
+from feedsim.scenario.structure.parts import Drive, GeometryStructure, Mount
 from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort
-from feedsim.structure.file import State
-from feedsim.structure.geometry.mesh import FRAME, Mesh, symmetric, weighted
-from feedsim.structure.geometry.points import Row, rigid
+from feedsim.structure.eigenpairs import State
+from feedsim.structure.geometry.mesh import FRAME, Mesh, Row, rigid, symmetric, weighted
 
 # --- Springs of a machine at a pose, each a stiffness and the row of the elongation it resists; and the ports ---------
 # Mounts hold the bed on the ground, carriages hold bodies on rails, bearings hold screws, nuts join bodies to screws,

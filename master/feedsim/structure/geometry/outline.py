@@ -14,11 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.scenario.structure.checks import held, nodes, rail
-from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.scenario.structure.parts import Section
+from feedsim.scenario.structure.parts import GeometryStructure, Section
 from feedsim.structure.assembly import Assembly, Floats, Geometry, Integers
-from feedsim.structure.geometry.mesh import Mesh, area_moments, beam_axes
-from feedsim.structure.geometry.points import Grip, rigid
+from feedsim.structure.geometry.mesh import Grip, Mesh, area_moments, beam_axes, rigid
 
 
 @dataclass(frozen=True, eq=False)

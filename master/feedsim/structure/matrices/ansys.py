@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.errors import InputError
 from feedsim.files import regular
-from feedsim.scenario.structure.matrices import AnsysStructure
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.parts import AnsysStructure
 from feedsim.structure.assembly import DEGREES, counted
-from feedsim.structure.matrices.raw import FREEDOM_NAMES, Raw, from_triangle
-from feedsim.structure.matrices.tables import read_points
+from feedsim.structure.matrices.tables import FREEDOM_NAMES, Raw, from_triangle, read_points
 
 READER = "ansys.mapdl.reader"
 INSTALL = "make ansys (outside a checkout: pip install --no-deps ansys-mapdl-reader)"

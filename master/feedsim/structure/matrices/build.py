@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from feedsim import units
-from feedsim.errors import InputError
 from feedsim.files import regular
-from feedsim.scenario.structure.matrices import (
+from feedsim.foundation import units
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.parts import (
     AnsysStructure,
     CalculixStructure,
     FiniteElements,
@@ -26,8 +26,17 @@ from feedsim.scenario.structure.matrices import (
 )
 from feedsim.structure.assembly import DEGREES, Assembly, Floats, Geometry, Integers, counted, few
 from feedsim.structure.matrices import ansys, calculix
-from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw, from_both, from_triangle, without_zeros
-from feedsim.structure.matrices.tables import NodeTable, read_nodes, read_ports
+from feedsim.structure.matrices.tables import (
+    FREEDOM_NAMES,
+    NodeTable,
+    Points,
+    Raw,
+    from_both,
+    from_triangle,
+    read_nodes,
+    read_ports,
+    without_zeros,
+)
 from feedsim.structure.modes import TOOL_PORTS
 
 # --- Mass and stiffness from Matrix Market files ----------------------------------------------------------------------

@@ -13,13 +13,12 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from feedsim.errors import InputError
 from feedsim.files import regular
-from feedsim.files.references import referred
-from feedsim.scenario.structure.matrices import CalculixStructure
+from feedsim.files.regular import referred
+from feedsim.foundation.errors import InputError
+from feedsim.scenario.structure.parts import CalculixStructure
 from feedsim.structure.assembly import Integers
-from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw, from_triangle
-from feedsim.structure.matrices.tables import read_points
+from feedsim.structure.matrices.tables import FREEDOM_NAMES, Points, Raw, from_triangle, read_points
 
 # Types of elements that CalculiX makes solids of: beams, shells, plane and axisymmetric ones, membranes, trusses.
 _EXPANDED = re.compile(r"B2|B3|S[0-9]|CP[SE]|CAX|M3D|T[23]D")

@@ -1,0 +1,477 @@
+"""What belongs to one process as long as it lives: a folder of results, folders for temporary files, a file that grows.
+
+May use: signals and errors. Start reading at claimed().
+
+A lock of the system on an open file shows whether its owner lives: it goes with the process, whatever has ended that.
+So nothing that a killed process has left keeps others waiting, and the next start removes it.
+"""
+
+from __future__ import annotations
+
+import _thread
+import atexit
+import errno
+import hashlib
+import os
+import platform
+import re
+import secrets
+import shlex
+import shutil
+import signal
+import stat
+import sys
+import tempfile
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+from feedsim.foundation.errors import OutputError
+
+# --- Signals that end a program: none is lost, and none stops what has to come to its end -----------------------------
+# May use: nothing. Start reading at end_program(); held() is for a few steps that belong together.
+#
+# A handler of Python raises wherever the main thread is at work. In a callback from C, in that of a weak reference, in
+# ``__del__`` and in a library with a bare ``except:`` the exception vanishes. An exception that is on its way lives; so
+# one that is dead while the program is still at work has vanished, and the signal is sent once more. While a module is
+# imported none is raised: there libraries make another exception of it, "import failed".
+
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))  # Windows
+LOOK = 0.02  # s between two looks at whether an exception lives
+
+
+class Ended(KeyboardInterrupt, SystemExit):
+    """A signal asks the program to end; whoever lets an interrupt or an exit pass lets this one pass."""
+
+
+def end_program(program: Callable[[], object]) -> None:
+    """Let signals unwind the stack of `program`, which is called next, and end the process with 128 + their number.
+
+    The first one raises Ended, behind an import. Further ones find the program on its way out and do not disturb that.
+    Behind `program` nothing is raised: what is registered with atexit comes to its end first. A signal that is ignored
+    stays so (nohup).
+    """
+    arrived: list[int] = []
+    raised: list[weakref.ref[Ended]] = []
+    dead: list[weakref.ref[Ended]] = []
+    main, shown, hook = threading.main_thread().ident or 0, sys.unraisablehook, sys.excepthook
+
+    def end(number: int, frame: FrameType | None) -> None:
+        arrived.append(number)
+        if len(arrived) == 1:  # a plain thread: those of threading wait for locks that this one may have
+            with suppress(RuntimeError):
+                _thread.start_new_thread(watch, ())
+        while frame is not None and frame.f_code is not program.__code__:
+            if frame.f_code.co_filename.startswith("<frozen importlib"):
+                return
+            frame = frame.f_back
+        if frame is None or len(dead) < len(raised):
+            return
+        ended = Ended(128 + arrived[0])
+        raised.append(weakref.ref(ended, dead.append))
+        try:
+            raise ended
+        finally:
+            del ended  # its traceback would keep it alive by this frame
+
+    def watch() -> None:
+        while True:
+            time.sleep(LOOK)
+            if len(dead) < len(raised):
+                continue
+            if hasattr(signal, "pthread_kill"):
+                signal.pthread_kill(main, arrived[0])  # ends what it waits for, too
+            else:
+                _thread.interrupt_main(signal.Signals(arrived[0]))
+
+    def show(unraisable: Any) -> None:
+        if unraisable.exc_type is not Ended:
+            shown(unraisable)
+
+    def tell(*error: Any) -> None:
+        if not arrived:  # else it is most likely what a library has made of Ended
+            hook(*error)
+
+    def leave() -> None:
+        if arrived:
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(Exception):
+                    stream.flush()
+            os._exit(128 + arrived[0])
+        for number in taken:  # nothing is left to be done
+            signal.signal(number, signal.SIG_DFL)
+
+    taken = [number for number in ENDING if signal.getsignal(number) not in (signal.SIG_IGN, None)]
+    sys.unraisablehook, sys.excepthook = show, tell
+    atexit.register(leave)  # the first, so that it is called last
+    for number in taken:
+        signal.signal(number, end)
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """Let interrupts and requests to end arrive behind the block, not in it.
+
+    For short blocks: steps of which all are done or none, and calls of what would swallow the exception of a handler.
+    In other threads than the main one nothing is to be held: handlers run in the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    arrived: list[int] = []
+    with ExitStack() as last:
+        last.callback(lambda: [*map(signal.raise_signal, arrived)])
+        # What is ignored stays so; None is a handler that was not set from Python and could not be put back.
+        for number in ENDING:
+            if (handler := signal.getsignal(number)) not in (signal.SIG_IGN, None):
+                last.callback(signal.signal, number, handler)
+                signal.signal(number, lambda number, _: arrived.append(number))
+        yield
+
+
+# --- What belongs to one process as long as it lives: a folder of results, folders for temporary files, a file
+#     that grows
+
+
+PREFIX = "feedsim-"  # of folders for temporary files
+_NAME_LETTERS, _LENGTH = "abcdefghijklmnopqrstuvwxyz0123456789_", 8  # of their names behind it, as tempfile has them
+_OWNED_NAME = re.compile(rf"{PREFIX}[{_NAME_LETTERS}]{{{_LENGTH}}}")
+LOCK = ".feedsim.lock"  # in a folder that belongs to a process
+WRITING = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
+YOUNG = 60.0  # s within which a folder without a lock may be one that is just being made
+_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is known by
+_FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
+_LOOK = 0.02  # s between two looks at a lock that is waited for
+_BETWEEN = 1e-4  # s between two attempts at what others may remove at the same moment
+_UNSETTLED = 5.0  # s for which they may
+_folders: dict[tuple[int, str], TemporaryFolder] = {}  # by process and where the system keeps what is temporary
+# What blocks have: locks and folders that were made, by path of the lock, thread and process.
+_claims: dict[tuple[str, int, int], tuple[list[_Lock], list[Path]]] = {}
+
+
+@contextmanager
+def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[None]:
+    """Have a folder alone, among all processes and threads that claim it; it is made where it is missing.
+
+    What is made is removed with the block if nothing is in it then. Blocks of one thread may stand in one another.
+
+    Args:
+        lock: name of the file that shows it.
+        wait: for others to end [s].
+
+    Raises:
+        OutputError: another has it, with who that is; or the folder cannot be written to.
+    """
+    key = os.path.realpath(directory / lock), threading.get_ident(), os.getpid()
+    if key in _claims:
+        yield
+        return
+    made = []
+    for path in (directory.absolute(), *directory.absolute().parents):
+        try:  # one look: what another makes or removes in between is either there or not
+            mode = path.stat().st_mode
+        except OSError:
+            made.append(path)
+            continue
+        if not stat.S_ISDIR(mode):
+            raise OutputError(f"{directory}: cannot be written, {path} is a file; allowed: a directory")
+        break
+    _claims[key] = [], made
+    try:
+        _take(directory, lock, time.monotonic() + wait, _claims[key][0])
+        yield
+    finally:
+        _give_back(key)
+
+
+def _give_back(key: tuple[str, int, int]) -> None:
+    with held():
+        locks, made = _claims[key]
+        while locks:
+            locks.pop().release()
+        for path in made:
+            with suppress(OSError):  # not empty, as a rule
+                path.rmdir()
+        del _claims[key]
+
+
+@atexit.register
+def _give_all_back() -> None:
+    """A signal may have ended a block ahead of its end."""
+    for key in [key for key in _claims if key[2] == os.getpid()]:
+        _give_back(key)
+
+
+def _take(directory: Path, name: str, until: float, locks: list[_Lock]) -> None:
+    """Add the locks that make a folder ours. OutputError."""
+    began = time.monotonic()
+    while True:
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            with held():
+                locks.append(lock := _Lock(directory / name))
+        except OSError as error:
+            between = isinstance(error, (FileNotFoundError, FileExistsError))  # made or removed by another just now
+            if between and not directory.is_symlink() and time.monotonic() < began + _UNSETTLED:
+                time.sleep(_BETWEEN)  # not in step with the other
+                continue
+            raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
+        if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
+            holder = lock.content()
+            if holder and f" on {platform.node()} since " not in holder:
+                locks.pop().close()
+                raise OutputError(
+                    f"{directory}: another process writes its results there, as {lock.path} says: {holder}. If it is "
+                    "not at work any more, remove that file; or take another directory"
+                )
+            unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]
+            with suppress(OSError), held():
+                locks.append(_Lock(Path(tempfile.gettempdir()) / f"{PREFIX}{unique}.lock"))
+        if all(lock.state is not False for lock in locks):
+            lock.tell(_self())
+            return
+        holder = lock.content()
+        while locks:
+            locks.pop().close()
+        if time.monotonic() >= until:
+            who = f": {holder}" if holder else ""
+            raise OutputError(
+                f"{directory}: another process writes its results there{who}; wait until it has ended, or take another "
+                "directory"
+            )
+        time.sleep(_LOOK)
+
+
+def _self() -> str:
+    """This process, for those that meet its lock."""
+    words = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv else "python"
+    shown = "".join(c if c.isprintable() else "?" for c in words)
+    since = time.strftime("%Y-%m-%d %H:%M:%S")
+    return f"process {os.getpid()} on {platform.node()} since {since}: {shown[:300]}"
+
+
+class _Lock:
+    """A file that is locked as long as it is open.
+
+    state: True; False: another has it; None: its file system has no locks.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        while True:
+            try:
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+            except PermissionError:  # another user's, who had the folder before
+                if not path.is_file():
+                    raise
+                self._file = os.open(path, os.O_RDONLY)
+            self.state = locked(self._file)
+            if self.state is not True or _is(path, self._file):
+                return
+            os.close(self._file)  # removed by who had it, between our opening and our locking it
+
+    def tell(self, text: str) -> None:
+        """Write into it for others."""
+        with suppress(OSError):
+            os.ftruncate(self._file, 0)
+            os.lseek(self._file, 0, os.SEEK_SET)
+            os.write(self._file, text.encode("utf-8", "replace"))
+
+    def content(self) -> str:
+        """What its owner has written into it."""
+        with suppress(OSError):
+            os.lseek(self._file, 0, os.SEEK_SET)
+            return os.read(self._file, 4096).decode("utf-8", "replace")
+        return ""
+
+    def close(self) -> None:
+        """Give it back, and leave the file."""
+        with suppress(OSError):
+            os.close(self._file)
+
+    def release(self) -> None:
+        """Remove the file and give it back; ahead of that where the system can, so that none is removed of another."""
+        with suppress(OSError):
+            if os.name != "nt" and _is(self.path, self._file):
+                self.path.unlink()
+        self.close()
+        if os.name == "nt":
+            with suppress(OSError):  # another has opened it meanwhile
+                self.path.unlink()
+
+
+def locked(file: int) -> bool | None:
+    """Lock an open file for this process; False: another has; None: its file system has no locks."""
+    try:
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            import msvcrt
+
+            os.lseek(file, _FAR, os.SEEK_SET)
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return False if error.errno in _HELD else None
+    return True
+
+
+def _is(path: Path, file: int) -> bool:
+    """Whether an open file is the one that has this name now."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file))
+    except OSError:
+        return False
+
+
+class Closing:
+    """What is closed at the end of the block that it is opened for."""
+
+    def close(self) -> None:
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class TemporaryFolder:
+    """A folder for temporary files, removed when it is closed, or at the latest with the process.
+
+    Attributes:
+        path: where it is.
+    """
+
+    def __init__(self, within: Path | None = None, *, lock: bool = False, prefix: str = PREFIX) -> None:
+        """
+        Args:
+            within: where it is made; None: in the folder that this process has where the system keeps what is
+                temporary.
+            lock: whether it shows others that its process lives; what is in such a folder needs no lock of its own.
+            prefix: of its name.
+
+        OutputError: nothing can be written there.
+        """
+        try:
+            while not self._make(within or _folder_of_process(), lock, prefix):
+                pass
+        except OSError as error:
+            where = f"{within}: a folder" if within and not lock else "a folder for temporary files (TMPDIR)"
+            raise OutputError(f"{where} cannot be made: {error.strerror or error}") from error
+
+    def _make(self, parent: Path, lock: bool, prefix: str) -> bool:
+        """Make it. False: another process has the name, or has taken it, while it was empty, for one that is left."""
+        self.path = parent / (prefix + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
+        files: list[int] = []
+        # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
+        self._end = weakref.finalize(self, _remove, self.path, files, os.getpid())
+        try:
+            self.path.mkdir(0o700)
+            if lock:
+                files.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
+            if not lock or (locked(files[0]) is not False and _is(self.path / LOCK, files[0])):
+                return True
+        except (FileExistsError, FileNotFoundError):
+            if not parent.is_dir():
+                raise
+        self._end.detach()
+        for file in files:
+            os.close(file)
+        return False
+
+    def close(self) -> None:
+        """Remove it with all that is in it."""
+        if (known := self._end.peek()) is not None:
+            _remove(*known[2])  # not by calling it, which forgets the folder first: a signal may end this half-way
+            self._end.detach()
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+
+def _folder_of_process() -> Path:
+    """The folder that has all others of this process, so that it leaves one if it is killed.
+
+    It is made when it is needed; then what killed processes have left is removed, too.
+    """
+    key = os.getpid(), tempfile.gettempdir()
+    if (known := _folders.get(key)) is None or not known.path.is_dir():  # cleaners take what has been idle for long
+        _folders.pop(key, None)
+        remove_orphans()
+        known = _folders.setdefault(key, TemporaryFolder(Path(key[1]), lock=True))
+        # Workers that multiprocessing forks end without what atexit and weakref were given.
+        processes = sys.modules.get("multiprocessing.process")
+        if processes is not None and processes.parent_process() is not None:
+            from multiprocessing.util import Finalize
+
+            Finalize(None, known.close, exitpriority=-100)  # the last, like multiprocessing's own folders
+    return known.path
+
+
+def _remove(folder: Path, files: list[int], owner: int) -> None:
+    """Remove a folder and close its lock. A process that was forked off leaves its parent's folders alone."""
+    if os.getpid() != owner:
+        return
+    with held():  # also where an exception of a handler would vanish, and the folder stay
+        until = time.monotonic() + WRITING
+        while not _emptied(folder) and time.monotonic() < until:
+            time.sleep(_LOOK)
+        while files:  # ahead of the rest: Windows does not remove what is open
+            os.close(files.pop())
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _emptied(folder: Path) -> bool:
+    """Remove what is in a folder, but for what shows whose it is: a folder that is half removed still has an owner."""
+    remaining = [path for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else []
+    for path in remaining:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                path.unlink()
+    return not any(os.path.lexists(path) for path in remaining)
+
+
+def remove_orphans() -> None:
+    """Remove this user's folders for temporary files whose process has gone."""
+    folders: list[Path] = []
+    with suppress(OSError):
+        folders += Path(tempfile.gettempdir()).glob(f"{PREFIX}*")
+    for folder in folders:
+        with suppress(OSError):
+            result = folder.lstat()
+            if (
+                _OWNED_NAME.fullmatch(folder.name)
+                and stat.S_ISDIR(result.st_mode)
+                and (not hasattr(os, "geteuid") or result.st_uid == os.geteuid())
+            ):
+                _remove_orphan(folder, time.time() - result.st_mtime)
+
+
+def _remove_orphan(folder: Path, age: float) -> None:
+    """Remove a folder whose lock is free, or which has none and is empty, `age` [s] after its last change. OSError."""
+    try:
+        file = os.open(folder / LOCK, os.O_RDWR)
+    except FileNotFoundError:
+        if age > YOUNG:
+            folder.rmdir()
+        return
+    try:
+        gone = locked(file) is True and _emptied(folder)
+    finally:
+        os.close(file)
+    if gone:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,15 @@
+"""Co-simulation of the units: archives, instances, roles, wiring, what a control cycle is, run, log.
+
+May use nc, structure and what is below them; sole user of fmpy and of the native loop.
+Start with run.py: ``run``; then schedule.py, which says once what a control cycle is, and system.py, on which units.
+"""
+
+from feedsim.foundation.installation import fmus_directory
+from feedsim.simulation.cosim.binaries import executed, executing
+from feedsim.simulation.cosim.loop import Progress
+from feedsim.simulation.cosim.run import Crossings, Follower, Run, check, follow, logged, run
+
+__all__ = [
+    "Crossings", "Follower", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",
+    "run",
+]  # fmt: skip

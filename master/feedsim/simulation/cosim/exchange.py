@@ -1,0 +1,134 @@
+"""The native cycle loop (``src/exchange``): finding its library, and operations executed by it.
+
+It is built into the folder of the archives and is no part of any result: without it, or with one that was built from
+other sources than this package, the loop runs in Python, which takes longer, says so, and gives the same bits.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.foundation import installation
+from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.installation import mend
+from feedsim.simulation.cosim.operations import Bond, Executor, Operation
+
+# src/exchange/exchange.h, word for word.
+VERSION = 5
+OPERATION_CODES = (
+    "set_real", "set_slopes", "do_step", "get_real", "get_slopes", "get_boolean", "get_state", "set_state",
+    "finite", "copy", "line", "rate", "bond", "due", "end",
+)  # fmt: skip
+FIELDS = (
+    ("int32_t", "kind"), ("int32_t", "count"),
+    ("function", "call"), ("address", "component"), ("address", "references"), ("address", "orders"),
+    ("address", "y"), ("double", "s"), ("double", "h"), ("address", "a"), ("address", "b"),
+    ("int64_t", "what"), ("int64_t", "every"), ("int64_t", "next"), ("int64_t", "stride"), ("int64_t", "rows"),
+    ("int64_t", "row"),
+)  # fmt: skip
+BOND = tuple(field.name for field in fields(Bond))
+INTERFACE = (
+    f"{VERSION}: {' '.join(OPERATION_CODES)}; {' '.join(f'{kind} {name},' for kind, name in FIELDS)}; "
+    + " ".join(f"address {name}," for name in BOND)
+)
+
+_TYPES = {"int32_t": np.int32, "int64_t": np.int64, "double": np.float64, "function": np.uintp, "address": np.uintp}
+_OPERATION = np.dtype([(name, _TYPES[kind]) for kind, name in FIELDS], align=True)
+LIBRARY_NAME = installation.library_name("exchange")
+
+Native = ctypes.CDLL  # the loaded library
+
+
+class _Fault(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_int64) for name in ("cycle", "operation", "looked_at", "changed_by"))
+
+
+@cache
+def library(folder: Path) -> Native | str:
+    """The native loop beside the archives in `folder`, or why none there can be used, without the folder's name."""
+    loaded = installation.library("exchange", folder, INTERFACE)
+    if not isinstance(loaded, str):
+        for run in (loaded.exchange_run, loaded.exchange_run_marked):
+            run.restype = ctypes.c_int
+            run.argtypes = (
+                ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
+            )  # fmt: skip
+    return loaded
+
+
+def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Note, ...]]:
+    """The native loop in the first of `folders` that has one; without one, unless it is not wanted, what that costs.
+
+    wanted: None: where there is one that fits; False: Python is to work.
+
+    Raises:
+        InputError: it is wanted, and there is none that fits.
+    """
+    if wanted is False:
+        return None, ()
+    reasons = []
+    for cdll in map(library, dict.fromkeys(folders)):
+        if not isinstance(cdll, str):
+            return cdll, ()
+        reasons.append(cdll)
+    why = f"{'; '.join(dict.fromkeys(reasons))}; {mend('the native loop')}"
+    if wanted:
+        raise InputError(f"{', '.join(map(str, folders))}: no native cycle loop that fits this version: {why}")
+    return None, (Note(f"the cycle loop ran in Python, some 30 times slower than the native one, same bits: {why}"),)
+
+
+class Exchange(Executor):
+    """Has operations worked by the native loop."""
+
+    def __init__(self, loop: Native, operations: Sequence[Operation], T_c: float) -> None:
+        super().__init__(operations, T_c)
+        self._native = loop
+        self._bonds: list[NDArray[np.uintp]] = []  # as the operations point to them
+        self._fault = _Fault()
+        self._looked_at = -1  # the last operation whose unit was found to change how the process computes
+        self._table = np.zeros(len(self._operations) + 1, dtype=_OPERATION)
+        self._table["kind"] = OPERATION_CODES.index("end")
+        for at, operation in enumerate(self._operations):
+            self._write(self._table[at], operation)
+
+    def _write(self, row: Any, o: Operation) -> None:
+        row["kind"], row["count"], row["s"], row["h"] = OPERATION_CODES.index(o.kind), o.count, o.s, o.h
+        for name in ("references", "orders", "y", "a", "b"):
+            row[name] = getattr(o, name).ctypes.data
+        if o.unit is not None and o.kind != "finite":
+            row["call"], row["component"] = o.unit.address(o.kind), o.unit.component
+        if o.bond is not None:
+            self._bonds.append(np.array([getattr(o.bond, name).ctypes.data for name in BOND], dtype=np.uintp))
+            row["a"] = self._bonds[-1].ctypes.data
+        if o.when is not None:
+            row["kind"], row["what"] = OPERATION_CODES.index("due"), row["kind"]
+            row["next"], row["every"] = o.when.first, o.when.every
+            row["rows"], row["stride"] = len(o.y), o.y.strides[0]
+
+    def run(self, begin: int, end: int) -> None:
+        mark = self.mark
+        fault = self._fault if mark is None else _Fault.from_address(mark.numbers.ctypes.data)
+        # Windows has no process of its own for other makers' units: there all are looked after.
+        run = self._native.exchange_run if mark is None and os.name == "posix" else self._native.exchange_run_marked
+        fault.looked_at, fault.changed_by = self._looked_at, -1
+        status = run(self._table.ctypes.data, self._T_c, begin, end, ctypes.byref(fault))
+        if fault.changed_by >= 0:
+            self._looked_at = fault.changed_by
+            unit = self._operations[fault.changed_by].unit
+            assert unit is not None
+            unit.warn_of_arithmetic()
+        if status:
+            self.done = fault.cycle
+            self._fail(fault.operation, status)
+        self.done = end
+        if mark is not None:
+            mark.back()

@@ -1,0 +1,10 @@
+"""The system of Fig. 2 as one SSP file for other people's simulators, and such a file run by feedsim.
+
+May use cosim, structure, nc, scenario and trace.
+Start with export.py and, the other way, opened.py.
+"""
+
+from feedsim.simulation.ssp.export import Exported, export
+from feedsim.simulation.ssp.opened import Opened, opened
+
+__all__ = ["Exported", "Opened", "export", "opened"]

@@ -162,7 +162,8 @@ class Panel:
 
     Attributes:
         linked: panels of one chart with the same word are zoomed together along their abscissae.
-        note: said in a corner. height: against the usual one.
+        note: said in a corner. height: against the usual one. equal: a unit is as long on both axes; the shorter span
+            is widened about its middle.
     """
 
     title: str
@@ -175,6 +176,7 @@ class Panel:
     linked: str = ""
     note: str = ""
     height: float = 1.0
+    equal: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,6 +374,7 @@ def _part(part: Part, pool: _Pool) -> dict[str, Any]:
         "levels": [_level(level) for level in part.levels],
         "bands": [_band(band, pool, part) for band in part.bands], "marks": [_mark(mark) for mark in part.marks],
         "linked": part.linked, "note": part.note, "height": part.height,
+        **({"equal": True} if part.equal else {}),
     }  # fmt: skip
 
 

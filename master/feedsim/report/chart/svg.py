@@ -316,14 +316,21 @@ def above(panel: Panel) -> float:
     return TOP + (SECOND if panel.x.also is not None else 0)
 
 
-def frame_of(panel: Panel, box: Box) -> Frame:
-    """For a box on paper."""
+def frame_of(panel: Panel, box: Box, aside: float) -> Frame:
+    """For a box on paper. aside: room at the right."""
     across, up = ranges(panel)
     tall = box[3] - above(panel) - BOTTOM
-    heights = ticks(panel.y, up, len(panel.y.names) or max(2, int(tall / TICK_HEIGHT)))
-    names = panel.y.names
+    names, most = panel.y.names, len(panel.y.names) or max(2, int(tall / TICK_HEIGHT))
+    heights = ticks(panel.y, up, most)
     beside = max((6.6 * len(name) + (26 if names else 30) for name in names or heights.texts), default=0.0)
-    return Frame(across, up, heights, min(max(LEFT, beside), 0.45 * box[2]))
+    left = min(max(LEFT, beside), 0.45 * box[2])
+    if panel.equal:
+        wide = box[2] - left - aside
+        unit = max((across[1] - across[0]) / wide, (up[1] - up[0]) / tall)
+        across, up = (((low + high - unit * size) / 2, (low + high + unit * size) / 2)
+                      for (low, high), size in ((across, wide), (up, tall)))  # fmt: skip
+        heights = ticks(panel.y, up, most)
+    return Frame(across, up, heights, left)
 
 
 def draw_panel(panel: Panel, box: Box, frame: Frame, aside: float, clip: str) -> str:
@@ -610,7 +617,9 @@ def svg(chart: Chart, stem: str, title: str) -> str:
     """Text of the SVG with ids of its own."""
     parts, top = _legend(chart)
     boxes, height = placed(chart)
-    frames = {k: frame_of(part, boxes[k]) for k, part in enumerate(chart.panels) if isinstance(part, Panel)}
+    frames = {
+        k: frame_of(part, boxes[k], _aside(chart)) for k, part in enumerate(chart.panels) if isinstance(part, Panel)
+    }
     for k, part in enumerate(chart.panels):
         x, y, wide, tall = boxes[k]
         name = f"{stem}-still-{k}"

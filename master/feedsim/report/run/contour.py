@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,9 +38,8 @@ WORST = 12  # blocks of the report's table
 SHARE_COLOURS = {"plan": GREEN, "servo": SIMULATED, "friction": FRICTION, "structure": ORANGE}
 # Classes of the path's picture, as shares of the largest distance, and their colours.
 CLASSES = ((0.25, GREEN), (0.5, SKY), (0.75, PURPLE), (1.0, VERMILLION))
-# Of the picture: rows of the path, share of its width that the largest distance is magnified to, and its shape.
-MOST_ROWS, MAGNIFIED, HEIGHT, ASPECT = 6000, 0.05, 2.0, 2.0
-FIRST_ASPECT = 2.5  # on the first screen
+# Of the picture: rows of the path, share of its width that the largest distance is magnified to, and its height.
+MOST_ROWS, MAGNIFIED, HEIGHT = 6000, 0.05, 2.0
 # What a main share means, and what to do about it.
 REMEDIES = {
     "plan": "The path itself is rounded there: lower the tolerance.",
@@ -132,28 +130,17 @@ def _path_picture(error: ContourError, stem: str) -> Picture:
         below = share
     seen = np.vstack([programmed, drawn * 1e3])
     low, high = np.nanmin(seen, axis=0), np.nanmax(seen, axis=0)
-    middle, half = (low + high) / 2, (high - low) / 2 * 1.05
-    tall = max(half[1], half[0] / ASPECT)
-    across = Axis(names[i], "mm", span=(middle[0] - ASPECT * tall, middle[0] + ASPECT * tall))
-    up = Axis(names[j], "mm", span=(middle[1] - tall, middle[1] + tall))
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2 * 1.05, 1e-3)
+    across, up = (
+        Axis(names[axis], "mm", span=(middle[k] - half[k], middle[k] + half[k])) for k, axis in enumerate((i, j))
+    )
     where = "tool point" if by == "tool" else "axes, by the linear scales"
     title = f"Deviation from the programmed path, magnified {magnified:,.0f} times"
     caption = (
         f"Programmed path in {names[i]}-{names[j]}, and the {where}: off it by {magnified:,.0f} times the deviation, "
         f"coloured by its size; the largest is {largest * 1e6:.3g} µm."
     )
-    return Picture(stem, title, caption, Chart([Panel("", across, up, curves, height=HEIGHT)]))
-
-
-def widened(picture: Picture) -> Picture:
-    """The path's picture for a frame that is FIRST_ASPECT times as wide as high."""
-    assert picture.chart is not None
-    (panel,) = picture.chart.panels
-    assert isinstance(panel, Panel)
-    assert panel.x.span is not None
-    middle, half = sum(panel.x.span) / 2, (panel.x.span[1] - panel.x.span[0]) / 2 * FIRST_ASPECT / ASPECT
-    wide = replace(panel, x=replace(panel.x, span=(middle - half, middle + half)))
-    return replace(picture, stem=f"{picture.stem}-first", shows=Chart([wide]))
+    return Picture(stem, title, caption, Chart([Panel("", across, up, curves, height=HEIGHT, equal=True)]))
 
 
 def _nice(value: float) -> float:

@@ -42,7 +42,7 @@ from feedsim.report.provenance import (
 from feedsim.report.run import sheet
 from feedsim.report.run.axis_plots import OVERSHOOT_TITLE, overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import accuracy_picture, accuracy_section, contour_picture, torque_picture
-from feedsim.report.run.contour import contour_pictures, contour_section, contour_words, widened
+from feedsim.report.run.contour import contour_pictures, contour_section, contour_words
 from feedsim.report.run.diagnosis import cause_tile, diagnosis_section
 from feedsim.report.run.pose import pose_section
 from feedsim.scenario import Drive, Level, Logging
@@ -359,11 +359,8 @@ def _has_peak(name: str, figures: Mapping[str, Figure]) -> bool:
 
 
 def lead(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
-    """The picture of the first screen, where it is not the first one: a stop without the way to it, a path in a wider
-    frame, which is lower there."""
+    """The picture of the first screen, where it is not the first one: a stop without the way to it."""
     for task in tasks(run.scenario, run.program)[:1]:
-        if isinstance(task, ContourTask) and pictures:
-            return widened(pictures[0])
         if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
             panel = next(
                 (panel for panel in chart.panels if isinstance(panel, Panel) and panel.title == OVERSHOOT_TITLE), None

@@ -57,13 +57,20 @@ class Taken {
 // What a panel shows of its curves, its ticks upwards, and the room that these need at the left.
 function frame_of(panel, box, values, hidden, zoom) {
   const shown = panel.curves.filter(entry => !hidden.has(entry.name));
-  const span = zoom.x || whole_span(panel, values);
-  const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
+  let span = zoom.x || whole_span(panel, values);
+  let height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
   const above = top_of(panel), tall = box.height - above - BOTTOM;
-  const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / TICK_HEIGHT)));
+  const ticked = () => ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / TICK_HEIGHT)));
+  let heights = ticked();
   const widest_of = (texts, wide, more) => texts.reduce((most, entry) => Math.max(most, wide * entry.length + more), 0);
   const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(entry => entry.text || ""), 6.6, 30);
-  return { shown, span, height, above, tall, heights, widest_of, left: Math.min(Math.max(LEFT, beside), box.width * 0.45) };
+  const left = Math.min(Math.max(LEFT, beside), box.width * 0.45);
+  if (panel.equal) { // a unit is as long on both axes
+    const wide = box.width - left - box.aside, unit = Math.max((span[1] - span[0]) / wide, (height[1] - height[0]) / tall);
+    [span, height] = [[span, wide], [height, tall]].map(([[low, high], size]) => [(low + high - unit * size) / 2, (low + high + unit * size) / 2]);
+    heights = ticked();
+  }
+  return { shown, span, height, above, tall, heights, widest_of, left };
 }
 
 // The frames of all panels; those below one another begin alike.

@@ -67,6 +67,8 @@ def test_the_first_sentence_names_deviation_block_and_main_share(ran: Path) -> N
     assert float(found[5]) == pytest.approx(figures[f"contour.{found[4]}"], rel=5e-3)
     assert summary["answer"][0] == first
     assert "M8 (part.mpf:3)" in (ran / "noted").read_text()
+    (following,) = re.findall(r"^  feedsim (run .*)", (ran / "said").read_text(), re.MULTILINE)
+    assert following.count(str(MACHINE)) == 1  # as --machine, not as a change as well
 
 
 def test_all_files_say_the_same_of_the_blocks(ran: Path) -> None:

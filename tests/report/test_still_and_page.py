@@ -53,6 +53,8 @@ CHARTS = {
                            [Mark(0.1, 6.0, "X+: 6 µm")], 1, "a note"),
                      panel(Axis("angle", "°"), Axis("deviation", "µm"), Curve("scales", np.degrees(ANGLE),
                                                                               3 * np.cos(3 * ANGLE)))], (3.0, 2.0)),
+    "one scale": Chart([panel(Axis("X", "mm", span=(-15.0, 15.0)), Axis("Y", "mm", span=(-15.0, 15.0)),
+                              Curve("circle", 15 * np.cos(ANGLE), 15 * np.sin(ANGLE)), height=1.5, equal=True)]),
     "cells": Chart([Grid("cells", ["F_C", "sigma_0"], ["one", "two"], np.array([[0.5, -1.0], [np.nan, 0.25]]),
                          (-1.0, 1.0), 2, np.array([[True, False], [False, False]]), (1, 1))]),
     "a map": Chart([MAP]),
@@ -155,3 +157,11 @@ def test_ticks_are_the_same_at_any_span(browser: Any) -> None:
         assert [text for _, text in marks] == [text for _, text in own.marks], said
         assert [at for at, _ in marks] == pytest.approx([at for at, _ in own.marks], rel=1e-9, abs=1e-12), said
         assert common == own.common, said
+
+
+def test_one_scale_keeps_circles_round() -> None:
+    """Whatever the frame: as wide as high, to the tenth of a pixel that is drawn."""
+    (drawn,) = drawn_panels(svg(CHARTS["one scale"], "circle", "A circle"))[0]
+    x, y = drawn.curves[0][0].T
+    assert np.ptp(x) == pytest.approx(np.ptp(y), abs=0.2)
+    assert np.ptp(y) > 100

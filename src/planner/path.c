@@ -536,14 +536,16 @@ static double leg_within(const Element *e1, const Element *e2, size_t axes, doub
             }
         }
     }
+    /* The deviation grows with the leg, with its square where the directions agree: then along the chord through the
+     * last two, which a curve that bends upwards crosses on the safe side. */
+    const double wanted = 0.98 * tolerance;
     double L = longest, d = deviation(e1, e2, axes, L, cosine);
-    double power = jump > 0.01 ? 1 : 2;
+    double shorter = L * (jump > 0.01 ? wanted / d : sqrt(wanted / d));
     for (int step = 0; step < 20 && d > tolerance; step++) {
-        const double shorter = L * pow(0.98 * tolerance / d, 1 / power);
-        const double reached = deviation(e1, e2, axes, shorter, cosine);
-        power = fmin(fmax(log(d / reached) / log(L / shorter), 0.5), 4);
+        const double reached = deviation(e1, e2, axes, shorter, cosine), slope = (d - reached) / (L - shorter);
         L = shorter;
         d = reached;
+        shorter = fmin(fmax(slope > 0 ? L - (d - wanted) / slope : 0, L / 4), 0.98 * L);
     }
     return d > tolerance ? 0 : L;
 }
@@ -612,7 +614,7 @@ static bool set_limits(const Program *p, Zones *zones, Zone *z, double feed, boo
                 double X3 = fmax(fabs(x[3][i]), fabs(y[3][i]));
                 if (arc) {
                     const double w = z->curve.w;
-                    const double r3 = w * w * w * hypot(z->curve.a[i], z->curve.b[i]);
+                    const double r3 = w * w * w * sqrt(z->curve.a[i] * z->curve.a[i] + z->curve.b[i] * z->curve.b[i]);
                     X3 = fmin(X3 + factor * r3 * w * w, r3);
                     X2 = fmin(X2 + factor * r3 * w, r3 / w);
                     X1 += factor * r3;

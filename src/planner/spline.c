@@ -144,23 +144,23 @@ double fit_spline(Spline *s, double tolerance, size_t *worst) {
     for (size_t k = 1; k < last; k++) {
         s->weight[k] = 2 * mean / (s->h[k - 1] + s->h[k]);
     }
-    /* The exponent of the weight in units of h^3: from interpolation to nearly a straight line. */
-    double low = -4, high = 14;
+    /* The weight in units of h^3: from interpolation to nearly a straight line. */
+    double low = 1e-4, high = 1e14;
     const double unit = mean * mean * mean;
-    solve(s, unit * pow(10, low));
+    solve(s, unit * low);
     const double least = measure_distances(s, worst);
     if (least > tolerance) {
         return least;
     }
-    while (high - low > 0.02) {
-        const double middle = (low + high) / 2;
-        solve(s, unit * pow(10, middle));
+    while (high > 1.05 * low) {
+        const double middle = sqrt(low * high);
+        solve(s, unit * middle);
         if (measure_distances(s, worst) <= tolerance) {
             low = middle;
         } else {
             high = middle;
         }
     }
-    solve(s, unit * pow(10, low));
+    solve(s, unit * low);
     return measure_distances(s, worst);
 }

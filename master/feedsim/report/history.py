@@ -20,12 +20,12 @@ from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.content import FOLDER, Picture, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import (
     ALLOWED,
-    BLUE,
     INK,
     MUTED,
     OTHERWISE,
     RECORDED,
-    VERMILLION,
+    RESIDUAL_COLOUR,
+    SIMULATED,
     counted,
     display_unit,
     minus,
@@ -646,15 +646,15 @@ def _picture(change: Change, history: History) -> Picture:
         days = np.linspace(edges[k], edges[k + 1], CURVE_POINTS)
         level = np.array([model.level(float(day), k) for day in days])
         x = (days - start) / MONTH
-        curves.append(Curve("model", x, level[:, 0], BLUE))
-        bands.append(Band("95 % of the model", level[:, 0] - level[:, 1], level[:, 0] + level[:, 1], x, BLUE))
+        curves.append(Curve("model", x, level[:, 0], SIMULATED))
+        bands.append(Band("95 % of the model", level[:, 0] - level[:, 1], level[:, 0] + level[:, 1], x, SIMULATED))
     levels = []
     if series.name in history.limits:
-        levels.append(Level(history.limits[series.name], "limit", colour=VERMILLION))
+        levels.append(Level(history.limits[series.name], "limit", colour=RESIDUAL_COLOUR))
         at = history.crossings[series.name]
         if at.state in ("ahead", "passed"):
             levels.append(
-                Level((at.day - start) / MONTH, date_text(at.day), upright=True, colour=VERMILLION, dash="dotted")
+                Level((at.day - start) / MONTH, date_text(at.day), upright=True, colour=RESIDUAL_COLOUR, dash="dotted")
             )
     text = sentence(change, history) if change.changed else f"{series.name} has not changed beyond doubt."
     remark = _remark(change)

@@ -60,7 +60,8 @@ def test_wear_lubrication_and_temperature_of_the_example(history: Command, tmp_p
     """What docs/histories.py has put in: -10 % of F_C and F_S as a rate, a step of F_log and sigma_2 in month 5."""
     done = history(LISTS / "z_wear.csv", "--limit", "F_C_Z=1.2 N.m")
     assert done.returncode == 0, done.stderr
-    first = done.stdout.splitlines()[0]
+    limited, first = done.stdout.splitlines()[:2]
+    assert re.fullmatch(r"Z\.F_C: 1\.2 N\.m is reached on 2027-.* at this rate \(95 %: 2027-.* to 2027-.*\)\.", limited)
     assert re.match(
         r"Z\.F_S falls by .* N\.m a month since 2025-01-13: from .* to .* N\.m on 2025-12-13 \(-10 %\)\.", first
     )
@@ -81,7 +82,17 @@ def test_wear_lubrication_and_temperature_of_the_example(history: Command, tmp_p
     assert {row["quantity"] for row in table(tmp_path / "out" / "changes.csv")} == set(found)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "Z.F_C falls by" in page
+    assert re.findall(r'class="key".*?<b[^>]*>([^<]*)', page) == ["−10 ", "−9.8 ", "−25 ", "−24 "]
     assert all(f"history-{name.replace('.', '-')}" in page for name in found)
+
+
+@pytest.mark.parametrize("limit", ["F_C_Z=2 N.m", "Z.sigma_0=350 N.m/rad"])
+def test_first_sentence_says_that_a_limit_is_not_reached(history: Command, tmp_path: Path, limit: str) -> None:
+    """F_C moves away from 2 N.m, and sigma_0 does not change."""
+    done = history(LISTS / "z_wear.csv", "--limit", limit)
+    assert done.returncode == 0, done.stderr
+    assert f"{limit.partition('=')[2]} is not reached: " in done.stdout.splitlines()[0]
+    assert summary_of(tmp_path / "out")["answer"][0] == done.stdout.splitlines()[0]
 
 
 def test_preload_that_is_lost_is_a_step_of_its_month(history: Command, tmp_path: Path) -> None:

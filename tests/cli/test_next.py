@@ -75,6 +75,23 @@ MADE = {
         f"replay log.csv --machine {CENTRE} --axes Z --columns log.yaml --window '0.05 s..1 s' --out r",
         ("identify drive log.csv", "--axes Z", "--columns log.yaml", "--window '0.05 s..1 s'", f"--machine {CENTRE}"),
     ),
+    "a drive": (
+        f"identify drive log.csv --machine {CENTRE} --axes Z --columns log.yaml --window '0.05 s..0.3 s' "
+        f"--set {Z}.K_v='3 (m/min)/mm' --out r",
+        (
+            f"replay log.csv --machine {CENTRE}",
+            "--axes Z",
+            "--columns log.yaml",
+            "--window '0.05 s..0.3 s'",
+            "K_v=3",
+            f"{Z}=r/drive_Z.yaml",
+            "machine.axes.Z.friction=r/friction_Z.yaml",
+        ),
+    ),
+    "a history": (
+        "history histories/z_wear.csv --quantities Z.F_C,Z.F_S --limit 'F_C_Z=1.4 N.m' --out r",
+        ("history r/history.csv", "--quantities Z.F_C,Z.F_S", "F_C_Z=1.4 N.m", "--out r_next"),
+    ),
     "a study": (f"sweep study.yaml --runs 3 --workers 0 --set '{Z}.K_v=3 (m/min)/mm' --out r", ("r:min=", "r:max=")),
     "two runs": ("diff one two --out r", ("compare two/result.csv one/result.csv",)),
     "a compensation": ("tune feedforward circle.yaml --no-table --out r", ("tune compensation circle.yaml",)),
@@ -100,7 +117,7 @@ LONG = ("a compensation", "a replay")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
     place = tmp_path_factory.mktemp("next")
-    fs.example(["ballbar", "log"], to=place)
+    fs.example(["ballbar", "log", "z_wear"], to=place)
     for name, target in (("before_ccw", "ccw"), ("before_cw", "cw"), ("after_ccw", "a_ccw"), ("after_cw", "a_cw")):
         for copy in (target, f"{target}_after"):
             shutil.copy(place / "records/ballbar" / f"{name}.csv", place / f"{copy}.csv")

@@ -188,6 +188,28 @@ def test_line_word_and_reason(program: str, monkeypatch: pytest.MonkeyPatch) -> 
     assert reason in str(error.value)
 
 
+@pytest.mark.parametrize("dialect", ["sinumerik", "iso"])
+@pytest.mark.parametrize(
+    ("loop", "word", "control"),
+    [
+        ("WHILE [#1 LT 5] DO 1\nG1 X#1 F60\n#1=#1+1\nEND 1", "WHILE", "Fanuc"),
+        ("N10 WHILE[#1LT5]DO1\nG0X1\nEND1", "WHILE", "Fanuc"),
+        ("O100 while [#1 LT 5]\nG0 X1\nO100 endwhile", "WHILE", "LinuxCNC"),
+        ("o<wide> repeat [5]\nG0 X1\no<wide> endrepeat", "REPEAT", "LinuxCNC"),
+        ("O7 DO\nG0 X1\nO7 WHILE [#1 LT 5]", "DO", "LinuxCNC"),
+    ],
+)
+def test_loops_of_other_controls_are_named(loop: str, word: str, control: str, dialect: str) -> None:
+    with pytest.raises(InputError) as error:
+        read(f"G0 X0\n{loop}\nM30\n", dialect=dialect)
+    assert str(error.value).startswith(f"main.mpf:2: {word}: macro loops of {control} "), error.value
+
+
+def test_names_like_those_of_other_loops_stay() -> None:
+    read("R1=0\nWHILE (R1<2)\nR1=R1+1\nG0 X=R1\nENDWHILE\nEND1: G0 X5\n")
+    read("O100\nG0 X1 (O100 WHILE [1])\nM30\n", dialect="iso")
+
+
 def test_a_fault_of_a_subprogram_has_its_file() -> None:
     with pytest.raises(InputError, match=r"^SUB\.SPF:2: Y: the axis stands twice"):
         read("G0 X1\nSUB\n", files={"SUB": "G0 X2\nY1 Y2\n"})

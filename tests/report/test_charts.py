@@ -100,7 +100,7 @@ def test_a_note_takes_the_corner_that_is_free(middle: float, low: bool) -> None:
     ("axis", "span", "most", "expected"),
     [
         (HEIGHT, (-1.3, 1.3), 6, ["−1", "−0.5", "0", "0.5", "1"]),
-        (HEIGHT, (0.0, 3e-5), 4, ["0", "1×10⁻⁵", "2×10⁻⁵", "3×10⁻⁵"]),
+        (HEIGHT, (0.0, 3e-5), 4, ["0", "10", "20", "30"]),
         (HEIGHT, (-15.7, 15.7), 2, ["−10", "0", "10"]),  # a single tick would be no scale
         (HEIGHT, (3.21, 3.79), 2, ["3.4", "3.6"]),
         (HEIGHT, (2000.0, 19990.0), 2, ["5000", "10000", "15000"]),

@@ -12,11 +12,14 @@ import pytest
 from feedsim.files.trace import Mark
 from feedsim.report import formatting
 from feedsim.report.chart import Curve
+from feedsim.report.formatting import Array
 from feedsim.report.replay.report import MOST_NAMES, names_of
 from feedsim.report.show import looks_of
 
 REPORT = Path(formatting.__file__).parent
-MEANINGS = ("SIMULATED", "RECORDED", "SETPOINT", "AT_TOOL", "RESIDUAL_COLOUR", "ALLOWED", "FRICTION", "OTHERWISE")
+MEANINGS = (
+    "SIMULATED", "RECORDED", "SETPOINT", "AT_TOOL", "RESIDUAL_COLOUR", "ALLOWED", "FRICTION", "OTHERWISE", "CLOCKWISE",
+)  # fmt: skip
 # Word with which the name of a curve begins -> meanings that its colour may have.
 WORDS = {
     "recorded": {"RECORDED"},
@@ -27,7 +30,7 @@ WORDS = {
     "model": {"SIMULATED"},
     "fit": {"SIMULATED"},
     "result": {"SIMULATED"},
-    "linear scales": {"SIMULATED"},
+    "linear scales": {"SIMULATED", "CLOCKWISE"},
     "with compensation": {"AFTER"},
     "setpoint": {"SETPOINT"},
     "friction": {"FRICTION"},
@@ -36,11 +39,11 @@ WORDS = {
 }
 # Modules whose colours are a list of many alike things: levels of a parameter, bodies, signals, stretches, sources.
 LISTS = {
-    "sweep/figure_plots.py", "sweep/report.py", "machine/model.py", "machine/report.py", "run/axis_plots.py",
-    "identify/report.py", "identify/stribeck_plots.py", "show/report.py", "frf/bode.py", "frf/report.py",
+    "sweep/figure_plots.py", "sweep/report.py", "machine/record.py", "machine/report.py", "run/axis_plots.py",
+    "identify/report.py", "identify/stribeck_plots.py", "show.py", "frf/bode.py", "frf/report.py",
     "chart/model.py", "chart/svg.py", "run/contour.py",
 }  # fmt: skip
-RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY"}
+RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY", "WINE"}
 
 
 def test_no_two_meanings_share_a_colour() -> None:
@@ -116,3 +119,43 @@ def test_names_of_blocks_have_room() -> None:
 
 def test_curves_take_their_meaning_by_default() -> None:
     assert Curve("", np.zeros(1), np.zeros(1)).colour == formatting.SIMULATED
+
+
+# What the colour-blind see of linear RGB (Machado, Oliveira, Fernandes 2009, severity 1), protan and deutan.
+SEEN = {
+    "all": np.eye(3),
+    "without red": np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                             [-0.003882, -0.048116, 1.051998]]),
+    "without green": np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.042847],
+                               [-0.011820, 0.042940, 0.968881]]),
+}  # fmt: skip
+
+
+def linear(colour: str) -> Array:
+    """Of sRGB, after IEC 61966-2-1."""
+    values = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb: Array) -> Array:
+    """CIELAB of linear RGB under D65."""
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    xyz = to_xyz @ np.clip(rgb, 0, 1) / np.array([0.9505, 1.0, 1.089])
+    x, y, z = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("ground", [0, 1])
+@pytest.mark.parametrize("seen", SEEN)
+def test_both_directions_of_a_circle_are_told_apart(ground: int, seen: str) -> None:
+    """From each other, from the tool point, and from the ground (3:1, WCAG 2.1), with any eyes.
+
+    A difference of 2.3 is just noticed; that of the two colours of thin lines is some ten times as large.
+    """
+    shades = {light: (light, dark)[ground] for _, light, dark in formatting.PALETTE}
+    back, paper = shades[formatting.CLOCKWISE], shades[formatting.PAPER]
+    y, y_paper = (float(linear(colour) @ [0.2126, 0.7152, 0.0722]) for colour in (back, paper))
+    assert (max(y, y_paper) + 0.05) / (min(y, y_paper) + 0.05) > 3
+    for other in (formatting.SIMULATED, formatting.RECORDED, formatting.AT_TOOL):
+        distance = np.linalg.norm(lab(SEEN[seen] @ linear(back)) - lab(SEEN[seen] @ linear(shades[other])))
+        assert distance > 20, other

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
-from feedsim.report.chart.model import NARROWEST
+from feedsim.report.chart.model import NARROWEST, UNITS_WITH_PREFIX
 from feedsim.report.chart.scales import ticks
 from feedsim.report.chart.svg import WIDTH, svg
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import drawing, html
+from feedsim_packager.units import parse
 from svg_helpers import drawn_panels
 
 SAME_PLACE = 1.0  # pixels
@@ -38,6 +39,11 @@ CHARTS = {
                   panel(Axis("f", "Hz", log=True), Axis("phase", "°"), Curve("G", T + 0.5, -400 * T))]),
     "both ways": Chart([panel(TIME, Axis("speed", "mm/min", symlog=10.0), Curve("v", T, 4e3 * np.sin(5 * T)))]),
     "narrow": Chart([panel(TIME, HEIGHT, Curve("far", T, 1999.5 + 1e-6 * np.sin(9 * T)))]),
+    "prefixes": Chart([panel(Axis("time", "s"), Axis("error", "mm"), Curve("e", 1e-5 * T, 3e-5 * np.sin(9 * T))),
+                       panel(Axis("f", "Hz", log=True), Axis("compliance", "µm/N", log=True),
+                             Curve("G", T + 1e-3, 1e-5 * (T + 1e-3) ** -2)),
+                       panel(TIME, Axis("stiffness", "N/m", also=("the same", "N·m/rad", 1e2)),
+                             Curve("c", T, 3e8 * T))]),
     "names": Chart([panel(Axis("share", "%"), Axis("", names=["first", "a longer name"]),
                           Curve("bar", np.array([0.0, 40.0]), np.array([1.0, 1.0]), width=14.0))]),
     "second scales": Chart([panel(Axis("n", "rad/s", also=("feed", "m/min", 0.06)),
@@ -125,14 +131,15 @@ def test_still_picture_and_page_show_the_same(page: Any, name: str) -> None:
 
 TICKS = """asked => asked.map(([axis, low, high, most]) => {
   const found = ticks(axis, low, high, most);
-  return [found.map(each => [each.at, each.text || ""]), found.common || ""];
+  return [found.map(each => [each.at, each.text || ""]), found.common || "", found.unit || ""];
 })"""
 
 
 def test_ticks_are_the_same_at_any_span(browser: Any) -> None:
     random = np.random.default_rng(5)
     axes = [Axis("x", "mm"), Axis("x", "°"), Axis("t", "s"), Axis("x"), Axis("f", "Hz", log=True),
-            Axis("v", "mm/min", symlog=9.0), Axis("", names=["a", "b", "c", "d"])]  # fmt: skip
+            Axis("v", "mm/min", symlog=9.0), Axis("c", "N/m"), Axis("G", "µm/N", log=True),
+            Axis("", names=["a", "b", "c", "d"])]  # fmt: skip
     asked, expected = [], []
     for _ in range(600):
         axis = axes[random.integers(len(axes))]
@@ -152,11 +159,48 @@ def test_ticks_are_the_same_at_any_span(browser: Any) -> None:
     found = page.evaluate(f"asked => {{ {script}; return ({TICKS})(asked); }}", asked)
     page.close()
     assert len(found) > 400
-    for (axis, low, high, most), (marks, common), own in zip(asked, found, expected, strict=True):
+    for (axis, low, high, most), (marks, common, unit), own in zip(asked, found, expected, strict=True):
         said = f"{axis['unit']} {low} to {high}, {most}"
         assert [text for _, text in marks] == [text for _, text in own.marks], said
         assert [at for at, _ in marks] == pytest.approx([at for at, _ in own.marks], rel=1e-9, abs=1e-12), said
-        assert common == own.common, said
+        assert (common, unit) == (own.common, own.unit), said
+
+
+@pytest.mark.parametrize(
+    ("axis", "span", "title"),
+    [
+        (Axis("error", "m"), (-2e-6, 3e-6), "error [µm]"),
+        (Axis("error", "mm"), (0.0, 4e-5), "error [nm]"),
+        (Axis("torque", "N·m"), (-5e-5, 1e-5), "torque [µN·m]"),
+        (Axis("stiffness", "N/m"), (1e8, 3e8), "stiffness [MN/m]"),
+        (Axis("compliance", "µm/N", log=True), (2e-6, 0.9), "compliance [nm/N]"),
+        (Axis("speed", "mm/min", symlog=1e-6), (-0.5, 0.5), "speed [µm/min]"),
+        (Axis("error", "mm"), (0.0, 0.4), "error [mm]"),
+        (Axis("ratio"), (0.0, 3e-6), "ratio"),
+    ],
+)
+def test_units_have_prefixes_in_place_of_powers_of_ten(axis: Axis, span: tuple[float, float], title: str) -> None:
+    found = ticks(axis, span, 6)
+    assert found.title(axis) == title
+    assert found.has_powers == (axis.unit == "")
+    if axis.unit:
+        per = size_of(title.partition("[")[2].rstrip("]")) / size_of(axis.unit)
+        for at, text in found.marks:
+            assert span[0] <= at <= span[1]
+            assert not text or float(text.replace("−", "-")) * per == pytest.approx(at, rel=1e-6, abs=1e-15)
+
+
+def test_units_with_prefixes_are_what_they_say() -> None:
+    for unit, known in UNITS_WITH_PREFIX.items():
+        assert (1, unit) in known
+        assert sorted(factor for factor, _ in known) == [factor for factor, _ in known]
+        for factor, other in known:
+            assert factor == pytest.approx(size_of(unit) / size_of(other), rel=1e-12), (unit, other)
+
+
+def size_of(unit: str) -> float:
+    """In SI, by the algebra of units."""
+    return float(parse(unit.replace("µ", "u").replace("·", "*").replace("²", "^2")).exact)
 
 
 def test_one_scale_keeps_circles_round() -> None:

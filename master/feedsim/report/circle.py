@@ -23,14 +23,14 @@ from feedsim.report.changes import action, changes_section, control_section
 from feedsim.report.chart import Curve, Dash
 from feedsim.report.content import TILES as TILES_SHOWN
 from feedsim.report.content import Bullets, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
-from feedsim.report.formatting import AFTER, BEFORE, OTHERWISE, RECORDED, SIMULATED, Array, counted, minus, two, typeset
+from feedsim.report.formatting import AFTER, BEFORE, CLOCKWISE, RECORDED, SIMULATED, Array, counted, minus, two, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, quantity, software
 from feedsim.report.run import circle_plots, sheet
 from feedsim.report.run.diagnosis import cause_tile, diagnosis_part, diagnosis_section
 
 FORMAT = 1
 DASHES: dict[int, Dash] = {1: "", -1: "dashed"}  # by the sense of the turn
-COLOURS = {1: RECORDED, -1: OTHERWISE}
+COLOURS = {1: RECORDED, -1: CLOCKWISE}
 NOTHING_CHANGED = "no cause has changed beyond doubt (95 %)"
 TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
 FULL_TURN_FIGURES = {

@@ -185,7 +185,7 @@ class Step:
         present = call()
         if present is None or (folder is None and placed != self.arguments):
             return ""
-        if "set" in placed:  # which machine it is, the argument says already
+        if placed.get("set"):  # which machine it is, the argument says already
             chosen = f"machine={present.arguments.get('machine')}"
             placed["set"] = [change for change in placed["set"] if change != chosen]
         line = present.typed(present, self.command, placed)

@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 
 INK, MUTED, GRID, PAPER = "#1b1f24", "#59636e", "#d4dae1", "#fefefe"
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0528a", "#b87a00", "#3d9bd0"
-# What a colour means, in every picture. Panel or label names the axis; dashes show the second direction of a circle.
+WINE = "#a8325a"  # none of theirs
+# What a colour means, in every picture. Panel or label names the axis.
 SIMULATED = AFTER = BLUE
 RECORDED = BEFORE = INK
 SETPOINT = MUTED
@@ -37,6 +38,7 @@ RESIDUAL_COLOUR = VERMILLION  # what is left, stands out or lies outside
 ALLOWED = GREEN  # bands that are allowed or targets
 FRICTION = PURPLE
 OTHERWISE = SKY  # simulated in another way: another set, another side
+CLOCKWISE = WINE  # second direction of a circle, simulated or recorded; dashed besides
 
 # CSS variable, colour on light ground (= in the drawing), colour on dark ground
 PALETTE = (
@@ -50,6 +52,7 @@ PALETTE = (
     ("purple", PURPLE, "#e29ac5"),
     ("orange", ORANGE, "#e8b04a"),
     ("sky", SKY, "#8fd0f5"),
+    ("wine", WINE, "#f06a8a"),
 )
 
 

@@ -20,14 +20,15 @@ from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.content import FOLDER, Picture, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import (
     ALLOWED,
-    BLUE,
     INK,
     MUTED,
     OTHERWISE,
     RECORDED,
-    VERMILLION,
+    RESIDUAL_COLOUR,
+    SIMULATED,
     counted,
     display_unit,
+    minus,
     plain_unit,
     typeset,
 )
@@ -157,18 +158,17 @@ def date_text(day: float) -> str:
 
 
 def answers(history: History) -> list[str]:
-    """What has changed, a sentence each, the surest first; of machines how far they scatter."""
+    """When limits are reached, then what has changed, a sentence each, the surest first; of machines how far they
+    scatter."""
     if history.scatters:
         return [_scatter_sentence(one) for one in history.scatters]
     changed = [one for one in history.ranked if one.changed]
-    lines = [sentence(one, history) for one in changed]
-    if not changed:
-        lines.append(_nothing(history))
-    lines += [
+    lines = [
         f"{one.series.name}: {_limit_sentence(history, one)}"
         for one in history.ranked
-        if one.series.name in history.limits and not one.changed
+        if one.series.name in history.limits
     ]
+    lines += [_change_sentence(one) for one in changed] or [_nothing(history)]
     if changed:
         same = len(history.changes) - len(changed)
         lines.append(
@@ -198,7 +198,15 @@ def _span(history: History) -> tuple[float, float]:
 
 
 def sentence(change: Change, history: History) -> str:
-    """Quantity, from, to, since when, at which rate or by which step, and when its limit is reached."""
+    """What has changed, and when its limit is reached."""
+    text = _change_sentence(change)
+    if change.series.name in history.limits:
+        text += f" {_capital(_limit_sentence(history, change))}"
+    return text
+
+
+def _change_sentence(change: Change) -> str:
+    """Quantity, from, to, since when, at which rate or by which step."""
     model, series = change.model, change.series
     first, last = float(series.days[0]), float(series.days[-1])
     begin, end = model.level(first, 0), model.level(last)
@@ -219,8 +227,6 @@ def sentence(change: Change, history: History) -> str:
     text += f" ({_percent(begin[0], end[0])})." if relative else "."
     if change.rival is not None:
         text += f" {_rival(change)}"
-    if series.name in history.limits:
-        text += f" {_capital(_limit_sentence(history, change))}"
     return text
 
 
@@ -249,9 +255,15 @@ def _limit_sentence(history: History, change: Change) -> str:
     if at.state == "never":
         if not change.changed:
             return (
-                f"no rate is known at which {where} would be reached." if not helps else "the compensation still helps."
+                f"{where} is not reached: no change is known beyond doubt."
+                if not helps
+                else "the compensation still helps."
             )
-        return "the compensation helps all the time." if helps else f"it does not move towards {where}."
+        return (
+            "the compensation helps all the time."
+            if helps
+            else f"{where} is not reached: the value does not move towards it."
+        )
     if at.state == "step":
         before, behind = (date_text(end) for end in at.interval)
         return f"{subject} between {before} and {behind}, by the step."
@@ -591,9 +603,9 @@ def _tiles(history: History) -> list[Tile]:
         first, last = model.level(float(series.days[0]), 0)[0], model.level(float(series.days[-1]))[0]
         tiles.append(
             Tile(
-                _percent(first, last) if first else number(last - first),
+                minus(_percent(first, last) if first else number(last - first)),
                 f"{series.name} since the first date",
-                sentence(one, history),
+                typeset(sentence(one, history)),
             )
         )
     return tiles
@@ -634,15 +646,15 @@ def _picture(change: Change, history: History) -> Picture:
         days = np.linspace(edges[k], edges[k + 1], CURVE_POINTS)
         level = np.array([model.level(float(day), k) for day in days])
         x = (days - start) / MONTH
-        curves.append(Curve("model", x, level[:, 0], BLUE))
-        bands.append(Band("95 % of the model", level[:, 0] - level[:, 1], level[:, 0] + level[:, 1], x, BLUE))
+        curves.append(Curve("model", x, level[:, 0], SIMULATED))
+        bands.append(Band("95 % of the model", level[:, 0] - level[:, 1], level[:, 0] + level[:, 1], x, SIMULATED))
     levels = []
     if series.name in history.limits:
-        levels.append(Level(history.limits[series.name], "limit", colour=VERMILLION))
+        levels.append(Level(history.limits[series.name], "limit", colour=RESIDUAL_COLOUR))
         at = history.crossings[series.name]
         if at.state in ("ahead", "passed"):
             levels.append(
-                Level((at.day - start) / MONTH, date_text(at.day), upright=True, colour=VERMILLION, dash="dotted")
+                Level((at.day - start) / MONTH, date_text(at.day), upright=True, colour=RESIDUAL_COLOUR, dash="dotted")
             )
     text = sentence(change, history) if change.changed else f"{series.name} has not changed beyond doubt."
     remark = _remark(change)

@@ -139,6 +139,8 @@ class Interpreter:
     def run(self, program: Program, at: int, line: int, stop: int) -> str:
         """Executes blocks from a place to a position. Returns "done", "return" (M17, RET) or "end" (M30)."""
         before = self.program, self.recorder.file, self.recorder.line
+        if program.loop_of_other_controls:
+            raise program.loop_of_other_controls
         if not self.iso:
             _ = program.structure  # what is open or closed too often is a fault, whether it is reached or not
         self.program, self.recorder.file = program, program.index

@@ -84,6 +84,11 @@ _STRUCTURE = re.compile(
     rf"{_HEAD}{_LABEL}*(IF|ELSE|ENDIF|WHILE|ENDWHILE|FOR|ENDFOR|LOOP|ENDLOOP|REPEAT|UNTIL)(?![A-Z0-9_:])([^\n;]*)",
     re.MULTILINE,
 )
+# Loops of other controls: WHILE [#1 LT 5] DO1 of Fanuc's macros, O100 WHILE [#1 LT 5] of LinuxCNC.
+_OTHER_LOOP = re.compile(
+    rf"{_HEAD}(?:(WHILE)[ \t]*\[|O(?:\d+|<[^>\n]*>)[ \t]*(WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|BREAK|CONTINUE)(?!\w))",
+    re.MULTILINE,
+)
 _TARGET = re.compile(rf"[ \t]*(?:/\d?[ \t]*)?(?:(?:N|:)(\d+))?[ \t]*({_LABEL}*)")
 _LABEL_NAME = re.compile(r"[A-Z_][A-Z0-9_]*")
 _ISO_TARGET = re.compile(r"[ \t]*[O:](\d+)")
@@ -104,6 +109,17 @@ class Program:
     def end_of_line(self, at: int) -> int:
         stop = self.code.find("\n", at)
         return len(self.code) if stop < 0 else stop
+
+    @cached_property
+    def loop_of_other_controls(self) -> Fault | None:
+        """The first loop that is written as other controls have it: here it would be read as something else."""
+        match = _OTHER_LOOP.search(self.code)
+        if not match:
+            return None
+        control = "Fanuc (WHILE [..] DO 1)" if match[1] else "LinuxCNC (O100 WHILE [..])"
+        reason = f"macro loops of {control} are not read; write the blocks out, or call a subprogram with M98 P L"
+        line = self.code.count("\n", 0, match.end()) + 1
+        return Fault(match[1] or match[2], reason, line, self.index)
 
     @cached_property
     def structure(self) -> Mapping[int, Place]:

@@ -43,10 +43,23 @@ MIN_TICKS, TICK_WIDTH, TICK_HEIGHT = 3, 74.0, 34.0
 MAX_DIGITS = 7  # of a tick; with more, what ticks have in common stands at the axis
 PHASES = (15, 30, 45, 90, 180, 360, 720, 1440)
 NARROWEST = 4e-9  # span against the largest value: 4 nm of 1 m
-FINER_UNITS = {
-    "m": ((1, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm")), "mm": ((1, "mm"), (1e3, "µm"), (1e6, "nm")),
-    "µm": ((1, "µm"), (1e3, "nm")), "s": ((1, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")),
-    "ms": ((1, "ms"), (1e3, "µs"), (1e6, "ns")), "Hz": ((1, "Hz"), (1e3, "mHz"), (1e6, "µHz")),
+# Unit -> factors and units in which its values are written where their ticks would have powers of ten, coarse to fine.
+UNITS_WITH_PREFIX = {
+    "m": ((1, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm")), "mm": ((1e-3, "m"), (1, "mm"), (1e3, "µm"), (1e6, "nm")),
+    "µm": ((1e-6, "m"), (1e-3, "mm"), (1, "µm"), (1e3, "nm"), (1e6, "pm")),
+    "s": ((1, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")), "ms": ((1e-3, "s"), (1, "ms"), (1e3, "µs"), (1e6, "ns")),
+    "Hz": ((1e-6, "MHz"), (1e-3, "kHz"), (1, "Hz"), (1e3, "mHz"), (1e6, "µHz")),
+    "N": ((1e-6, "MN"), (1e-3, "kN"), (1, "N"), (1e3, "mN"), (1e6, "µN")),
+    "N·m": ((1e-6, "MN·m"), (1e-3, "kN·m"), (1, "N·m"), (1e3, "mN·m"), (1e6, "µN·m")),
+    "A": ((1e-3, "kA"), (1, "A"), (1e3, "mA"), (1e6, "µA")), "rad": ((1, "rad"), (1e3, "mrad"), (1e6, "µrad")),
+    "mm/min": ((1e-3, "m/min"), (1, "mm/min"), (1e3, "µm/min"), (1e6, "nm/min")),
+    "m/s": ((1, "m/s"), (1e3, "mm/s"), (1e6, "µm/s")), "mm/s": ((1e-3, "m/s"), (1, "mm/s"), (1e3, "µm/s")),
+    "rad/s": ((1, "rad/s"), (1e3, "mrad/s"), (1e6, "µrad/s")),
+    "m/s²": ((1, "m/s²"), (1e3, "mm/s²"), (1e6, "µm/s²")),
+    "N/m": ((1e-9, "GN/m"), (1e-6, "MN/m"), (1e-3, "kN/m"), (1, "N/m")),
+    "N·m/rad": ((1e-9, "GN·m/rad"), (1e-6, "MN·m/rad"), (1e-3, "kN·m/rad"), (1, "N·m/rad")),
+    "m/N": ((1, "m/N"), (1e3, "mm/N"), (1e6, "µm/N"), (1e9, "nm/N")),
+    "µm/N": ((1, "µm/N"), (1e3, "nm/N"), (1e6, "pm/N")),
 }  # fmt: skip
 
 LAYOUT: dict[str, Any] = {name: value for name, value in globals().items() if name.isupper() and name != "LAYOUT"}

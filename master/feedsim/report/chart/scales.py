@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from itertools import pairwise
@@ -11,12 +11,12 @@ from itertools import pairwise
 import numpy as np
 
 from feedsim.report.chart.model import (
-    FINER_UNITS,
     MAX_DIGITS,
     MIN_TICKS,
     NARROWEST,
     PHASES,
     ROOM,
+    UNITS_WITH_PREFIX,
     Axis,
     Curve,
     Panel,
@@ -34,7 +34,8 @@ class Ticks:
 
     Attributes:
         marks: value and text of each; without text it is a thin line.
-        common: what stands at the axis because all texts are added to it; unit: of the texts then.
+        common: what stands at the axis because all texts are added to it.
+        unit: of the texts, where it is not that of the axis.
     """
 
     marks: list[tuple[float, str]] = field(default_factory=list)
@@ -43,12 +44,19 @@ class Ticks:
 
     def title(self, axis: Axis) -> str:
         """What stands along the axis."""
-        return f"{axis.label} − {self.common}{f' [{self.unit}]' if self.unit else ''}" if self.common else axis.title
+        if self.common:
+            return f"{axis.label} − {self.common}{f' [{self.unit}]' if self.unit else ''}"
+        return replace(axis, unit=self.unit).title if self.unit else axis.title
 
     @property
     def texts(self) -> list[str]:
         """Those that are not empty."""
         return [text for _, text in self.marks if text]
+
+    @property
+    def has_powers(self) -> bool:
+        """Whether a text has a power of ten."""
+        return any("×" in text for text in self.texts)
 
 
 def ranges(panel: Panel) -> tuple[Range, Range]:
@@ -103,7 +111,29 @@ def measured(axis: Axis, values: Array | float) -> Array:
 
 
 def ticks(axis: Axis, span: Range, most: float) -> Ticks:
-    """Where an axis is marked, and with what: some `most` round values, angles in parts of a turn."""
+    """Where an axis is marked, and with what: some `most` round values, angles in parts of a turn.
+
+    Where a text would have a power of ten, the texts are in the first unit with a prefix in which none has one, from
+    that on in which the largest value is 1 or more.
+    """
+    result = _marks(axis, span, most)
+    if result.common or axis.names or not result.has_powers:
+        return result
+    known = UNITS_WITH_PREFIX.get(axis.unit, ((1, axis.unit),))
+    for factor, unit in known[known.index(_with_prefix(known, max(map(abs, span)))) :]:
+        scaled = replace(axis, unit=unit, symlog=axis.symlog * factor)
+        there = _marks(scaled, (span[0] * factor, span[1] * factor), most)
+        if not there.has_powers:
+            return Ticks([(at / factor, text) for at, text in there.marks], unit=unit)
+    return result
+
+
+def _with_prefix(known: Sequence[tuple[float, str]], size: float) -> tuple[float, str]:
+    """Factor and unit in which a size is 1 or more, else the finest that is known."""
+    return next((pair for pair in known if size * pair[0] >= 1), known[-1])
+
+
+def _marks(axis: Axis, span: Range, most: float) -> Ticks:
     low, high = span
     if axis.names:
         every = math.ceil(len(axis.names) / max(1.0, most))
@@ -177,8 +207,7 @@ def _stepped(axis: Axis, span: Range, step: float) -> Ticks:
         return Ticks([(at, tick_text(at, n)) for at, n in zip(values, digits, strict=True)])
     whole = 10.0 ** math.ceil(math.log10(high - low) - 1e-9)
     common = math.floor(low / whole + 1e-9) * whole
-    known = FINER_UNITS.get(axis.unit, ((1, axis.unit),))
-    factor, unit = next((pair for pair in known if (high - common) * pair[0] >= 1), known[-1])
+    factor, unit = _with_prefix(UNITS_WITH_PREFIX.get(axis.unit, ((1, axis.unit),)), high - common)
     marks = [(at, tick_text(round((at - common) / step) * step * factor, 4)) for at in values]
     count = math.floor(math.log10(abs(common) or 1)) - math.floor(math.log10(whole) + 1e-9) + 1
     return Ticks(marks, f"{tick_text(common, max(1, count))}{f' {axis.unit}' if axis.unit else ''}", unit)

@@ -313,11 +313,13 @@ def _next(identified: Identified) -> Step:
     subject, axis = identified.subject, identified.found.axis
     if subject is not None and subject.scenario is not None:
         key = f"machine.axes.{axis}.friction={FOLDER}/{FRICTION_FILE}"
-        return Step("Run the machine with this friction", "run", {"scenario": subject.file, "set": [key]})
+        return Step(
+            "Run the machine with this friction", "run", {"scenario": subject.file, "machine": None, "set": [key]}
+        )
     return Step(
         "Try the friction in the example with one axis; a machine file takes it as its key friction",
         "run",
-        {"scenario": "one_axis.yaml", "set": [f"machine.axes.X.friction={FOLDER}/{FRICTION_FILE}"]},
+        {"scenario": "one_axis.yaml", "machine": None, "set": [f"machine.axes.X.friction={FOLDER}/{FRICTION_FILE}"]},
         "feedsim example one_axis",
     )
 

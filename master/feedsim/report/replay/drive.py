@@ -268,6 +268,19 @@ def machine_of(report: DriveReport) -> Machine:
     return machine.model_copy(update={"axes": {axis: one.machine.axes[axis] for axis, one in drives.items()}})
 
 
+def _machine_of_replay(report: DriveReport) -> dict[str, Any]:
+    """Arguments of a replay on what was identified: the folder is a machine, or has parts of one."""
+    if report.subject is None:
+        return {"machine": FOLDER, "set": None}
+    parts = [
+        f"machine.axes.{axis}.{part}={FOLDER}/{file}"
+        for axis in report.found.drives
+        for part, file in (("drive", drive_file(axis)), ("friction", friction_file(axis)))
+        if file in report.found.files
+    ]
+    return {"set": [*report.subject.overrides, *parts]}
+
+
 def report_of(report: DriveReport) -> Report:
     """Content of the report."""
     pictures = []
@@ -288,7 +301,7 @@ def report_of(report: DriveReport) -> Report:
         next_step=Step(
             "Replay the record on it; another record in its place shows how far it holds",
             "replay",
-            {"machine": FOLDER, "axes": ",".join(drives), "set": None},
+            {"axes": ",".join(drives), **_machine_of_replay(report)},
         ),
         tiles=[
             *(

@@ -13,11 +13,22 @@ from feedsim.files.trace import Trace
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.content import Picture, Section, Table
-from feedsim.report.formatting import AT_TOOL, FRICTION, OTHERWISE, RESIDUAL_COLOUR, SIMULATED, Array, minus, number
+from feedsim.report.formatting import (
+    AT_TOOL,
+    CLOCKWISE,
+    FRICTION,
+    OTHERWISE,
+    RESIDUAL_COLOUR,
+    SIMULATED,
+    Array,
+    minus,
+    number,
+)
 from feedsim.report.run.axis_plots import TIME, TOOL_TITLE, reversed_note, torque_axis
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
 GAP = 5.0  # deg of a turn that is not recorded; curves break there
+COLOURS = {1: SIMULATED, -1: CLOCKWISE}  # by the sense of the turn, where there are two
 HIGHER = 10e-9  # m; a peak that is higher by less has the same height for a reader
 
 
@@ -45,13 +56,15 @@ def contour_picture(
     if all(name in trace.columns for name in tool):
         by_tool = contour(trace, turn, tool)
         curves.append(turned(TOOL_TITLE, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
-    curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
+    dash: Dash
     over, seen = "", {turn.sense: by_scale}
-    if back is not None:
+    if back is None:
+        curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
+    else:
         seen[back.sense] = other = contour(trace, back)
-        curves.append(
-            turned(f"linear scales, {SENSE_WORDS[back.sense]}", SIMULATED, other.angle, other.deviation, "dashed", 1.2)
-        )
+        for sense, own, dash, width in ((turn.sense, by_scale, "", 1.6), (back.sense, other, "dashed", 1.2)):
+            name = f"linear scales, {SENSE_WORDS[sense]}"
+            curves.append(turned(name, COLOURS[sense], own.angle, own.deviation, dash, width))
         over = f" Dashed: {SENSE_WORDS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (

@@ -1,8 +1,8 @@
 // What the drawing of charts (chart_draw.js) computes with: numbers as text, scales and their ticks, curves as paths.
 const SPACE = "http://www.w3.org/2000/svg";
 const {
-  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, FINER_UNITS, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
-  NARROWEST, NEXT, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP,
+  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
+  NARROWEST, NEXT, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP, UNITS_WITH_PREFIX,
 } = LAYOUT; // feedsim.report.chart.model
 const NARROW = 640, COLUMN = 250;
 const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
@@ -48,7 +48,23 @@ function step_of(rough) {
   return decade * [1, 2, 5, 10].find(entry => entry * decade >= rough * 0.999);
 }
 
+// Where an axis is marked, and with what. Where a text would have a power of ten, the texts are in the first unit with a
+// prefix in which none has one, from that on in which the largest value is 1 or more.
 function ticks(axis, low, high, most) {
+  const found = ticks_in_unit(axis, low, high, most), has_powers = all => all.some(entry => entry.text && entry.text.includes("×"));
+  if (found.common || axis.names.length || !has_powers(found)) return found;
+  const known = UNITS_WITH_PREFIX[axis.unit] || [[1, axis.unit]];
+  for (const [factor, unit] of known.slice(known.indexOf(with_prefix(known, Math.max(Math.abs(low), Math.abs(high)))))) {
+    const there = ticks_in_unit({ ...axis, unit, symlog: (axis.symlog || 0) * factor }, low * factor, high * factor, most);
+    if (!has_powers(there)) return Object.assign(there.map(entry => ({ ...entry, at: entry.at / factor })), { unit });
+  }
+  return found;
+}
+
+// Factor and unit in which a size is 1 or more, else the finest that is known.
+const with_prefix = (known, size) => known.find(([factor]) => size * factor >= 1) || known.at(-1);
+
+function ticks_in_unit(axis, low, high, most) {
   if (axis.names.length) {
     const every = Math.ceil(axis.names.length / Math.max(1, most));
     return axis.names.map((name, k) => ({ at: k, text: name })).filter((entry, k) => k % every === 0 && k >= low && k <= high);
@@ -87,7 +103,7 @@ function marks_of(axis, low, high, step) {
   if (Math.max(...result.map(entry => digits(entry.at))) <= MAX_DIGITS) for (const entry of result) entry.text = number(entry.at, digits(entry.at));
   else {
     const whole = 10 ** Math.ceil(Math.log10(high - low) - 1e-9), common = Math.floor(low / whole + 1e-9) * whole, part = high - common;
-    const [factor, unit] = (FINER_UNITS[axis.unit] || []).find(([factor]) => part * factor >= 1) || (FINER_UNITS[axis.unit] || [[1, axis.unit]]).at(-1);
+    const [factor, unit] = with_prefix(UNITS_WITH_PREFIX[axis.unit] || [[1, axis.unit]], part);
     for (const entry of result) entry.text = number(Math.round((entry.at - common) / step) * step * factor, 4);
     result.common = `${number(common, Math.floor(Math.log10(Math.abs(common) || 1)) - Math.floor(Math.log10(whole) + 1e-9) + 1)}${unit_of(axis)}`;
     result.unit = unit;
@@ -110,7 +126,7 @@ function apart(found_of, across, most, end = Infinity) {
 
 // What stands along an axis: quantity and unit, or what its ticks are added to.
 function title_of(axis, result) {
-  return result.common ? `${axis.label} − ${result.common}${result.unit ? ` [${result.unit}]` : ""}` : label_of(axis);
+  return result.common ? `${axis.label} − ${result.common}${result.unit ? ` [${result.unit}]` : ""}` : label_of(result.unit ? { ...axis, unit: result.unit } : axis);
 }
 
 // A range that a zoom asks for, no narrower than its numbers have digits for.

@@ -50,8 +50,10 @@ function contour_chart(task, result, kept, peaks) {
   };
   if (kept) draw("kept", contour(kept.trace, kept.tasks.find(entry => entry.prefix === task.prefix).turn), KEPT.colour, KEPT);
   draw("tool point", contour(result.trace, turn, turn.axes.map(axis => `tcp.x_${axis}`)), "orange", { dash: "dashed", width: 1.2 });
-  draw("linear scales", seen, "blue", { width: 1.6 });
-  if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(result.trace, back), "blue", { dash: "dashed", width: 1.2 });
+  const words = sense => back ? `linear scales, ${sense > 0 ? "counterclockwise" : "clockwise"}` : "linear scales";
+  const hue = sense => back && sense < 0 ? "wine" : "blue";
+  draw(words(turn.sense), seen, hue(turn.sense), { width: 1.6 });
+  if (back) draw(words(back.sense), contour(result.trace, back), hue(back.sense), { dash: "dashed", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
   // The height is that of the figures, the larger of the two directions; its place is in the first turn, unless that of the other is higher.
   const glitches = new Map([turn, ...back ? [back] : []].map(entry => [entry.sense, contour(result.trace, entry).glitches]));

@@ -324,7 +324,7 @@ NOTES = (
     (270, ("A peak stands where an axis reverses.", "The clockwise direction is dashed.")),
     (334, ("Three figures; the others stand", "in tables below.")),
     (398, ("The next step, a command to copy.",)),
-    (470, ("All else is folded: a click, Enter", "or a link opens it. Paper has what is open.")),
+    (470, ("All else is folded: a click, Enter", "or a link opens it.")),
 )  # where in height, and the lines of each note
 
 

@@ -58,7 +58,7 @@ def test_figures_of_the_drawn_report_are_those_that_a_run_prints() -> None:
     printed += (ROOT / "docs" / "page.md").read_text(encoding="utf-8")
     figures = [word for word in " ".join((*diagrams.ANSWER, *(tile for tile, _ in diagrams.TILES))).split()
                if word[0].isdigit()]  # fmt: skip
-    assert len(figures) == 6
+    assert len(figures) == 5
     assert not [figure for figure in figures if figure not in printed]
 
 

@@ -69,7 +69,7 @@ MADE = {
     ),
     "friction without a scenario": (
         "identify friction log.csv --columns log.yaml --stages 2 --inertia '0.0164 kg.m^2' --out r",
-        ("feedsim example one_axis &&", "r/friction.yaml"),
+        ("feedsim example z_positioning &&", "r/friction.yaml"),
     ),
     "a replay": (
         f"replay log.csv --machine {CENTRE} --axes Z --columns log.yaml --window '0.05 s..1 s' --out r",

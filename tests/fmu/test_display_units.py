@@ -63,7 +63,7 @@ PEOPLES = {
     "m/rad": {"mm/rad"},
     "m/s": {"m/min", "mm/min"},  # mm/min: what machine data of a friction pulse are in
     "N/m": {"N/um"},
-    "J": {"uJ", "J"},
+    "J": {"uJ", "mJ", "J"},
     "H": {"mH"},
     "1": {"1", "%"},
 }

@@ -316,11 +316,13 @@ def _next(identified: Identified) -> Step:
         return Step(
             "Run the machine with this friction", "run", {"scenario": subject.file, "machine": None, "set": [key]}
         )
+    example, on = ("z_positioning", "Z") if axis == "Z" else ("one_axis", "X")
+    key = f"machine.axes.{on}.friction={FOLDER}/{FRICTION_FILE}"
     return Step(
-        "Try the friction in the example with one axis; a machine file takes it as its key friction",
+        "Try the friction in an example; a machine file takes it as its key friction",
         "run",
-        {"scenario": "one_axis.yaml", "machine": None, "set": [f"machine.axes.X.friction={FOLDER}/{FRICTION_FILE}"]},
-        "feedsim example one_axis",
+        {"scenario": f"{example}.yaml", "machine": None, "set": [key]},
+        f"feedsim example {example}",
     )
 
 

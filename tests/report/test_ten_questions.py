@@ -66,7 +66,7 @@ def unstable(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("can I trust it", "identify", (r"known to ±[\d.]+ %",)),
         ("what has changed", "circles", (r"G [\d.]+ → [\d.]+ µm|unchanged: ",)),
         ("what do I type", "stop", (r"feedsim tune drive \S+ --axes Z",)),
-        ("how near is the model", "replay", (r"position off by", r"rms")),
+        ("how near is the model", "replay", (r"position (off by|the same to)", r"rms")),
         ("what are my margins", "frf", (r"least gain margin [\d.]+ dB", r"least phase margin \d+°")),
         ("which parameter moves it", "study", (r"(feed|K_v) \([\d.]+\) moves it most",)),
         ("are they the same", "compare", (r"Comparison: (same|different)",)),

@@ -154,6 +154,17 @@ def test_date_of_a_record_is_in_its_result(tmp_path: Path, fmus: Path) -> None:
     assert summary_of(tmp_path / "plain")["recorded"] is None
 
 
+@pytest.mark.parametrize("dates", [2, 4])
+def test_figure_that_is_zero_at_all_dates(history: Command, tmp_path: Path, dates: int) -> None:
+    """A peak that no circle has: it has not changed, and is written with the others."""
+    folders = [result(tmp_path / f"r{k}", 0.0, sigma=0.0) for k in range(dates)]
+    done = history(*(f"{folder.name}@2026-0{k + 1}-01" for k, folder in enumerate(folders)))
+    assert done.returncode == 0, done.stderr
+    assert "Warning" not in done.stderr
+    rows = table(tmp_path / "out" / "history.csv")
+    assert [float(row["value"]) for row in rows] == [0.0] * dates
+
+
 def test_two_dates_show_no_change(history: Command, tmp_path: Path) -> None:
     done = history(f"{result(tmp_path / 'a', 1.6)}@2026-01-10", f"{result(tmp_path / 'b', 1.8)}@2026-02-10")
     assert done.returncode == 0

@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 ERROR_RATE = 0.01  # chance that any quantity is said to change though none does; likewise that a model is too large
 MIN_RECORDS = 3  # two dates may differ by scatter between records
 LEAST_SEGMENT = 2  # records before, and between, steps: one alone is an outlier; behind the last step one will do
-MAX_STEPS = 2
 MAX_TWO_STEP_RECORDS = 100  # records up to which two steps are looked for: their pairs grow with the square
 # Of likelihoods, from which on a rate is distinguished from a step: evidence of that strength is misleading in at most
 # one of 100 cases (R. Royall, Statistical Evidence, 1997).
@@ -56,7 +55,8 @@ class Series:
 
     def known_sigma(self) -> Array:
         """(K,) with a floor. Where one is missing it is the median of the others; without any the scatter says all."""
-        least = LEAST_SIGMA * max(float(np.max(np.abs(self.value))), 1e-300)
+        # A figure that is 0 at all dates, such as a peak that no circle has: the square of the floor is not 0.
+        least = LEAST_SIGMA * max(float(np.max(np.abs(self.value))), 1e-100)
         there = np.isfinite(self.sigma)
         usual = float(np.median(self.sigma[there])) if np.any(there) else 0.0
         return np.asarray(np.maximum(np.where(there, self.sigma, usual), least))

@@ -193,7 +193,7 @@ def _with_bars(name: str, x: Array, y: Array, spread: Array, faint: bool) -> lis
 
 
 def plateaus_picture(identification: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
-    """The plateaus in torque and speed over time; None where none of the records is at hand."""
+    """The plateaus in torque and speed over time; None without records."""
     count = {record.name: sum(p.record == record.name for p in stage.plateaus) for record in records}
     shown = sorted((r for r in records if count[r.name]), key=lambda r: -count[r.name])[:MOST_RECORDS]
     if not shown:

@@ -4,9 +4,9 @@
 
 #define MOST_AXES 8
 
-/* The default coupling, as feedsim/simulation/cosim/schedule.py has it, over `total` cycles of T_c. setpoints[axes][positions][2]
- * at every `ratio` cycles; a row of table[total/every + 1] at every `every`: per axis controller and friction, then the
- * plant. energies[axes][3]: residual, its peak, friction work. */
+/* The default coupling, as feedsim/simulation/cosim/schedule.py has it, over `total` cycles of T_c.
+ * setpoints[axes][positions][2] at every `ratio` cycles; a row of table[total/every + 1] at every `every`: per axis
+ * controller and friction, then the plant. energies[axes][3]: residual, its peak, friction work. */
 #ifdef __GNUC__
 __attribute__((visibility("default")))
 #endif

@@ -1,8 +1,8 @@
 /* A control cycle, as data: how plant and friction may see each other (SCHEMES), and what is done in which order.
  *
  * Two programs read these rows: the unit machine, on its parts (exchange.c), and the master, on units of their own
- * (feedsim/simulation/cosim/schedule.py). Both do the same arithmetic in the same order, and so give the same bits. The packager
- * takes the rows as text (feedsim_packager/cycle.py): plain words, a row a line. */
+ * (feedsim/simulation/cosim/schedule.py). Both do the same arithmetic in the same order, and so give the same bits. The
+ * packager takes the rows as text (feedsim_packager/cycle.py): plain words, a row a line. */
 #ifndef FEEDSIM_CYCLE_H
 #define FEEDSIM_CYCLE_H
 

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"numpy", "scipy", "matplotlib", "fmpy", "pydantic", "yaml", "ruckig", "distributed", "dask", "pyarrow"}
 # What neither a run nor a check of a scenario needs, beyond the report's own.
-NOT_FOR_A_RUN = {"scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
+NOT_FOR_A_RUN = {"scipy.optimize", "scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
 # Nor what reads files of other kinds.
 NOT_FOR_A_RUN |= {"feedsim.scenario.study", "feedsim.files.columns", "feedsim.simulation.ssp"}
 # Nor what makes modes of other programs' matrices, or of a grid of poses.
@@ -34,6 +34,7 @@ def loaded(code: str) -> set[str]:
         "from feedsim.cli import main; main(['--version'])",
         "from feedsim.cli import main; main(['run', '--help'])",
         "from feedsim.cli import main; main(['no such command'])",
+        "from feedsim.cli import main; main(['run', 'no_such_file.yaml'])",
     ],
 )
 def test_no_library_is_loaded(code: str) -> None:

@@ -252,7 +252,7 @@ def test_a_link_does_not_lead_out_of_the_folder(tmp_path: Path) -> None:
 def test_values_are_written_into_the_file_that_has_them(tmp_path: Path) -> None:
     """The acceleration differs; the main file keeps its bytes."""
     from feedsim.jobs.machine_import import read_files
-    from feedsim.jobs.result import NO_WATCH
+    from feedsim.jobs.parameters import NO_WATCH
 
     main = laid(tmp_path, {"main.ini": HEAD + "[JOINT_1]\n#INCLUDE a.inc\n", "a.inc": JOINT.format(30)})
     made = changed(read_files([main], NO_WATCH), {"Z": "Z"}, {"Z": {"max_acceleration": 0.2, "max_speed": 0.03}})

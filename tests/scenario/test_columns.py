@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 import yaml
 
-from feedsim.files.columns import Columns, Signal, is_rms, load_columns, spelled
+from feedsim.files.columns import Columns, Signal, load_columns
 from feedsim.foundation.errors import InputError
+from feedsim.foundation.units import is_rms, spelled
 from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]

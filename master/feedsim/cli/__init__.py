@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from feedsim.cli.commands import Command, Parser, add_commands, arguments, given_files, refuse_missing_files, renamed
-from feedsim.cli.kinds import meant
 from feedsim.cli.terminal import (
     STANDARD_OUTPUT,
     START_TEXT,
@@ -154,6 +153,8 @@ def _done(command: Command, options: argparse.Namespace) -> int:
 
 def _kind_meant(command: Command, options: argparse.Namespace) -> str:
     """What is to be said in place of a refusal, where the file is of a kind that another command takes."""
+    from feedsim.cli.kinds import meant
+
     sentences = (meant(f"{command.name} {option}".strip(), [value]) for option, value in given_files(command, options))
     return next(filter(None, sentences), "")
 

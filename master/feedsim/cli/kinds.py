@@ -40,10 +40,10 @@ class Kind:
 
 def _keys(path: Path) -> set[str]:
     """Keys of the first level of a YAML file; none of a file that is none."""
-    from feedsim.files.source import read
-
     if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
         return set()
+    from feedsim.files.source import read
+
     try:
         data = read(path).data
     except InputError:

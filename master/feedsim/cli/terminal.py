@@ -15,7 +15,7 @@ from typing import Any, TextIO
 from unicodedata import category
 
 from feedsim.foundation.errors import WRONG, Note, ranked, severity
-from feedsim.jobs.result import Watch
+from feedsim.jobs.parameters import Watch
 
 STANDARD_OUTPUT = "standard output"  # what an error calls it
 

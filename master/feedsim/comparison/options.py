@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from feedsim.files.columns import spelled
 from feedsim.files.trace import Series, matches
 from feedsim.files.trace.trace import suggest
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.units import spelled
 
 LISTED = 4  # columns that a note names
 

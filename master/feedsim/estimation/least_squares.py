@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from feedsim.estimation.interval import Covariance
 from feedsim.estimation.parameter import Array, Parameter
@@ -196,6 +195,8 @@ def _ahead(problem: LeastSquares, here: Point, step: Array) -> Point | None:
 
 def _step(problem: LeastSquares, here: Point, radius: float) -> tuple[Array, float]:
     """The best step by the slopes, no longer than `radius` in any parameter, and its predicted reduction."""
+    from scipy.optimize import lsq_linear  # a third of what a run loads, for the circles that need none of it
+
     both = np.asarray(np.linalg.qr(np.column_stack([problem.jacobian(here), problem.residuals(here)]), mode="r"))
     size = len(here.x)
     R, r = both[:size, :size], both[:size, size]

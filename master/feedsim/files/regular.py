@@ -15,7 +15,6 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
-from feedsim.files.fields import brief
 from feedsim.foundation.errors import InputError, no_such_file
 
 MAX_JSON_DEPTH = 100  # levels of groups and lists
@@ -175,6 +174,8 @@ def referred(folder: Path, name: str) -> Path:
     Raises:
         InputError: it is none that a system can have; `folder` is closed and the name leads out.
     """
+    from feedsim.files.fields import brief  # loads pydantic, which who asks for the kind of a file has no need of
+
     if not _possible(name):
         raise InputError(f"{brief(name)} is no file name")
     path = folder / name

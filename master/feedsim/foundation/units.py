@@ -291,3 +291,35 @@ def _suggest_for(symbol: str, text: str, target: Unit) -> str:
             if unit(corrected).dimension == target.dimension:
                 return f"; did you mean {name!r}?"
     return f"; known are {', '.join(UNIT_SYMBOLS)}"
+
+
+# --- Units as drives and people spell them ----------------------------------------------------------------------------
+
+
+# What drives write that is no unit of its own: a whole unit -> the unit, and what to know about it.
+SPELLINGS: dict[str, str] = {
+    "increment": "1", "increments": "1", "inc": "1", "incs": "1", "count": "1", "counts": "1", "digits": "1",
+    "inch": "in", "inches": "in", "turn": "rev", "turns": "rev", "revs": "rev", "revolutions": "rev",
+    "r/min": "rpm", "u/min": "rpm", "upm": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
+    "a rms": "A", "arms": "A", "a(rms)": "A", "a_rms": "A", "aeff": "A", "a eff": "A",
+}  # fmt: skip
+RMS = ("a rms", "arms", "a(rms)", "a_rms", "aeff", "a eff")
+
+
+def spelled(text: str) -> str:
+    """A unit as drives write it in the spelling of this module: "U/min" is rpm, "increments" a plain number."""
+    return SPELLINGS.get(" ".join(text.split()).lower(), text)
+
+
+def is_rms(text: str) -> bool:
+    """Whether a unit says that a current is an effective value."""
+    return " ".join(text.split()).lower() in RMS
+
+
+def known_unit(text: str) -> bool:
+    """Whether text is a unit at all."""
+    try:
+        unit(spelled(text))
+    except InputError:
+        return False
+    return True

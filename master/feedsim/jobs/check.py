@@ -12,8 +12,8 @@ from feedsim import analysis
 from feedsim.files.source import is_study
 from feedsim.foundation.arguments import spelt
 from feedsim.foundation.errors import InputError, severity
-from feedsim.jobs.parameters import Archives, Argument, File, MachineChoice, Option, Settings, job
-from feedsim.jobs.result import NO_WATCH, Watch, announce
+from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, File, MachineChoice, Option, Settings, Watch, job
+from feedsim.jobs.result import announce
 from feedsim.jobs.subject import on_machine, opened
 from feedsim.scenario import Scenario
 from feedsim.simulation import judge

@@ -16,8 +16,8 @@ from feedsim.analysis.circularity import axis_letters
 from feedsim.files.columns import load_columns
 from feedsim.foundation.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
+from feedsim.jobs.result import Result, kept
 from feedsim.report import circle as page
 from feedsim.report.content import Report
 from feedsim.report.page import sheet_html

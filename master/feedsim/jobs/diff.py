@@ -15,8 +15,8 @@ from feedsim.design.sweep.bundle import case, scenario_of
 from feedsim.files.columns import Columns, load_columns
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.owned import TemporaryFolder
-from feedsim.jobs.parameters import Argument, ControlName, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.run import RunResult
 from feedsim.report import show as page
 from feedsim.report.content import Report

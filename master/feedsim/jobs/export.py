@@ -17,6 +17,7 @@ from feedsim.foundation.outputs import archive_with, begins_with, same
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.machine import positions
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Archives,
     File,
     Force,
@@ -25,10 +26,11 @@ from feedsim.jobs.parameters import (
     Positions,
     Settings,
     SubjectArgument,
+    Watch,
     job,
     out_file,
 )
-from feedsim.jobs.result import NO_WATCH, Kind, Made, Watch, announce_archive
+from feedsim.jobs.result import Kind, Made, announce_archive
 from feedsim.jobs.subject import on_machine
 from feedsim.report.live_page.content import content
 from feedsim.report.live_page.html import MARK, page

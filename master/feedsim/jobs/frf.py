@@ -16,6 +16,7 @@ from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.foundation.arguments import Band, Value, between, listed, quantity, settings, spelt
 from feedsim.foundation.errors import FeedsimError, InputError, severity
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Archives,
     FigureKinds,
     File,
@@ -23,10 +24,11 @@ from feedsim.jobs.parameters import (
     Option,
     Settings,
     SubjectArgument,
+    Watch,
     job,
     out,
 )
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.jobs.result import Result, announce, kept
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.report.content import Report

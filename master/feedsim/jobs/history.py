@@ -23,8 +23,20 @@ from feedsim.files.trace.trace import MAX_MAGNITUDE
 from feedsim.foundation.arguments import Pairs, Value, amount, given, listed, pairs, settings, spelt
 from feedsim.foundation.errors import InputError, Note, few, nearest
 from feedsim.foundation.outputs import read_rows
-from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Archives,
+    Argument,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    Watch,
+    job,
+    out,
+)
+from feedsim.jobs.result import Result, kept
 from feedsim.jobs.run import run
 from feedsim.jobs.subject import load
 from feedsim.report import history as page

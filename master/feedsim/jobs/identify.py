@@ -18,8 +18,8 @@ from feedsim.estimation.parameter import Prior
 from feedsim.files.columns import load_columns
 from feedsim.foundation.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, FigureKinds, File, Force, Option, Watch, job, out
+from feedsim.jobs.result import Result, kept
 from feedsim.report import identify as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content

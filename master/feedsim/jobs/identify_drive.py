@@ -15,6 +15,7 @@ from feedsim.estimation.replay.machine_files import MOST_MODES
 from feedsim.foundation.arguments import Value, quantity, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Archives,
     ControlName,
     FigureKinds,
@@ -26,11 +27,12 @@ from feedsim.jobs.parameters import (
     RecordColumns,
     RecordWindow,
     Settings,
+    Watch,
     job,
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.jobs.result import Result, announce, kept
 from feedsim.report.content import Report
 from feedsim.report.replay import drive as page
 from feedsim.report.replay.drive import DriveReport

@@ -15,8 +15,8 @@ from feedsim.files.fields import no_axis
 from feedsim.files.trace.response_files import read_response
 from feedsim.foundation.arguments import Band, Value, between, quantity, settings, spelt
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.parameters import NO_WATCH, Argument, FigureKinds, File, Force, Option, Settings, Watch, job, out
+from feedsim.jobs.result import Result, kept
 from feedsim.report import modal as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content

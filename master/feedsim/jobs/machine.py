@@ -16,6 +16,7 @@ from feedsim.foundation.arguments import Value, lengths, pairs, quantity, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.outputs import begins_with, forced, replacing
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     AxisPositions,
     CouplingStep,
     Cutoff,
@@ -25,10 +26,11 @@ from feedsim.jobs.parameters import (
     Positions,
     StaticCorrection,
     StructureArgument,
+    Watch,
     job,
     out,
 )
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.result import Result, kept
 from feedsim.report.content import PICTURE_FORMATS, Report
 from feedsim.report.machine import record as shown
 from feedsim.report.provenance import to_json

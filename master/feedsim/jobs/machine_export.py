@@ -17,6 +17,7 @@ from feedsim.foundation.arguments import listed, pairs, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.machine_import import assumed, axes_of, inputs_of, read_files
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Argument,
     AssumedValues,
     CheckedUnits,
@@ -25,10 +26,11 @@ from feedsim.jobs.parameters import (
     File,
     Force,
     Option,
+    Watch,
     job,
     out,
 )
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.result import Result, kept
 from feedsim.report.content import Report
 from feedsim.report.control_files import exported as page
 from feedsim.report.results import Content

@@ -17,6 +17,7 @@ from feedsim.files.regular import content
 from feedsim.foundation.arguments import listed, pairs, spelt
 from feedsim.foundation.errors import InputError, no_such_file
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Argument,
     AssumedValues,
     CheckedUnits,
@@ -26,10 +27,11 @@ from feedsim.jobs.parameters import (
     Force,
     Names,
     Option,
+    Watch,
     job,
     out,
 )
-from feedsim.jobs.result import NO_WATCH, Result, Watch, kept
+from feedsim.jobs.result import Result, kept
 from feedsim.report.content import Report
 from feedsim.report.control_files import imported as page
 from feedsim.report.results import Content

@@ -13,7 +13,7 @@ import inspect
 import re
 import shlex
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
 from pathlib import Path
@@ -443,3 +443,42 @@ def _word(value: Any, unit: str) -> str | None:
     if isinstance(value, int | float):
         return f"{value!r} {unit}".strip()
     return value if isinstance(value, str) else None
+
+
+# --- Who watches a job: hears how far it is, and what is to be known before it begins ---------------------------------
+
+
+class Watch:
+    """Nobody: every word is lost. The command line has one that shows them.
+
+    command: the command line that was given, for records; empty in Python.
+
+    >>> Watch().progress("reading", 1, 3)
+    """
+
+    command: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
+    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
+        """`done` of `total` steps of `what`; before: steps that an earlier call of the job has done."""
+
+    def of(self, what: str) -> Callable[[int, int], None]:
+        """The same for work that reports (done, total) and not what it is."""
+        return lambda done, total: self.progress(what, done, total)
+
+    def announce(self, sentence: str) -> None:
+        """Whose programs the job executes besides those of feedsim."""
+
+    def note(self, sentence: str) -> None:
+        """What the job will replace."""
+
+    def warn(self, findings: Iterable[str]) -> None:
+        """What is the matter with the files that the job begins with."""
+
+    def say(self, sentence: str) -> None:
+        """What takes longer, and why."""
+
+
+NO_WATCH = Watch()

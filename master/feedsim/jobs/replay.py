@@ -15,6 +15,7 @@ from feedsim.estimation.replay.compare import replayed
 from feedsim.estimation.replay.open_loop import driven
 from feedsim.files.trace import Trace, write_csv
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Archives,
     ControlName,
     FigureKinds,
@@ -26,11 +27,12 @@ from feedsim.jobs.parameters import (
     RecordColumns,
     RecordWindow,
     Settings,
+    Watch,
     job,
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.jobs.result import Result, announce, kept
 from feedsim.report.content import Report
 from feedsim.report.replay import report as page
 from feedsim.report.replay.report import Replayed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,7 +16,7 @@ from feedsim.foundation.arguments import Call, call, calling
 from feedsim.foundation.errors import InputError, OutputError, severity
 from feedsim.foundation.outputs import check_file, forced, replacing
 from feedsim.foundation.owned import claimed
-from feedsim.jobs.parameters import File
+from feedsim.jobs.parameters import File, Watch
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, replaced, write_report
@@ -26,43 +26,7 @@ if TYPE_CHECKING:
     from feedsim.scenario import Coupling, Machine
 
 
-# --- Who watches a job: hears how far it is, and what is to be known before it begins ---------------------------------
-
-
-class Watch:
-    """Nobody: every word is lost. The command line has one that shows them.
-
-    command: the command line that was given, for records; empty in Python.
-
-    >>> Watch().progress("reading", 1, 3)
-    """
-
-    command: Sequence[str] = ()
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}()"
-
-    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
-        """`done` of `total` steps of `what`; before: steps that an earlier call of the job has done."""
-
-    def of(self, what: str) -> Callable[[int, int], None]:
-        """The same for work that reports (done, total) and not what it is."""
-        return lambda done, total: self.progress(what, done, total)
-
-    def announce(self, sentence: str) -> None:
-        """Whose programs the job executes besides those of feedsim."""
-
-    def note(self, sentence: str) -> None:
-        """What the job will replace."""
-
-    def warn(self, findings: Iterable[str]) -> None:
-        """What is the matter with the files that the job begins with."""
-
-    def say(self, sentence: str) -> None:
-        """What takes longer, and why."""
-
-
-NO_WATCH = Watch()
+# --- What is said to who watches a job (jobs/parameters.py) before it begins ------------------------------------------
 
 
 def announce(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> None:

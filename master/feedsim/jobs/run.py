@@ -19,6 +19,7 @@ from feedsim.foundation.arguments import calling
 from feedsim.foundation.errors import ranked, severity
 from feedsim.foundation.outputs import forced, replacing
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Archives,
     Argument,
     ControlName,
@@ -29,10 +30,11 @@ from feedsim.jobs.parameters import (
     MachineChoice,
     Option,
     Settings,
+    Watch,
     job,
     out,
 )
-from feedsim.jobs.result import NO_WATCH, Result, Watch, in_words_of, kept
+from feedsim.jobs.result import Result, in_words_of, kept
 from feedsim.jobs.subject import Opened, on_machine, opened
 from feedsim.report import run as report
 from feedsim.report.content import Report

@@ -19,8 +19,20 @@ from feedsim.design.sweep.table import RECORD, Format, Table
 from feedsim.foundation.arguments import settings
 from feedsim.foundation.errors import WRONG, Wrong
 from feedsim.foundation.owned import TemporaryFolder
-from feedsim.jobs.parameters import Archives, Argument, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Archives,
+    Argument,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    Watch,
+    job,
+    out,
+)
+from feedsim.jobs.result import Result, announce, kept
 from feedsim.report.content import Report
 from feedsim.report.results import Content, discard
 from feedsim.report.sweep import report as page

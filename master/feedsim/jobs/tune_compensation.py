@@ -16,8 +16,21 @@ from feedsim.design.uncertainty import check_count, cloud_of
 from feedsim.files.fields import no_axis
 from feedsim.foundation.arguments import listed, settings, spelt
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Archives,
+    Argument,
+    Draws,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    Watch,
+    job,
+    out,
+)
+from feedsim.jobs.result import Result, announce, kept
 from feedsim.report import tune as page
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths

@@ -20,6 +20,7 @@ from feedsim.foundation.arguments import Value, amount, given, quantity, setting
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.diff import Overlay, diff
 from feedsim.jobs.parameters import (
+    NO_WATCH,
     Archives,
     Argument,
     ControlName,
@@ -29,10 +30,11 @@ from feedsim.jobs.parameters import (
     Force,
     Option,
     Settings,
+    Watch,
     job,
     out,
 )
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, in_words_of, kept
+from feedsim.jobs.result import Result, announce, in_words_of, kept
 from feedsim.jobs.run import RunResult, run
 from feedsim.report import run as report
 from feedsim.report.changes import change_lines

@@ -25,8 +25,21 @@ from feedsim.design.uncertainty import (
 from feedsim.files.trace import write_csv
 from feedsim.foundation.arguments import Pairs, Value, amount, by_name, pairs, settings, spelt
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import Archives, Argument, Draws, FigureKinds, File, Force, Option, Settings, job, out
-from feedsim.jobs.result import NO_WATCH, Result, Watch, announce, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Archives,
+    Argument,
+    Draws,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    Watch,
+    job,
+    out,
+)
+from feedsim.jobs.result import Result, announce, kept
 from feedsim.report import compensate as page
 from feedsim.report import uncertainty as intervals
 from feedsim.report.content import Report

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,8 +26,10 @@ from feedsim.structure import Modes, checked_modes, read_modes
 from feedsim.structure.modes import damped_twice
 from feedsim.structure.mounts import factored, read_mounts
 from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, warnings
-from feedsim.structure.poses import GridAxis
 from feedsim.structure.table_check import table_mismatch
+
+if TYPE_CHECKING:
+    from feedsim.structure.poses import GridAxis
 
 # --- Whether the loads of a run are what they are meant to be: by their size ahead, by their energy afterwards --------
 

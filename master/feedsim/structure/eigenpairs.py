@@ -6,8 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -15,7 +13,6 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, SuperLU, eigsh, splu
 
-from feedsim.foundation.cache import digest
 from feedsim.foundation.errors import FeedsimError, InputError
 from feedsim.structure.assembly import Assembly, few
 
@@ -318,24 +315,3 @@ def _ritz(assembly: Assembly, factor: Factor, shapes: Floats) -> tuple[Floats, F
     shapes /= np.sqrt(np.einsum("ij,ij->j", shapes, assembly.mass @ shapes))
     values, rotation = linalg.eigh(shapes.T @ (assembly.stiffness @ shapes), shapes.T @ (assembly.mass @ shapes))
     return values, shapes @ rotation
-
-
-# --- A structure file as solutions know it: in the state that it has, and the code that solves it ---------------------
-
-
-# What separates a file from a later one of the same name.
-State = tuple[int, int, int]
-# What solutions of a structure follow from besides its file: the rooms of structures, solved and described.
-CODE = (Path(__file__).parent, Path(__file__).parents[1] / "scenario" / "structure")
-
-
-def state_of(file: Path) -> State:
-    """Time of the last change [ns], length [byte] and number of a file. Raises OSError."""
-    result = file.stat()
-    return result.st_mtime_ns, result.st_size, result.st_ino
-
-
-@lru_cache(maxsize=8)
-def digest_of(file: Path, state: State) -> str:
-    """SHA-256 of the file, which is read anew where its state is another one. Raises OSError."""
-    return digest(file)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from feedsim.foundation.cache import cached
 from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario import Machine
-from feedsim.structure.eigenpairs import CODE, State, digest_of, state_of
+from feedsim.structure.assembly import CODE, State, digest_of, state_of
 from feedsim.structure.modes import TOOL_PORTS
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from feedsim.foundation import units
 from feedsim.foundation.cache import cached
 from feedsim.foundation.errors import FeedsimError, few
 from feedsim.scenario import Machine
-from feedsim.structure.assembly import MAX_SHOWN_LABELS
-from feedsim.structure.eigenpairs import CODE, State, digest_of, state_of
+from feedsim.structure.assembly import CODE, MAX_SHOWN_LABELS, State, digest_of, state_of
 from feedsim.structure.modes import Modes, read_modes
 from feedsim.structure.mounts import MountTable, read_mounts, table_of
 

@@ -29,11 +29,12 @@ from feedsim.analysis.circle.doubts import (
 from feedsim.analysis.circle.geometry import CLOSED, CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
-from feedsim.files.columns import Columns, spelled
+from feedsim.files.columns import Columns
 from feedsim.files.trace import Recording, read_recording
 from feedsim.files.trace.recording import mapped
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.units import spelled
 from feedsim.motions.circular import SENSE_WORDS
 
 # --- Radius and feed that an instrument writes ahead of the columns of a circle, such as "Radius: 150 mm" -------------

@@ -7,10 +7,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from feedsim.files.columns import DIMENSIONS, DRIVING, Columns, Signal, is_rms, known_unit, resulting, target_of
+from feedsim.files.columns import DIMENSIONS, DRIVING, Columns, Signal, resulting, target_of
 from feedsim.files.trace import Recording
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.units import is_rms, known_unit
 
 # --- Names that drive traces give their signals, and which signal of an axis each of them is --------------------------
 # A name is compared without case, blanks, underscores and the like, and without the axis before or behind it. Only

@@ -22,12 +22,11 @@ from typing import Literal
 
 import numpy as np
 
-from feedsim.files.columns import known_unit, spelled
 from feedsim.files.regular import content
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recorded, suggest
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, few
-from feedsim.foundation.units import NUMBER
+from feedsim.foundation.units import NUMBER, known_unit, spelled
 
 # --- Time stamps -> seconds since the first one: dates as loggers and gateways write them, times of day,
 #     milliseconds

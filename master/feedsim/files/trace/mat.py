@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.files import regular
-from feedsim.files.columns import known_unit, spelled
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.installation import need
+from feedsim.foundation.units import known_unit, spelled
 
 # --- What a MAT file holds, whatever its version: numbers, texts, structures and cells, by name -----------------------
 

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files.columns import Columns, Factor, resulting, spelled, target_of
 from feedsim.files.trace import capture, sinumerik_xml
 from feedsim.files.trace.capture import CaptureAxis
 from feedsim.files.trace.cells import TIME_NAMES, Table, read_table, titles, usual_column
@@ -26,6 +26,10 @@ from feedsim.files.trace.scopes import read_scope
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.units import spelled
+
+if TYPE_CHECKING:
+    from feedsim.files.columns import Columns, Factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,6 +255,8 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
     Without mapping files it is what it was. Raises InputError: a mapping of positions that names no axis, a column that
     there is not, a unit that is not known.
     """
+    from feedsim.files.columns import target_of
+
     if not mappings:
         return recording
     columns: dict[str, Array] = {}
@@ -289,6 +295,8 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
 
 
 def _unit_of(recording: Recording, name: str, unit: str | None, factor: Factor | None) -> units.Unit:
+    from feedsim.files.columns import resulting
+
     if name not in recording.units:
         raise InputError(f"{recording.header}: no column {name!r}{suggest(name, recording.names)}")
     return resulting(unit or spelled(recording.units[name]) or "1", factor.unit if factor is not None else "1")
@@ -296,6 +304,8 @@ def _unit_of(recording: Recording, name: str, unit: str | None, factor: Factor |
 
 def _scaled(recording: Recording, role: str, name: str, unit: str | None, factor: Factor | None) -> Array:
     """Values of a column in the SI unit of its role."""
+    from feedsim.files.columns import target_of
+
     given = _unit_of(recording, name, unit, factor)
     target = target_of(role, given)
     scale = 1.0

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.files import regular
-from feedsim.files.columns import known_unit, spelled
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.units import known_unit, spelled
 
 MAX_CHANNELS = 1000
 SCOPE_BYTES = 65536  # bytes within which a file shows what it is

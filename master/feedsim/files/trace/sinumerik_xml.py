@@ -18,11 +18,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from feedsim.files import regular
-from feedsim.files.columns import known_unit, spelled
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.scopes import Signals, unique
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.units import known_unit, spelled
 
 SUFFIX = ".xml"
 ALPHABET = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from feedsim.foundation.errors import InputError
-from feedsim.motions.part_program.conversational import Conversational
-from feedsim.motions.part_program.interpreter import Interpreter
 from feedsim.motions.part_program.moves import Moves
 from feedsim.motions.part_program.recorder import Fault, Recorder
 from feedsim.motions.part_program.source import DIALECTS, Folder, Program, detect_dialect, read_text
@@ -65,6 +63,10 @@ def interpret(
     dialect: str, offsets: Mapping[str, Mapping[str, float]], tolerance: float, skip: bool,
 ) -> Moves:  # fmt: skip
     """As read_program(), of texts; lengths in mm. find: name -> file and text of a subprogram."""
+    # Machine files and results name moves, and load this package; the languages are for those who run programs.
+    from feedsim.motions.part_program.conversational import Conversational
+    from feedsim.motions.part_program.interpreter import Interpreter
+
     recorder = Recorder(axes, start)
     programs = [Program(name, text, 0)]
     called: dict[str, Program | None] = {}

@@ -19,7 +19,6 @@ from feedsim.simulation.cosim.unpacked import STORE
 from feedsim.structure.assembly import SAME_POSITION
 from feedsim.structure.modes import Modes, checked_modes, with_transmissions
 from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, MOUNTS_IN_ARCHIVE, POSES_IN_ARCHIVE, pack
-from feedsim.structure.poses import read_cell
 
 _START = ".x_0"  # of every axis of a plant
 MAX_PACKED_PLANTS = 4  # packed archives, of about 1 MB each: studies run the same machine again and again
@@ -170,6 +169,8 @@ def plant_modes(machine: Machine, amplitude: float = 0.0) -> tuple[Modes, list[s
 
 
 def _of_cell(machine: Machine) -> tuple[Modes, list[str]] | None:
+    from feedsim.structure.poses import read_cell  # whose room solves structures, which few runs do
+
     assert machine.plant is not None
     with Archive(machine.plant) as archive:
         file = archive.directory / POSES_IN_ARCHIVE

@@ -7,6 +7,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,9 @@ from feedsim.simulation.cosim.worker import deliver
 from feedsim.simulation.nc import Program, plan
 from feedsim.structure.modes import checked_modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
-from feedsim.structure.poses import GridAxis, read_grid
+
+if TYPE_CHECKING:
+    from feedsim.structure.poses import GridAxis
 
 # --- The log of a run as a control records it: sampled, delayed, disturbed by noise, rounded --------------------------
 # Sampling is at instants, without a filter ahead of it. What a signal is between two control cycles is known exactly,
@@ -250,7 +253,11 @@ def grid_of(system: System) -> tuple[GridAxis, ...]:
     if system.plant_modes_file is not None:
         return ()
     file = system.plant.archive.directory / POSES_IN_ARCHIVE
-    return read_grid(file, system.plant_axes) if file.is_file() else ()
+    if not file.is_file():
+        return ()
+    from feedsim.structure.poses import read_grid  # whose room solves structures, which few runs do
+
+    return read_grid(file, system.plant_axes)
 
 
 def crossings_of(system: System) -> Crossings:

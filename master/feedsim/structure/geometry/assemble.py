@@ -16,8 +16,7 @@ from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.checks import contradictions, held, load_structure, node, nodes, pose_faults, rail
 from feedsim.scenario.structure.parts import Drive, GeometryStructure, Mount
-from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort
-from feedsim.structure.eigenpairs import State
+from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort, State
 from feedsim.structure.geometry.mesh import FRAME, Mesh, Row, rigid, symmetric, weighted
 
 # --- Springs of a machine at a pose, each a stiffness and the row of the elongation it resists; and the ports ---------

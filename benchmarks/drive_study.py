@@ -32,7 +32,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead
 import numpy as np
 
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.closed_loop import read_axes, windowed
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import ElasticMode, with_modes

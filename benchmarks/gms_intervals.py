@@ -23,7 +23,7 @@ import numpy as np
 
 from feedsim.estimation.identify import Options, Record, identify
 from feedsim.estimation.identify.parameters import estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario.roles import FRICTION_UNITS, GMS
 from feedsim.simulation.cosim.friction_law import FrictionLaw

@@ -24,7 +24,7 @@ from types import FrameType
 from identification_logs import FLAWS, Log, made, names
 
 from feedsim.estimation.identify import Asked, identify, named_apart, read_traces
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.foundation.errors import InputError
 from feedsim.simulation.cosim.friction_law import FrictionLaw

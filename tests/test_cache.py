@@ -11,12 +11,11 @@ from typing import Any
 
 import pytest
 
-from feedsim.foundation import cache
+from feedsim.foundation import owned
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.scenario import load_machine
 from feedsim.structure import pose_change as room
-from feedsim.structure import table_check
 from feedsim.structure.pose_change import pose_change
 
 MACHINE = Path(__file__).resolve().parents[1] / "scenarios" / "machines" / "test_centre"
@@ -37,7 +36,7 @@ class Counted:
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "kept"
-    monkeypatch.setenv(cache.FOLDER, str(folder))
+    monkeypatch.setenv(owned.FOLDER, str(folder))
     return folder
 
 
@@ -50,7 +49,7 @@ def code(tmp_path: Path) -> Path:
 
 def test_an_answer_is_found_once(place: Path, code: Path) -> None:
     find = Counted([0.1 + 0.2, 1e-300, "words", None])
-    answers = [cache.cached("kind", ["a", 1.5], [code], find) for _ in range(3)]
+    answers = [owned.cached("kind", ["a", 1.5], [code], find) for _ in range(3)]
     assert answers == [find.answer] * 3  # to the last bit
     assert find.times == 1
     assert [file.name.startswith("kind-") for file in place.iterdir()] == [True]
@@ -59,11 +58,11 @@ def test_an_answer_is_found_once(place: Path, code: Path) -> None:
 def test_what_follows_from_something_else_is_found_anew(place: Path, code: Path) -> None:
     find = Counted()
     for follows_from in (["a", 1.0], ["a", 1.0 + 1e-15], ["b", 1.0]):
-        cache.cached("kind", follows_from, [code], find)
+        owned.cached("kind", follows_from, [code], find)
     assert find.times == 3
     (code / "solver.py").write_text("x = 2\n")
-    cache._versions.cache_clear()
-    cache.cached("kind", ["a", 1.0], [code], find)
+    owned._versions.cache_clear()
+    owned.cached("kind", ["a", 1.0], [code], find)
     assert find.times == 4
 
 
@@ -72,10 +71,10 @@ def test_what_follows_from_something_else_is_found_anew(place: Path, code: Path)
 )
 def test_a_damaged_file_is_replaced(content: str, place: Path, code: Path) -> None:
     find = Counted(7)
-    cache.cached("kind", [], [code], find)
+    owned.cached("kind", [], [code], find)
     (file,) = place.iterdir()
     file.write_text(content)
-    assert cache.cached("kind", [], [code], find) == 7
+    assert owned.cached("kind", [], [code], find) == 7
     assert find.times == 2
     assert json.loads(file.read_text())["answer"] == 7
 
@@ -83,9 +82,9 @@ def test_a_damaged_file_is_replaced(content: str, place: Path, code: Path) -> No
 def test_a_folder_that_cannot_be_written_is_none(tmp_path: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     for folder in ("", str(tmp_path / "file"), str(tmp_path / "file" / "below")):
-        monkeypatch.setenv(cache.FOLDER, folder)
+        monkeypatch.setenv(owned.FOLDER, folder)
         find = Counted(3)
-        assert [cache.cached("kind", [], [code], find) for _ in range(2)] == [3, 3]
+        assert [owned.cached("kind", [], [code], find) for _ in range(2)] == [3, 3]
         assert find.times == 2
 
 
@@ -96,17 +95,17 @@ def test_a_folder_that_cannot_be_written_is_none(tmp_path: Path, code: Path, mon
      ({"HOME": "/home/a", "XDG_CACHE_HOME": "/b"}, Path("/b/feedsim"))],
 )  # fmt: skip
 def test_where_answers_are_kept(set_to: dict[str, str], expected: Path | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (cache.FOLDER, "HOME", "XDG_CACHE_HOME"):
+    for name in (owned.FOLDER, "HOME", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     for name, value in set_to.items():
         monkeypatch.setenv(name, value)
-    assert cache.folder() == expected
+    assert owned.folder() == expected
 
 
 def test_the_oldest_answers_go(place: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "MAX_ANSWERS", 3)
+    monkeypatch.setattr(owned, "MAX_ANSWERS", 3)
     for k in range(6):
-        cache.cached("kind", [k], [code], Counted(k))
+        owned.cached("kind", [k], [code], Counted(k))
         for file in place.iterdir():  # a clock may be coarse
             if json.loads(file.read_text())["answer"] == k:
                 os.utime(file, (k, k))
@@ -118,18 +117,18 @@ def test_the_pose_is_judged_the_same_and_solved_once(place: Path, monkeypatch: p
     machine = load_machine(MACHINE)
 
     def judged() -> tuple[Any, Any]:
-        for each in (room._between, room._end, room._middle, table_check._modes):
+        for each in (room._between, room._end, room._middle, room._modes_of_table):
             each.cache_clear()
-        return pose_change(machine, RANGES), table_check.table_mismatch(machine)
+        return pose_change(machine, RANGES), room.table_mismatch(machine)
 
-    monkeypatch.setenv(cache.FOLDER, "")
+    monkeypatch.setenv(owned.FOLDER, "")
     plain = judged()
     assert plain[0].axes[0].modes
-    monkeypatch.setenv(cache.FOLDER, str(place))
+    monkeypatch.setenv(owned.FOLDER, str(place))
     assert judged() == plain
     monkeypatch.setattr(room, "_model", lambda *_, **__: pytest.fail("solved again"))
-    monkeypatch.setattr(table_check, "_modes", lambda *_: pytest.fail("solved again"))
-    table_check._modes.cache_clear = lambda: None  # type: ignore[attr-defined]
+    monkeypatch.setattr(room, "_modes_of_table", lambda *_: pytest.fail("solved again"))
+    room._modes_of_table.cache_clear = lambda: None  # type: ignore[attr-defined]
     assert judged() == plain
 
 
@@ -163,8 +162,8 @@ def test_templates_of_reports_are_compiled_once(place: Path) -> None:
 def test_folders_of_other_code_are_few(place: Path, code: Path) -> None:
     for k in range(8):
         (code / "solver.py").write_text(f"x = {k}\n")
-        cache._versions.cache_clear()
-        own = cache.own_folder("compiled", [code])
+        owned._versions.cache_clear()
+        own = owned.own_folder("compiled", [code])
         assert own is not None
         os.utime(own, (k, k))
     assert len([*place.iterdir()]) == 5
@@ -173,7 +172,7 @@ def test_folders_of_other_code_are_few(place: Path, code: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="rights of POSIX")
 def test_a_folder_that_others_can_write_to_is_not_used(place: Path, code: Path) -> None:
-    own = cache.own_folder("compiled", [code])
+    own = owned.own_folder("compiled", [code])
     assert own is not None
     own.chmod(0o777)
-    assert cache.own_folder("compiled", [code]) is None
+    assert owned.own_folder("compiled", [code]) is None

@@ -45,7 +45,7 @@ ORDER = [
 SOLE_USERS = {
     "fmpy": {"simulation/cosim/archive.py", "simulation/cosim/unit.py"},
     "ctypes": {
-        *(f"simulation/cosim/{name}.py" for name in ("unit", "friction_law", "exchange", "arithmetic")),
+        *(f"simulation/cosim/{name}.py" for name in ("unit", "friction_law", "exchange", "archive")),
         "foundation/installation.py", "motions/planner/planned.py",
     },
     "yaml": {"files", "estimation/identify/friction_file.py"},

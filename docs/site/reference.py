@@ -20,7 +20,7 @@ import feedsim
 from feedsim import cli
 from feedsim.estimation.identify.signals import ALIASES
 from feedsim.files import control
-from feedsim.foundation.variables import table
+from feedsim.foundation.units import table
 from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -28,8 +28,8 @@ from feedsim.jobs.replay import replay as replay
 from feedsim.jobs.result import Made as Made
 from feedsim.jobs.result import Result as Result
 from feedsim.jobs.run import RunResult as RunResult
+from feedsim.jobs.run import load as load
 from feedsim.jobs.run import run as run
-from feedsim.jobs.subject import load as load
 from feedsim.jobs.sweep import sweep as sweep
 from feedsim.jobs.tools import convert as convert
 from feedsim.jobs.tools import example as example

@@ -13,7 +13,7 @@ from drawn_circles import Causes, driven
 from scipy import stats
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence, swinging
-from feedsim.estimation.interval import student
+from feedsim.estimation.least_squares import student
 
 BALLBAR = CircleUnderTest(("X", "Z"), radius=0.1, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
 SAMPLES = 3000

@@ -16,9 +16,8 @@ import numpy as np
 import pytest
 
 from command_helpers import feedsim, feedsim_process
-from feedsim.cli.commands import COMMANDS
+from feedsim.cli.commands import COMMANDS, Painted, painted, shown_streams
 from feedsim.cli.kinds import INPUT_KINDS, kind
-from feedsim.cli.terminal import Painted, painted, shown_streams
 
 ROOT = Path(__file__).resolve().parents[2]
 CENTRE = ROOT / "scenarios" / "machines" / "test_centre"

@@ -24,7 +24,7 @@ from feedsim.estimation.identify.result import Correlation, Estimate, Plateau
 from feedsim.estimation.identify.stages import begins, merged_correlation, transitions
 from feedsim.files.trace import write_csv
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.variables import parameters
+from feedsim.foundation.units import parameters
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
 from feedsim.simulation.cosim.friction_law import FrictionLaw

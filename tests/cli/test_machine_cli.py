@@ -18,7 +18,7 @@ from feedsim.analysis import evaluate
 from feedsim.simulation import cosim
 from feedsim.simulation.judge import judged
 from feedsim.structure import read_modes
-from feedsim.structure.table_check import table_mismatch
+from feedsim.structure.pose_change import table_mismatch
 
 ROOT = Path(__file__).resolve().parents[2]
 TEST_CENTRE, ONE_AXIS = (ROOT / "scenarios" / "machines" / name for name in ("test_centre", "one_axis"))

@@ -17,7 +17,7 @@ from feedsim.scenario import Base, load_machine
 from feedsim.scenario.loads import ForceTable, ToolLoad
 from feedsim.simulation import cosim, judge, nc
 from feedsim.simulation.cosim.loads import Acting
-from feedsim.simulation.cosim.loop import REPORTED_EVERY
+from feedsim.simulation.cosim.schedule import REPORTED_EVERY
 from feedsim.simulation.judge import JudgedRun, judged
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ from feedsim.motions import circular
 from feedsim.motions.kind import Held, Joined
 from feedsim.report import run as report
 from feedsim.simulation import cosim, nc
-from feedsim.simulation.cosim import loop, recording
+from feedsim.simulation.cosim import recording, schedule
 from feedsim.simulation.cosim.unit import Log
 from feedsim.simulation.judge import judged
 from feedsim.simulation.nc import program
@@ -42,7 +42,7 @@ def everything_is_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(program, "SPLINE_POINTS", 64)
     monkeypatch.setattr(spline.LongSpline.__init__, "__defaults__", (64,))
     monkeypatch.setattr(circular, "INSTANTS", 77)
-    for room in (loop, recording):
+    for room in (schedule, recording):
         monkeypatch.setattr(room, "RING", 3)
         monkeypatch.setattr(room, "REPORTED_EVERY", 203)
 

@@ -22,9 +22,8 @@ from feedsim.scenario.model import SCHEMES
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim import exchange
 from feedsim.simulation.cosim.excite import measure, usual_rms
-from feedsim.simulation.cosim.loop import REPORTED_EVERY, Loop, Progress
 from feedsim.simulation.cosim.operations import set_real
-from feedsim.simulation.cosim.schedule import Cycle
+from feedsim.simulation.cosim.schedule import REPORTED_EVERY, Cycle, Loop, Progress
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Port
 from feedsim.simulation.judge import JudgedRun, judged

@@ -11,7 +11,7 @@ import pytest
 from feedsim import scenario
 from feedsim.scenario import Scenario
 from feedsim.simulation import cosim, nc
-from feedsim.simulation.cosim import loop, recording
+from feedsim.simulation.cosim import recording, schedule
 from feedsim.simulation.nc import Program
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
@@ -47,8 +47,8 @@ def test_every_row_is_that_of_an_unringed_recording(
     totals += [n * REPORTED_EVERY for n in range(1, 8)]
     program = nc.plan(loaded)
     whole = cosim.run(loaded, program=begun(program, max(totals)), fmus=fmus, native=native)
-    assert len(whole.trace) <= loop.RING, "the reference is not unringed"
-    for room in (loop, recording):
+    assert len(whole.trace) <= schedule.RING, "the reference is not unringed"
+    for room in (schedule, recording):
         monkeypatch.setattr(room, "RING", RING)
         monkeypatch.setattr(room, "REPORTED_EVERY", REPORTED_EVERY)
     for total in totals:

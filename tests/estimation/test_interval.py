@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from feedsim.estimation import interval
+from feedsim.estimation import least_squares
 from feedsim.estimation.identify.result import Estimate, Status
-from feedsim.estimation.interval import Covariance, correlation_length, stretched
+from feedsim.estimation.least_squares import Covariance, correlation_length, stretched
 
 ROWS, RUNS, POLE = 2000, 400, 0.9
 
 
 def test_examples_of_docstrings() -> None:
-    assert doctest.testmod(interval).failed == 0
+    assert doctest.testmod(least_squares).failed == 0
 
 
 @pytest.mark.parametrize(
@@ -27,8 +27,8 @@ def test_examples_of_docstrings() -> None:
      (1.0, math.nan, True, True)],
 )  # fmt: skip
 def test_the_rule(value: float, half: float, determined: bool, shows: bool) -> None:
-    assert interval.determined(value, half) is determined
-    assert interval.shows(value, half) is shows
+    assert least_squares.determined(value, half) is determined
+    assert least_squares.shows(value, half) is shows
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_an_estimate_is_judged_by_it(name: str, status: Status, sigma: float, be
 
 
 def test_the_interval_is_that_of_a_normal_distribution() -> None:
-    assert interval.half_width(2.0) == pytest.approx(2 * stats.norm.ppf(0.975), rel=1e-6)
+    assert least_squares.half_width(2.0) == pytest.approx(2 * stats.norm.ppf(0.975), rel=1e-6)
 
 
 @pytest.mark.parametrize("of_mean", [True, False])
@@ -107,9 +107,9 @@ def test_blocks_that_share_their_noise() -> None:
 def test_the_autocorrelation_is_the_sum_of_products() -> None:
     values = np.random.default_rng(2).standard_normal(50)
     expected = np.correlate(values, values, "full")[49:]
-    assert interval.autocorrelation(values)[:50] == pytest.approx(expected, abs=1e-12)
+    assert least_squares.autocorrelation(values)[:50] == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("free", [2, 7, 40, 1e6])
 def test_a_pair_of_values_has_the_quantile_of_fisher(free: float) -> None:
-    assert interval.pair_quantile(free) == pytest.approx(math.sqrt(2 * stats.f.ppf(0.95, 2, free)), rel=1e-9)
+    assert least_squares.pair_quantile(free) == pytest.approx(math.sqrt(2 * stats.f.ppf(0.95, 2, free)), rel=1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feedsim.estimation.interval import NORMAL_95, between_groups, student
+from feedsim.estimation.least_squares import NORMAL_95, between_groups, student
 
 
 def test_a_mean_of_groups_in_closed_form() -> None:

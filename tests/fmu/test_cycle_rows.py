@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim_packager import cycle
 from feedsim_packager.errors import InputError
 
@@ -15,7 +15,7 @@ C = (cycle.HEADER.parent / "exchange.c").read_text(encoding="utf-8")
 
 def test_schemes_are_numbered_as_the_parameter_allows() -> None:
     numbers = [row[0] for row in cycle.read()["SCHEMES"]]
-    scheme = variables.table("machine")["coupling.scheme"]
+    scheme = units.table("machine")["coupling.scheme"]
     assert numbers == list(range(int(scheme.minimum), int(scheme.maximum) + 1))
     assert all(f"{number} {name}" in scheme.text for number, name, *_ in cycle.read()["SCHEMES"])
 

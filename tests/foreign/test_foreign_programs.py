@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli
-from feedsim.simulation.cosim import binaries
+from feedsim.simulation.cosim import exchange
 from feedsim.simulation.cosim.archive import Archive, folders
 from feedsim_packager import toolchain
 from foreign import acme
@@ -144,7 +144,7 @@ def test_the_sum_is_of_the_whole_archive(libraries: Libraries, tmp_path: Path) -
         path = acme.archive(tmp_path / "wrapped.fmu", "friction", libraries.friction, acme.FRICTION)
         with zipfile.ZipFile(path, "a") as package:
             package.writestr("resources/program.py", program)
-        sums.add(binaries.executing(path, "friction of X")[0])
+        sums.add(exchange.executing(path, "friction of X")[0])
     assert len(sums) == 2
 
 
@@ -172,11 +172,11 @@ def test_whose_programs_they_are(fmus: Path, tmp_path: Path) -> None:
         ({beside: b""}, False),
     ):
         with Archive(write(tmp_path / "other.fmu", {**shipped, **changed})) as archive:
-            assert binaries.is_shipped(archive) == ours, changed.keys()
+            assert exchange.is_shipped(archive) == ours, changed.keys()
     named = tmp_path / "friction.fmu"
     os.link(tmp_path / "other.fmu", named)
     with Archive(named) as archive:
-        assert not binaries.is_shipped(archive)
+        assert not exchange.is_shipped(archive)
 
 
 def test_archives_that_are_named_apart(
@@ -191,4 +191,4 @@ def test_archives_that_are_named_apart(
     digest = hashlib.sha256(base.read_bytes()).hexdigest()
     said = capsys.readouterr().err
     assert f"executes {base} as the packed plant's trial: binaries/{folders()[0]}/plant.so; SHA-256 {digest}" in said
-    assert binaries.executing(fmus / "friction.fmu", "friction law") == []
+    assert exchange.executing(fmus / "friction.fmu", "friction law") == []

@@ -16,7 +16,7 @@ from feedsim.estimation.identify.friction_file import (
     value_text,
 )
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.scenario.load import read_friction
 from identification_helpers import estimates, identified
 

@@ -18,7 +18,7 @@ from feedsim.estimation.identify.open_loop import balanced, first_deflection, fi
 from feedsim.estimation.identify.parameters import FRICTION_NAMES, NO_EFFECT
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Balance, Estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 

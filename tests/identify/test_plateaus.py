@@ -8,7 +8,7 @@ import pytest
 from feedsim.estimation.identify import plateaus as averages
 from feedsim.estimation.identify.plateaus import plateaus
 from feedsim.estimation.identify.record import Record
-from feedsim.estimation.interval import correlation_length
+from feedsim.estimation.least_squares import correlation_length
 from identify_records import I_P, SPEEDS, TRUE, J, constant_speeds, noisy, stationary
 
 

@@ -16,7 +16,7 @@ from feedsim.estimation.identify.position_loop import (
     setpoint_delay,
     speed_setpoint,
 )
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation.errors import InputError
 
 H = 2e-3

@@ -12,7 +12,7 @@ from feedsim.estimation.identify import stribeck
 from feedsim.estimation.identify import stribeck as drift
 from feedsim.estimation.identify.parameters import curve, torque
 from feedsim.estimation.identify.result import Plateau, Stationary
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation.errors import InputError
 from identify_records import I_P, SPEEDS, TRUE, stationary
 

@@ -24,7 +24,7 @@ from feedsim.linear.system import LinearSystem
 from feedsim.report.content import Table
 from feedsim.report.formatting import typeset
 from feedsim.report.live_page.content import content, rows, segments
-from feedsim.report.run.diagnosis import diagnosis_section
+from feedsim.report.run.pose import diagnosis_section
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim import fmus_directory
 from feedsim.simulation.judge import judged

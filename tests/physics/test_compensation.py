@@ -15,7 +15,7 @@ from feedsim.analysis import compensation as module
 from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
 from feedsim.foundation.errors import InputError, severity
 from feedsim.jobs.tune_feedforward import CompensateResult
-from feedsim.linear.drive import LinearDrive
+from feedsim.linear.plant import LinearDrive
 from feedsim.report.compensate import rows_of
 from feedsim.scenario import Axis, Machine, Scenario
 from feedsim.simulation import cosim, nc

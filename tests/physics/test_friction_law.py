@@ -15,7 +15,7 @@ from friction_reference import X_AXIS, Z_AXIS, level, line, sine, solved, torque
 from scipy.integrate import solve_ivp
 
 from feedsim.estimation.identify.parameters import torque as constant_speed_torque
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 from fmi_helpers import Archive, Floats
@@ -43,7 +43,7 @@ def speeds(count: int = 6000, amplitude: float = 2.0) -> Floats:
     return exact(n)
 
 
-@pytest.mark.parametrize("name", variables.parameters("friction"))
+@pytest.mark.parametrize("name", units.parameters("friction"))
 def test_identification_knows_what_acts_at_constant_speed(law: FrictionLaw, name: str) -> None:
     """Its curve over speed is Eq. 7 a second time: whichever parameter differs, the law settles at it."""
     start = law.start_values
@@ -87,7 +87,7 @@ def test_each_parameter_is_taken_for_what_it_is(law: FrictionLaw, archive: Archi
 
 
 def test_start_values_are_the_units(law: FrictionLaw) -> None:
-    rows = variables.parameters("friction")
+    rows = units.parameters("friction")
     assert [*law.start_values.items()] == [(name, row.start) for name, row in rows.items()]
     assert law.start_values.items() >= Z_AXIS.items()
     assert law.names == tuple(rows)

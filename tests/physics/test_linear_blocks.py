@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import bilinear, cont2discrete, freqz
 
-from feedsim.linear.drive import LinearDrive, OperatingPoint, zero_order_hold
-from feedsim.linear.plant import ModalPlant
+from feedsim.linear.plant import LinearDrive, ModalPlant, OperatingPoint, zero_order_hold
 from feedsim.scenario import Filter
 from physics import controller_reference
 from scenario_helpers import default_machine

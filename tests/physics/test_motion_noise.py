@@ -15,7 +15,7 @@ from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Dynamic, Estimate
 from feedsim.estimation.identify.search import Solution
 from feedsim.estimation.identify.uncertainty import reversals, turnover_rows
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identify_records import constant_speeds, noisy
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim.estimation.identify import Record
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
 from feedsim.estimation.replay.identified import _beside, coupled
 from feedsim.estimation.replay.machine_files import Beside, ElasticMode, RigidAxis, machine_files, with_modes

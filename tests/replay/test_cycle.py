@@ -11,7 +11,7 @@ import pytest
 from drive_helpers import COLUMNS, MACHINES, SCENARIO
 from feedsim.estimation.identify.parameters import estimate
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.closed_loop import read_axes, windowed
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.tuning import OtherCycle, decision, gain_of, with_either

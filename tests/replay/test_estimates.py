@@ -11,7 +11,7 @@ import pytest
 
 from feedsim.estimation.identify.parameters import estimate
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.closed_loop import of_cycle
 from feedsim.estimation.replay.estimates import STRETCHES, between_stretches, shared_lag, with_undecided
 from feedsim.estimation.replay.tuning import parameter

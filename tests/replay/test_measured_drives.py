@@ -12,7 +12,7 @@ import pytest
 
 from drive_helpers import MACHINES, identified
 from feedsim.cli import main
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.closed_loop import read_axes, windowed
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.files.columns import load_columns

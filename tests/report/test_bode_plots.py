@@ -15,7 +15,7 @@ from feedsim.analysis.truncation import deviations, structure_responses
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.report import chart
 from feedsim.report.chart import Panel
-from feedsim.report.chart.scales import ranges, ticks
+from feedsim.report.chart.model import ranges, ticks
 from feedsim.report.frf.bode import Column, Curve, Ordinate, at, bode_chart, phases
 from feedsim.report.frf.bode_plots import (
     curves_of,

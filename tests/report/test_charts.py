@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
-from feedsim.report.chart.model import embedded
-from feedsim.report.chart.scales import measured, ranges, ticks
+from feedsim.report.chart.model import embedded, measured, ranges, ticks
 from feedsim.report.chart.svg import svg
 from feedsim.report.content import Picture
 from svg_helpers import Drawn, drawn_panels, overlap

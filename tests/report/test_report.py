@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import Figure, evaluate
-from feedsim.cli.terminal import finish, warn
+from feedsim.cli.commands import finish, warn
 from feedsim.files.trace import read_csv
 from feedsim.foundation.errors import Note, Wrong
 from feedsim.jobs.check import Checked

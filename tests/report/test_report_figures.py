@@ -14,8 +14,7 @@ from feedsim.report import chart
 from feedsim.report.chart import Panel, Polar
 from feedsim.report.content import LARGEST_SVG
 from feedsim.report.formatting import CLOCKWISE, SIMULATED
-from feedsim.report.run.axis_plots import overview_picture, positioning_picture
-from feedsim.report.run.circle_plots import ring_step
+from feedsim.report.run.axis_plots import overview_picture, positioning_picture, ring_step
 from feedsim.report.run.report import draw
 from feedsim.scenario import Axis, CircleTest, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
-from feedsim.report.chart.model import NARROWEST, UNITS_WITH_PREFIX
-from feedsim.report.chart.scales import ticks
+from feedsim.report.chart.model import NARROWEST, UNITS_WITH_PREFIX, ticks
 from feedsim.report.chart.svg import WIDTH, svg
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import drawing, html

@@ -16,8 +16,7 @@ from feedsim.analysis import evaluate
 from feedsim.files.trace import read_csv
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.chart.model import BLOCK_ROWS, embedded, steps
-from feedsim.report.chart.scales import ticks
+from feedsim.report.chart.model import BLOCK_ROWS, embedded, steps, ticks
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from kinds_helpers import KINDS, Kinds

@@ -13,7 +13,7 @@ import pytest
 from command_helpers import feedsim
 from feedsim.files.control import CONTROLS, known, names_of
 from feedsim.files.control.names import table
-from feedsim.foundation import units, variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import CONTROL_CHOICES
 from feedsim.scenario import load, load_machine
@@ -24,7 +24,7 @@ MACHINE = PROJECT / "scenarios" / "machines" / "test_centre"
 
 
 def test_every_row_names_a_parameter_that_we_have() -> None:
-    ours = variables.parameters("controller")
+    ours = units.parameters("controller")
     for row in table():
         group, _, name = row.parameter.partition(".")
         if group == "drive":

@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from feedsim.files.fields import Quantity, is_multiple
-from feedsim.foundation import units, variables
+from feedsim.foundation import units
 from feedsim.motions import Arc, Circle, Column, Dwell, MeasuredSetpoints, Move
 from feedsim.scenario import (
     CircleTest,
@@ -63,7 +63,7 @@ def test_default_machine(name: str) -> None:
     rest = {"L_q": L, "p": 5, "u_max": 350.0, "k_ffw": 1.0, "T_ref": 0.0, "filter_1.type": 1, "filter_2.type": 0}
     switches = {"symmetry_lag": False, "ramp_speed_setpoint": True, "speed_integrator": True, "reference_model": True}
     assert {key: drive[key] for key in (*rest, *switches)} == rest | switches
-    start = {key: row.start for key, row in variables.parameters("friction").items()}
+    start = {key: row.start for key, row in units.parameters("friction").items()}
     assert axis.friction.parameters() == start | COMMON | FRICTION[name]
     assert (axis.pitch, axis.max_acceleration, axis.max_speed, axis.M_0) == (0.020, 14.4, 0.5, 0.0)
     assert axis.travel == (0.0, {"X": 1.770, "Y": 0.655, "Z": 0.685}[name])

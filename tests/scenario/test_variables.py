@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim_packager import cli
 
@@ -13,14 +13,14 @@ from feedsim_packager import cli
 def test_the_packager_writes_what_is_loaded(tmp_path: Path) -> None:
     written = tmp_path / "variables.json"
     assert cli.main(["variables", "--out", str(written)]) == 0
-    assert json.loads(written.read_bytes()) == json.loads(variables.FILE.read_bytes())
+    assert json.loads(written.read_bytes()) == json.loads(units.FILE.read_bytes())
 
 
 def test_a_table_that_is_missing_names_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(variables, "FILE", tmp_path / "none.json")
-    variables._read.cache_clear()
+    monkeypatch.setattr(units, "FILE", tmp_path / "none.json")
+    units._read.cache_clear()
     with pytest.raises(InputError, match=r"none\.json is missing; `make fmus` builds it"):
-        variables._read()
+        units._read()
 
 
 @pytest.mark.parametrize(
@@ -34,5 +34,5 @@ def test_a_table_that_is_missing_names_the_command(monkeypatch: pytest.MonkeyPat
     ],
 )
 def test_a_row_in_words(name: str, example: str, short: str) -> None:
-    row = variables.table("controller")[name]
+    row = units.table("controller")[name]
     assert (row.example, row.short) == (example, short)

@@ -16,7 +16,7 @@ import pytest
 
 from audit_helpers import outside, watched
 from feedsim import cli
-from feedsim.files.regular import closed
+from feedsim.files.source import closed
 from feedsim.foundation.errors import InputError
 from feedsim.simulation.ssp import archive
 from feedsim.structure.matrices.calculix import _cards

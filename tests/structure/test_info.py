@@ -15,7 +15,7 @@ from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure import read_modes
 from feedsim.structure.build import Built, build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
-from feedsim.structure.table_check import stale
+from feedsim.structure.pose_change import stale
 from structure_helpers import GIVEN_POSE, MACHINES
 
 STEP = 125e-6

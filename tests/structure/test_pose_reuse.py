@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from feedsim.scenario import Machine
-from feedsim.structure import pose_change, solve, table_check
+from feedsim.structure import pose_change, solve
 from feedsim.structure.geometry import assemble
 from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange
 from scenario_helpers import MACHINE, default_machine
@@ -24,7 +24,7 @@ def forget() -> None:
         pose_change._between,
         pose_change._end,
         pose_change._middle,
-        table_check._modes,
+        pose_change._modes_of_table,
         assemble.structure_of,
         assemble.assembler_of,
     ):
@@ -121,17 +121,17 @@ def test_another_pose_and_another_structure_are_noticed(poses: list[dict[str, fl
 
 
 def test_many_runs_keep_little(poses: list[dict[str, float]]) -> None:
-    for cached in (pose_change._between, pose_change._end, pose_change._middle, table_check._modes):
+    for cached in (pose_change._between, pose_change._end, pose_change._middle, pose_change._modes_of_table):
         assert cached.cache_parameters()["maxsize"] in range(1, 257)
 
 
 def test_the_table_of_modes_is_doubted_once(poses: list[dict[str, float]]) -> None:
     machine = default_machine()
-    assert table_check.table_mismatch(machine) is None
-    assert table_check.table_mismatch(machine) is None
+    assert pose_change.table_mismatch(machine) is None
+    assert pose_change.table_mismatch(machine) is None
     assert poses == [dict(machine.pose)]
     wrong = machine.model_copy(update={"pose": {**machine.pose, "Z": 0.4}})
-    said = table_check.table_mismatch(wrong)
+    said = pose_change.table_mismatch(wrong)
     assert said is not None
     assert "Z 0.4 m" in said
     assert len(poses) == 2

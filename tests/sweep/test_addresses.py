@@ -5,7 +5,7 @@ from __future__ import annotations
 import distributed
 import pytest
 
-from feedsim.design.sweep import cluster
+from feedsim.design.sweep import trial
 from feedsim.foundation.errors import InputError
 
 
@@ -18,7 +18,7 @@ def test_no_address_is_told_at_once(
 ) -> None:
     """Nobody is asked: Dask itself would wait for 20 s."""
     monkeypatch.setattr(distributed, "Client", lambda *_, **__: pytest.fail("somebody was asked"))
-    with pytest.raises(InputError, match="an address reads tcp://host:8786"), cluster.remote(address):
+    with pytest.raises(InputError, match="an address reads tcp://host:8786"), trial.remote(address):
         pass
     assert "Traceback" not in capfd.readouterr().err
 
@@ -27,22 +27,22 @@ def test_no_address_is_told_at_once(
     "address", ["tcp://node1:8786", "node1:8786", "tls://10.0.0.1:1", "tcp://[::1]:8786", "ws://a-b.c:80/"]
 )
 def test_addresses(address: str) -> None:
-    cluster._check_address(address)
+    trial._check_address(address)
 
 
 def test_waiting_for_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     from distributed import LocalCluster
 
-    monkeypatch.setattr(cluster, "JOIN", 0.5)
+    monkeypatch.setattr(trial, "JOIN", 0.5)
     told: list[str] = []
     with LocalCluster(
         n_workers=0, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50
     ) as made:
-        with pytest.raises(InputError, match="has no workers"), cluster.remote(made.scheduler_address, told.append):
+        with pytest.raises(InputError, match="has no workers"), trial.remote(made.scheduler_address, told.append):
             pass
         assert len(told) == 1
         assert "waiting for workers" in told[0]
         made.scale(1)
         made.wait_for_workers(1, timeout=120)
-        with cluster.remote(made.scheduler_address, told.append):
+        with trial.remote(made.scheduler_address, told.append):
             assert len(told) == 1  # not where there is one

@@ -16,7 +16,7 @@ import pytest
 
 from cluster_helpers import Cluster, scheduler
 from engine_helpers import Chores, chore
-from feedsim.design.sweep import cluster, engine, provenance
+from feedsim.design.sweep import engine, provenance, trial
 from feedsim.design.sweep.design import Outcome, Task
 from feedsim.design.sweep.engine import open_engine
 from feedsim.foundation.errors import InputError, SimulationError
@@ -163,7 +163,7 @@ def test_a_late_worker_that_cannot_take_part_is_left_out(
 
 
 def test_no_workers(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "JOIN", 0.5)
+    monkeypatch.setattr(trial, "JOIN", 0.5)
     with (
         pytest.raises(InputError, match=r"has no workers .*dask worker tcp://"),
         open_engine(Chores("nobody"), scheduler=a_cluster.address),

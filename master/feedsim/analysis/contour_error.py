@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from feedsim.analysis.figures import Array, Figure, column
 from feedsim.files.fields import Quantity
 from feedsim.files.trace import Trace
-from feedsim.motions.part_program.moves import Motion
+from feedsim.motions.part_program.words import Motion
 from feedsim.motions.planner.nearest import Feet
 from feedsim.motions.program import Programmed
 from feedsim.scenario import Drive, ForeignUnit, Machine
 from feedsim.scenario.axis_units import ParameterGroup
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim import Run
-from feedsim.simulation.cosim.loop import Progress
+from feedsim.simulation.cosim.schedule import Progress
 from feedsim.simulation.nc import Program, Segment
 
 Integers = NDArray[np.int64]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, fdtrc
 
-from feedsim.estimation.interval import NORMAL_95, student
+from feedsim.estimation.least_squares import NORMAL_95, student
 
 Array = NDArray[np.float64]
 

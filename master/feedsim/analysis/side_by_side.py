@@ -17,7 +17,7 @@ from feedsim.analysis.figures import Array
 from feedsim.analysis.positioning import MIN_REST_TIME, Approach
 from feedsim.comparison.shift import estimated_shift
 from feedsim.files.columns import Columns
-from feedsim.files.regular import json_file
+from feedsim.files.source import json_file
 from feedsim.files.trace import Recording, Trace, as_series, read_recording
 from feedsim.files.trace.recording import mapped
 from feedsim.foundation import units

@@ -18,14 +18,20 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-from feedsim.cli.commands import Command, Parser, add_commands, arguments, given_files, refuse_missing_files, renamed
-from feedsim.cli.terminal import (
+from feedsim.cli.commands import (
     STANDARD_OUTPUT,
     START_TEXT,
+    Command,
+    Parser,
+    add_commands,
+    arguments,
     choose_colour,
     finish,
+    given_files,
     painted,
     prepare_streams,
+    refuse_missing_files,
+    renamed,
     shown_streams,
     watching,
 )

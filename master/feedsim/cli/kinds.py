@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feedsim.files.regular import json_file
+from feedsim.files.source import json_file
 from feedsim.foundation.errors import InputError
 
 NO_RECORD = "a folder of results without a record (result.csv)"

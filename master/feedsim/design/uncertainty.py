@@ -28,7 +28,7 @@ from feedsim.analysis import CircleTask, Figure, PositioningTask, contour, evalu
 from feedsim.analysis.circularity import Contour
 from feedsim.analysis.compensation import Compensation, circle_figures
 from feedsim.analysis.evaluate import Result
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.fields import Quantity
 from feedsim.foundation import units
 from feedsim.foundation.arguments import spelt

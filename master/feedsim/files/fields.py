@@ -29,7 +29,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, nearest, no_such_file
-from feedsim.foundation.variables import Variable
+from feedsim.foundation.units import Variable
 
 # Studies check a scenario for every run, most of whose texts are those of the run before.
 _parsed = lru_cache(maxsize=4096)(units.parse)

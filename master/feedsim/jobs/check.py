@@ -14,7 +14,7 @@ from feedsim.foundation.arguments import spelt
 from feedsim.foundation.errors import InputError, severity
 from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, File, MachineChoice, Option, Settings, Watch, job
 from feedsim.jobs.result import announce
-from feedsim.jobs.subject import on_machine, opened
+from feedsim.jobs.run import on_machine, opened
 from feedsim.scenario import Scenario
 from feedsim.simulation import judge
 

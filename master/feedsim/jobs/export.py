@@ -31,7 +31,7 @@ from feedsim.jobs.parameters import (
     out_file,
 )
 from feedsim.jobs.result import Kind, Made, announce_archive
-from feedsim.jobs.subject import on_machine
+from feedsim.jobs.run import on_machine
 from feedsim.report.live_page.content import content
 from feedsim.report.live_page.html import MARK, page
 from feedsim.report.provenance import input_paths
@@ -49,8 +49,8 @@ from feedsim.structure.build import build
 from feedsim.structure.geometry.assemble import movable
 from feedsim.structure.modes import read_modes, write_modes
 from feedsim.structure.mounts import MOUNTS_FILE, table_of, write_mounts
+from feedsim.structure.pose_change import table_mismatch
 from feedsim.structure.poses import GridAxis, grid_axis, pose_grid, write_poses
-from feedsim.structure.table_check import table_mismatch
 
 # Ending of the file -> the options that it has besides those of all.
 ENDINGS = {".fmu": ("inputs", "plant", "base", "terminals"), ".ssp": ("one",), ".html": ("knobs",)}

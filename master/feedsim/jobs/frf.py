@@ -37,7 +37,7 @@ from feedsim.scenario import Coupling, Machine, Subject, load_subject
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation.cosim.plant import plant_modes
 from feedsim.simulation.judge import control as control_findings
-from feedsim.structure.table_check import table_mismatch
+from feedsim.structure.pose_change import table_mismatch
 
 REALISATIONS_WITH_FRICTION = 4
 DEFAULT_LOWEST, DEFAULT_HIGHEST = 1.0, 1000.0  # [Hz]; the band where none is given

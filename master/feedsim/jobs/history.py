@@ -17,8 +17,8 @@ import numpy as np
 from feedsim.analysis import Figure, Named
 from feedsim.analysis.history import Array, Scatter, Series, changes, crossing, scatter
 from feedsim.estimation.identify.friction_file import fleet_yaml
-from feedsim.estimation.interval import NORMAL_95
-from feedsim.files.regular import json_file
+from feedsim.estimation.least_squares import NORMAL_95
+from feedsim.files.source import json_file
 from feedsim.files.trace.trace import MAX_MAGNITUDE
 from feedsim.foundation.arguments import Pairs, Value, amount, given, listed, pairs, settings, spelt
 from feedsim.foundation.errors import InputError, Note, few, nearest
@@ -37,8 +37,7 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.result import Result, kept
-from feedsim.jobs.run import run
-from feedsim.jobs.subject import load
+from feedsim.jobs.run import load, run
 from feedsim.report import history as page
 from feedsim.report.content import Report
 from feedsim.report.history import Entry, Followed, History

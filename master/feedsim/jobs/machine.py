@@ -42,7 +42,7 @@ from feedsim.structure.build import build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
 from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
 from feedsim.structure.mounts import MOUNTS_FILE, MountTable, table_of, write_mounts
-from feedsim.structure.table_check import stale
+from feedsim.structure.pose_change import stale
 
 # Exchange step where no machine file says what the control cycle is [s].
 USUAL_STEP = 125e-6

@@ -13,7 +13,7 @@ from feedsim.analysis import Figure, Named
 from feedsim.files.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
 from feedsim.files.control.formats import opened
 from feedsim.files.control.reading import Reading, read
-from feedsim.files.regular import content
+from feedsim.files.source import content
 from feedsim.foundation.arguments import listed, pairs, spelt
 from feedsim.foundation.errors import InputError, no_such_file
 from feedsim.jobs.parameters import (

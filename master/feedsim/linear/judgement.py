@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError
-from feedsim.linear.drive import LinearDrive
 from feedsim.linear.loops import GROWTH, MAX_PHASE_STEP
-from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, ModalPlant, modal_sums
+from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, LinearDrive, ModalPlant, modal_sums
 from feedsim.scenario import Cycles, Drive, Friction, FrictionParameters, Machine
 from feedsim.structure import Modes
 

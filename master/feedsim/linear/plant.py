@@ -24,6 +24,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.scenario import Cycles, Drive, Filter
 from feedsim.structure import Modes
 
 Floats = NDArray[np.float64]
@@ -232,3 +233,274 @@ def _phi_2(x: Complexes) -> Complexes:
         series = series * x + 1 / math.factorial(k)
     small = np.abs(x) < SERIES_BELOW
     return np.asarray(np.where(small, series, (np.expm1(x) - x) / x**2))
+
+
+# --- The sampled drive of one axis, linear: every block as a function of s, z = exp(s T_c) ----------------------------
+# Sampling as the drive does it (Wiesauer, Bleicher, 18th CIRP CMMO (2021), section 2.2; instants and order of
+# operations in the controller unit's documentation). At the instants t_k of the control cycle T_c, with m = T_pos/T_c:
+#
+#     n_s  = r + n_add                          r: the position controller's setpoint, ramped or held over T_pos
+#     M_s  = S n_s - C n + M_add                S = K_p + I R, C = K_p + I, I = (K_p T_c/T_n)/(1 - 1/z), R: n_ref/n_s
+#     n    = n_a, or V x_m                      V = (1 - 1/z^N)/(N T_c I_P): speed from the position over N cycles
+#     x_m  = x_a, or I_P J n_a                  J = T_c/2 (z + 1)/(z - 1): position from the motor encoder (indirect)
+#     M_a  = E M_s - G_n n_a                    E: current setpoint filters and current loop, G_n: what the EMF leaves
+#
+# Limits (torque, voltage) are not reached. The motor's equations are linearised about a steady speed and torque.
+
+
+# a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
+WHOLE_SAMPLE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A steady motion about which the drive is linearised: speed [rad/s] and motor torque [N.m]."""
+
+    n: float = 0.0
+    M: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class LinearDrive:
+    """Drive parameters with cycles and lead (I_P [m/rad]); its blocks at s (F,) [rad/s] as (F,) arrays."""
+
+    drive: Drive
+    cycles: Cycles
+    I_P: float
+    operating: OperatingPoint = OperatingPoint()
+
+    @property
+    def ticks(self) -> int:
+        """Control cycles in a position cycle."""
+        return round(self.cycles.T_pos / self.cycles.T_c)
+
+    # --- position controller, at the instants of T_pos --------------------------------------------------------------
+
+    @property
+    def position_gain(self) -> float:
+        """K_v/I_P: speed setpoint per following error [rad/(s.m)]."""
+        return self.drive.K_v / self.I_P
+
+    def setpoint_delay(self, s: Complexes) -> Complexes:
+        """From x_s to the delayed setpoint that the following error sees [1]."""
+        d, T = self.drive, self.cycles.T_pos
+        if not d.symmetry_lag:
+            return _cubic_delay(s, (d.T_dyn + d.T_sym) / T, T)
+        return _cubic_delay(s, d.T_dyn / T, T) * _lag(s, d.T_sym, T)
+
+    def feedforward(self, s: Complexes) -> Complexes:
+        """From n_ffw to its part in the speed setpoint [1]."""
+        T = self.cycles.T_pos
+        return self.drive.k_ffw * _cubic_delay(s, self.drive.T_dyn / T, T)
+
+    def ramp(self, s: Complexes) -> Complexes:
+        """From the setpoint computed at the instants of T_pos to the component at s of what the ticks make of it [1].
+
+        Tick j of a cycle gives n_old + (n_new - n_old)(j + 1)/m, or n_new where the setpoint is held. The other
+        components lie at s + 2 pi i l/T_pos and are this function's values there.
+        """
+        m, T_c = self.ticks, self.cycles.T_c
+        j = np.arange(m)
+        share = (j + 1) / m if self.drive.ramp_speed_setpoint else np.ones(m)
+        last_cycle = np.exp(-s * self.cycles.T_pos)[:, None]
+        ticks = np.exp(-s[:, None] * j * T_c) * (share + (1 - share) * last_cycle)
+        return np.asarray(ticks.sum(axis=1) / m)
+
+    def measured_position(self, s: Complexes, n_a: Complexes, x_a: Complexes) -> Complexes:
+        """x_m of responses of n_a and x_a, (F, ...) alike; errors of the measuring system are no part of it."""
+        if not self.drive.indirect:
+            return x_a
+        turned = 0.5 * self.cycles.T_c * self.I_P * (np.exp(s * self.cycles.T_c) + 1) / np.expm1(s * self.cycles.T_c)
+        return np.asarray(turned.reshape(-1, *[1] * (n_a.ndim - 1)) * n_a)
+
+    # --- speed controller --------------------------------------------------------------------------------------------
+
+    def integrator(self, s: Complexes) -> Complexes:
+        """Integral part per speed error [N.m.s/rad]; takes the error of the present instant in."""
+        d, T_c = self.drive, self.cycles.T_c
+        if not d.speed_integrator:
+            return np.zeros_like(s)
+        return np.asarray(d.K_p * T_c / _given(d.T_n) / -np.expm1(-s * T_c))
+
+    def reference_model(self, s: Complexes) -> Complexes:
+        """n_ref/n_s [1]: PT2 by Tustin without prewarping, dead time linear between samples."""
+        d, T_c = self.drive, self.cycles.T_c
+        if not d.reference_model:
+            return np.ones_like(s)
+        omega_0, D = _given(d.omega_0), _given(d.D)
+        denominator = (1.0, 2 * D * omega_0, omega_0**2)
+        return _bilinear(s, (0.0, 0.0, omega_0**2), denominator, 2 / T_c, T_c) * _linear_delay(s, d.T_ref / T_c, T_c)
+
+    def speed_of_position(self, s: Complexes) -> Complexes | None:
+        """V: speed formed from the measured position [rad/(s.m)]; None where the motor speed is taken."""
+        window = self.drive.speed_window * self.cycles.T_c
+        return np.asarray(-np.expm1(-s * window) / (window * self.I_P)) if window else None
+
+    def from_speed(self, s: Complexes) -> Complexes:
+        """C: torque setpoint per negative speed, K_p + I [N.m.s/rad]."""
+        return self.drive.K_p + self.integrator(s)
+
+    def from_setpoint(self, s: Complexes) -> Complexes:
+        """S: torque setpoint per speed setpoint, K_p + I R [N.m.s/rad]."""
+        return self.drive.K_p + self.integrator(s) * self.reference_model(s)
+
+    def filters(self, s: Complexes) -> Complexes:
+        """The current setpoint filters in series [1]."""
+        d = self.drive
+        result = np.ones_like(s)
+        for entry in (d.filter_1, d.filter_2, d.filter_3, d.filter_4):
+            if entry.type != "off":
+                result = result * _filter(s, entry, self.cycles.T_c)
+        return result
+
+    # --- current loop and motor --------------------------------------------------------------------------------------
+
+    def torque(self, s: Complexes) -> tuple[Complexes, Complexes]:
+        """E [1] and G_n [N.m.s/rad] with M_a = E M_s - G_n n_a.
+
+        With the ideal current loop M_a is the torque that begins at t_k and is held.
+        """
+        if self.drive.ideal_current_loop:
+            return self.filters(s), np.zeros_like(s)
+        per_setpoint, per_speed = self._motor.loop(s)
+        return self.filters(s) * per_setpoint, -per_speed
+
+    @cached_property
+    def _motor(self) -> _CurrentLoop:
+        return _CurrentLoop.of(self.drive, self.cycles.T_c, self.operating)
+
+
+def zero_order_hold(A: Floats, T: float) -> tuple[Floats, Floats]:
+    """exp(A T) and its integral from 0 to T, of a small matrix A (n, n) [1/s] over T [s].
+
+    Taylor's series over T/2^k, whose norm is at most a half, so that 14 terms reach the last bit; then doubled k times.
+    scipy.linalg.expm has the same within rounding, and takes a tenth of a short run to load.
+    """
+    norm = float(np.abs(A).sum(axis=1).max()) * T
+    doublings = max(0, math.ceil(math.log2(2 * norm))) if norm > 0 else 0
+    step = T / 2**doublings
+    one = np.eye(len(A))
+    series = one  # I + M/2 (I + M/3 (I + ...)), the integral over the step
+    for k in range(15, 1, -1):
+        series = one + A @ series * (step / k)
+    Gamma = series * step
+    Phi = one + A @ Gamma
+    for _ in range(doublings):
+        Gamma = Gamma + Phi @ Gamma
+        Phi = Phi @ Phi
+    return Phi, Gamma
+
+
+@dataclass(frozen=True, eq=False)
+class _CurrentLoop:
+    """Current controller with one cycle of computing delay and motor, in deviations (i_d, i_q) from a steady motion.
+
+    Motor over a cycle with voltage u (that of the instant before) and speed n held, exactly:
+        i(t_k+1) = Phi i + Gamma (u/L + v n)
+    Controller, stored for the next cycle:  u = K (i_s - i) + W i - L v n, the EMF term.
+    """
+
+    Phi: Floats  # (2, 2)
+    Gamma: Floats  # (2, 2) [s]
+    L: Floats  # (2,) [H]
+    W: Floats  # (2, 2) decoupling [V/A]
+    v: Floats  # (2,) current slope per speed [A/rad]
+    per_current: Floats  # (2,) torque per current [N.m/A]
+    K_t: float
+    K_p: float
+    K_i: float
+    T_c: float
+
+    @classmethod
+    def of(cls, drive: Drive, T_c: float, at: OperatingPoint) -> _CurrentLoop:
+        R, L_d, L_q, p = (_given(value) for value in (drive.R, drive.L_d, drive.L_q, drive.p))
+        current = drive.current
+        assert current is not None  # the machine file's check: needed without the ideal current loop
+        psi = drive.K_t / (1.5 * p)
+        omega, i_q = p * at.n, at.M / drive.K_t
+        A = np.array([[-R / L_d, omega * L_q / L_d], [-omega * L_d / L_q, -R / L_q]])
+        Phi, Gamma = zero_order_hold(A, T_c)
+        return cls(
+            Phi=Phi,
+            Gamma=Gamma,
+            L=np.array([L_d, L_q]),
+            W=np.array([[0.0, -omega * L_q], [omega * L_d, 0.0]]),
+            v=np.array([p * L_q * i_q / L_d, -p * psi / L_q]),
+            per_current=1.5 * p * np.array([(L_d - L_q) * i_q, psi]),
+            K_t=drive.K_t,
+            K_p=current.K_p,
+            K_i=current.K_p * T_c / current.T_n,
+            T_c=T_c,
+        )
+
+    def loop(self, s: Complexes) -> tuple[Complexes, Complexes]:
+        """M_a per torque setpoint behind the filters [1], and per speed [N.m.s/rad]."""
+        z = np.exp(s * self.T_c)
+        K = self.K_p + self.K_i / -np.expm1(-s * self.T_c)
+        drives = self.Gamma / self.L  # current per voltage
+        decoupling = drives @ self.W
+        # the system's matrix and, by Cramer's rule, what its inverse makes of an input: thousands of 2 x 2 at once
+        (a, b), (c, d) = (
+            [z * (i == j) - self.Phi[i, j] + (drives[i, j] * K - decoupling[i, j]) / z for j in (0, 1)] for i in (0, 1)
+        )
+        row = (self.per_current[0] * d - self.per_current[1] * c, self.per_current[1] * a - self.per_current[0] * b)
+        determinant = a * d - b * c
+        per_setpoint = (row[0] * drives[0, 1] + row[1] * drives[1, 1]) * K / z / self.K_t
+        emf = self.Gamma @ self.v
+        per_speed = (row[0] * emf[0] + row[1] * emf[1]) * -np.expm1(-s * self.T_c)
+        return per_setpoint / determinant, per_speed / determinant
+
+
+def _given(value: float | None) -> float:
+    assert value is not None  # the machine file's checks demand what is switched on
+    return float(value)
+
+
+def _bilinear(
+    s: Complexes, numerator: tuple[float, ...], denominator: tuple[float, ...], factor: float, T: float
+) -> Complexes:
+    """A second-order transfer function (coefficients of s^2, s, 1) with s replaced by factor (z - 1)/(z + 1)."""
+    difference, total = factor * np.expm1(s * T), np.exp(s * T) + 1
+    powers = (difference**2, difference * total, total**2)
+    above = sum(c * power for c, power in zip(numerator, powers, strict=True))
+    below = sum(c * power for c, power in zip(denominator, powers, strict=True))
+    return np.asarray(above / below)
+
+
+def _filter(s: Complexes, described: Filter, T_c: float) -> Complexes:
+    """A current setpoint filter that is on, Tustin prewarped at its frequency."""
+    omega = 2 * math.pi * _given(described.f)
+    denominator = (1.0, 2 * _given(described.D_den) * omega, omega**2)
+    if described.type == "low_pass":
+        numerator = (0.0, 0.0, omega**2)
+    else:
+        numerator = (1.0, 2 * _given(described.D_num) * omega, omega**2)
+    return _bilinear(s, numerator, denominator, omega / math.tan(omega * T_c / 2), T_c)
+
+
+def _cubic_delay(s: Complexes, samples: float, T: float) -> Complexes:
+    """A delay of `samples` cycles of T: Lagrange through the ages m-1 ... m+2 about it, 0 ... 3 below one sample."""
+    nearest = round(samples)
+    if abs(samples - nearest) < WHOLE_SAMPLE_TOLERANCE * max(1, nearest):
+        return np.exp(-s * nearest * T)
+    ages = max(math.floor(samples) - 1, 0) + np.arange(4)
+    # weights that are right for 1, a, a^2, a^3, ages counted from the delayed instant
+    weights = np.linalg.solve(np.vander(ages - samples, 4, increasing=True).T, [1.0, 0.0, 0.0, 0.0])
+    return np.asarray(np.exp(-s[:, None] * ages * T) @ weights)
+
+
+def _linear_delay(s: Complexes, samples: float, T: float) -> Complexes:
+    """A delay of `samples` cycles of T, linear between two samples."""
+    whole = math.floor(samples + WHOLE_SAMPLE_TOLERANCE)
+    rest = max(samples - whole, 0.0)
+    return np.asarray(np.exp(-s * whole * T) * (1 - rest + rest * np.exp(-s * T)))
+
+
+def _lag(s: Complexes, time_constant: float, T: float) -> Complexes:
+    """1/(1 + s time_constant), exact for an input that is linear between samples of T."""
+    if time_constant == 0:
+        return np.ones_like(s)
+    a = math.exp(-T / time_constant)
+    slow = (1 - a) * time_constant / T
+    back = np.exp(-s * T)
+    return np.asarray((1 - slow + (slow - a) * back) / (1 - a * back))

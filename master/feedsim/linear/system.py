@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace.response import FrequencyResponse, quotient_unit
 from feedsim.foundation.errors import InputError
-from feedsim.linear.drive import LinearDrive, OperatingPoint
-from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
+from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, LinearDrive, ModalPlant, OperatingPoint
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
 

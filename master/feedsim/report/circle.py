@@ -25,8 +25,8 @@ from feedsim.report.content import TILES as TILES_SHOWN
 from feedsim.report.content import Bullets, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
 from feedsim.report.formatting import AFTER, BEFORE, CLOCKWISE, RECORDED, SIMULATED, Array, counted, minus, two, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, quantity, software
-from feedsim.report.run import circle_plots, sheet
-from feedsim.report.run.diagnosis import cause_tile, diagnosis_part, diagnosis_section
+from feedsim.report.run import axis_plots, sheet
+from feedsim.report.run.pose import cause_tile, diagnosis_part, diagnosis_section
 
 FORMAT = 1
 DASHES: dict[int, Dash] = {1: "", -1: "dashed"}  # by the sense of the turn
@@ -134,13 +134,11 @@ def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagno
         circle, diagnosis, recorded.centred,
     )  # fmt: skip
     curves = [
-        circle_plots.turned(
-            SENSE_WORDS[turn.sense], COLOURS[turn.sense], turn.angle, turn.deviation, DASHES[turn.sense]
-        )
+        axis_plots.turned(SENSE_WORDS[turn.sense], COLOURS[turn.sense], turn.angle, turn.deviation, DASHES[turn.sense])
         for turn in turns
     ]
     curves += [
-        circle_plots.turned("model without peaks", SIMULATED, centred.angle, centred.deviation, "dotted", 1.1)
+        axis_plots.turned("model without peaks", SIMULATED, centred.angle, centred.deviation, "dotted", 1.1)
         for centred in fitted[:1]
     ]
     return _drawn(circle, recorded, turns, curves, "Dotted: the fitted model without peaks.")
@@ -153,7 +151,7 @@ def picture_of_both(before: Taken, after: Taken) -> Picture:
         circle, recorded = taken.recorded.circle, taken.recorded
         turns = _centred([turn.path for turn in recorded.turns], circle, taken.diagnosis, recorded.centred)
         curves += [
-            circle_plots.turned(f"{words}, {SENSE_WORDS[t.sense]}", colour, t.angle, t.deviation, DASHES[t.sense])
+            axis_plots.turned(f"{words}, {SENSE_WORDS[t.sense]}", colour, t.angle, t.deviation, DASHES[t.sense])
             for t in turns
         ]
         every += turns
@@ -163,7 +161,7 @@ def picture_of_both(before: Taken, after: Taken) -> Picture:
 def _drawn(
     circle: CircleUnderTest, recorded: RecordedCircle, turns: Sequence[_Centred], curves: Sequence[Curve], note: str
 ) -> Picture:
-    on = circle_plots.circle(circle, max(float(np.abs(turn.deviation).max()) for turn in turns))
+    on = axis_plots.circle(circle, max(float(np.abs(turn.deviation).max()) for turn in turns))
     plane = f"{circle.axes[0]}-{circle.axes[1]}"
     caption = (
         f"Radius {circle.radius * 1e3:.6g} mm. Radius deviation magnified "
@@ -171,7 +169,7 @@ def _drawn(
         f"circle{', about its fitted centre' if recorded.centred else ''}. {note}"
     )
     title = f"Recorded circle in the plane {plane}"
-    return Picture(f"circle-{plane}", title, caption, circle_plots.circle_chart(on, curves))
+    return Picture(f"circle-{plane}", title, caption, axis_plots.circle_chart(on, curves))
 
 
 def _centred(

@@ -40,8 +40,7 @@ from feedsim.report.formatting import (
     typeset,
 )
 from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hashed, inputs_part, quantity
-from feedsim.report.run.axis_plots import TIME, reversed_note, torque_axis
-from feedsim.report.run.circle_plots import circle, circle_chart, turned
+from feedsim.report.run.axis_plots import TIME, circle, circle_chart, reversed_note, torque_axis, turned
 from feedsim.report.run.files import summary as summary_of_run
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.uncertainty import BANDS

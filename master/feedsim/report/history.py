@@ -13,7 +13,7 @@ import numpy as np
 
 from feedsim.analysis import Figure
 from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, Crossing, Fitted, Scatter, testable
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation import outputs
 from feedsim.report import formatting
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.modal.rational import MOTOR, AxisModes
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.response_files import write_response

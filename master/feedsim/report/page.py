@@ -19,8 +19,8 @@ from typing import IO, TYPE_CHECKING, Self
 from feedsim.files.trace import Trace
 from feedsim.files.trace.files import heading, lines_of
 from feedsim.files.trace.trace import first_not_finite
-from feedsim.foundation.cache import own_folder
 from feedsim.foundation.errors import OutputError
+from feedsim.foundation.owned import own_folder
 from feedsim.report.chart.model import LAYOUT, embedded
 from feedsim.report.content import TILES, Report, parted
 from feedsim.report.formatting import PALETTE, typeset

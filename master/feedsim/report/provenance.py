@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from feedsim.files.fields import Quantity
-from feedsim.files.regular import digest
+from feedsim.files.source import digest
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.installation import version
 from feedsim.scenario import Axis, Drive, ForeignUnit, FrictionParameters, Machine, Scenario

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim.files.regular import json_file
+from feedsim.files.source import json_file
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.foundation.outputs import forced, same
 from feedsim.foundation.owned import TemporaryFolder, claimed, held

@@ -42,8 +42,7 @@ from feedsim.report.formatting import (
     three,
 )
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
-from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE
-from feedsim.report.run.circle_plots import circle, circle_chart, turned
+from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE, circle, circle_chart, turned
 
 # --- Pictures of several results over each other: contours of circles, stops, signals over time and by frequency ------
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.analysis import Figure
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation import outputs
 from feedsim.report.chart import Axis, Band, Chart, Curve, Panel
 from feedsim.report.content import Part, Picture, Report, Section, Table, Text, code

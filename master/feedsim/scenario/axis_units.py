@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from feedsim.files.fields import Model, Quantity, Reading, brief, fault, parameter
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim.scenario.roles import (
     ANOTHER_LAW,
     DRIVE,
@@ -69,9 +69,7 @@ def effects(unit: str, groups: Mapping[str, str]) -> type[ParameterGroup]:
 def group(unit: str, name: str, text: str) -> Any:
     """A model of one group of parameters of `unit`, as :func:`effects` has them."""
     rows = {
-        key.removeprefix(f"{name}."): row
-        for key, row in variables.parameters(unit).items()
-        if key.startswith(f"{name}.")
+        key.removeprefix(f"{name}."): row for key, row in units.parameters(unit).items() if key.startswith(f"{name}.")
     }
     fields: dict[str, Any] = {
         key: (_KINDS[row.kind], parameter(row, bool(row.start) if row.kind == "BOOLEAN" else row.start))
@@ -95,13 +93,13 @@ FILTER_TYPES: dict[str, int] = {"off": 0, "second_order": 1, "band_stop": 1, "lo
 _FRICTION_NEEDED = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "v_s")
 _FRICTION_WITHOUT = {"F_log": 0.0, "W": 0.0, "gamma": 1.0}
 _PARAMETERS_BY_LAW = {
-    LUGRE: variables.parameters(FRICTION_ROLE.shipped),
-    **{law: variables.parameters(unit) for law, unit in FRICTION_UNITS.items()},
+    LUGRE: units.parameters(FRICTION_ROLE.shipped),
+    **{law: units.parameters(unit) for law, unit in FRICTION_UNITS.items()},
 }
 _NAMES_OF_LAWS = {name for names in _PARAMETERS_BY_LAW.values() for name in names}
 # Over position and with warmth friction changes at the guide alone, which may take all of the axis's friction.
 _AT_GUIDE_ALONE = [
-    name.removeprefix("guide.") for name in variables.parameters("plant/axis")
+    name.removeprefix("guide.") for name in units.parameters("plant/axis")
     if name.startswith(("guide.place_", "guide.warm_"))
 ]  # fmt: skip
 _IDENTIFIED = (
@@ -188,7 +186,7 @@ class _GmsFriction(FrictionParameters):
 
 def _friction_fields(unit: str) -> dict[str, Any]:
     """The parameters of a friction unit, each with how it is checked, and where they come from."""
-    known = variables.parameters(unit)
+    known = units.parameters(unit)
     defaults = dict.fromkeys(_FRICTION_NEEDED, ...) | _FRICTION_WITHOUT
     fields = {
         name: (float, parameter(variable, defaults.get(name, float(variable.start))))
@@ -221,7 +219,7 @@ def friction_filled(data: Any) -> str:
     return filled(data) if law == LUGRE else ANOTHER_LAW
 
 
-CONTROLLER_TABLE = variables.parameters("controller")
+CONTROLLER_TABLE = units.parameters("controller")
 
 
 def _drive(name: str, default: Any = ...) -> Any:

@@ -14,8 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from feedsim.files.changes import expected, names_file
-from feedsim.files.checked import fetch
+from feedsim.files.checked import expected, fetch, names_file
 from feedsim.files.source import Mark, Place, Source, at, places
 from feedsim.scenario.load import Draft, Setting, drafted
 from feedsim.scenario.model import Scenario

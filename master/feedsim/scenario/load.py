@@ -10,8 +10,20 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, StrictStr
 
-from feedsim.files import changes
-from feedsim.files.checked import check, checked, describe, dotted, fetch, in_order, read_group
+from feedsim.files.checked import (
+    apply,
+    as_text,
+    check,
+    checked,
+    describe,
+    dotted,
+    entries,
+    fetch,
+    in_order,
+    options,
+    read_group,
+    spread,
+)
 from feedsim.files.control import Name, known
 from feedsim.files.fields import AxisName, File, Model, Quantity, brief
 from feedsim.files.source import Mark, Place, Source, is_program, places, read
@@ -176,7 +188,7 @@ class Draft:
         for key, value in settings:
             with _collecting(self.faults):
                 key, value = translated(key, value)
-                for place in changes.apply(self.source, Scenario, key, value):
+                for place in apply(self.source, Scenario, key, value):
                     self.changed.append((place, value.mark(()).where))
                     fetch(self.source, Scenario, place, self.faults)
 
@@ -192,7 +204,7 @@ class Draft:
         scenario._overrides = self.overrides
         scenario._origins = {place: mark.where for place, mark in source.marks.items()}
         scenario._changes = tuple(self.changed)
-        scenario._settings = tuple(f"{key}={changes.as_text(value.data)}" for key, value in self.own)
+        scenario._settings = tuple(f"{key}={as_text(value.data)}" for key, value in self.own)
         scenario._files = tuple(_files(source, self.path))
         scenario.machine._directory = source.mark(("machine",)).folder
         return scenario
@@ -210,8 +222,8 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
     given: list[str] = []
     for text in overrides:
         with _collecting(faults):
-            given += changes.spread([text])
-            outside += changes.options(text, Path())
+            given += spread([text])
+            outside += options(text, Path())
     # A machine chosen from outside comes first: the scenario's own settings then meet that machine.
     for key, value in outside:
         if key == "machine":
@@ -224,7 +236,7 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
     fetch(source, Scenario, (), faults)
     translate(source, ("machine", "axes"), faults)
     others = tuple((key, value) for key, value in outside if key != "machine")
-    texts = (*(f"{key}={changes.as_text(value.data)}" for key, value in settings), *given)
+    texts = (*(f"{key}={as_text(value.data)}" for key, value in settings), *given)
     return Draft(path, source, own, others, texts, faults)
 
 
@@ -269,9 +281,9 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     translate(source, ("axes",), faults)
     for text in overrides:
         with _collecting(faults):
-            for given in changes.options(text, Path()):
+            for given in options(text, Path()):
                 key, value = translated(*given)
-                for place in changes.apply(source, Machine, key.removeprefix("machine."), value):
+                for place in apply(source, Machine, key.removeprefix("machine."), value):
                     fetch(source, Machine, place, faults)
     machine = check(source, Machine, faults)
     if faults or machine is None:
@@ -335,7 +347,7 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
     files = (*files, ("modes", machine.modes))
     if machine.mounts is not None:
         files = (*files, ("mounts", machine.mounts.table))
-    return Subject(machine, kind, name, file, kept, settings, tuple(changes.spread(overrides)), files, scenario)
+    return Subject(machine, kind, name, file, kept, settings, tuple(spread(overrides)), files, scenario)
 
 
 def _is_machine(path: Path) -> bool:
@@ -363,7 +375,7 @@ def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Sour
     if settings is not None and not isinstance(settings, dict):
         faults.append(describe(source, place, f"a group of KEY: VALUE is expected, not {brief(settings)}"))
     elif settings:
-        yield from changes.entries(source, "set")
+        yield from entries(source, "set")
     source.data.pop("set", None)
     source.forget(place)
 

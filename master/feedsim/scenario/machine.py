@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from feedsim.files.fields import AxisName, File, Model, Quantity, fault, is_multiple, parameter
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.motions.planner import Limits
 from feedsim.scenario.axis_units import (
@@ -117,7 +117,7 @@ class Axis(Model):
         share = self.guide.share if self.guide is not None else None
         if share is None:
             return values
-        least = {name: variable.minimum for name, variable in variables.parameters("friction").items()}
+        least = {name: variable.minimum for name, variable in units.parameters("friction").items()}
         return values | {name: max(float(values[name]) * (1 - share), least[name]) for name in SHARED_WITH_GUIDE}
 
     @property

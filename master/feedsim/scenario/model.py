@@ -25,7 +25,7 @@ from pydantic_core import core_schema
 
 from feedsim.files.fields import AxisName, Model, Quantity, Reading, did_you_mean, fault, is_multiple, no_axis
 from feedsim.files.source import Place
-from feedsim.foundation import units, variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, MeasuredSetpoints, Motion, PartProgram, PositioningCycle
 from feedsim.scenario.loads import Load, MotionIndex
@@ -56,7 +56,7 @@ class Scheme:
         return self.speed in ("within", "extrapolated")
 
 
-SCHEMES = {scheme.name: scheme for scheme in (Scheme(*row) for row in variables.cycle()["SCHEMES"])}
+SCHEMES = {scheme.name: scheme for scheme in (Scheme(*row) for row in units.cycle()["SCHEMES"])}
 
 
 class Coupling(Model):

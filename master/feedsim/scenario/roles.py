@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from feedsim.files.fields import File, Model, brief, fault
-from feedsim.foundation import variables
+from feedsim.foundation.units import table
 
 SHIPPED, FOREIGN, ANOTHER_LAW = "[shipped]", "[foreign]", "[law]"  # tags of unions, in brackets, being no keys
 LUGRE = "lugre"  # the law of friction.fmu
@@ -77,7 +77,7 @@ def _role(name: str, shipped: str, *needed: str, others: Mapping[str, str] = Map
             variable.causality,
             Signal(name, variable.unit if variable.kind == "REAL" else BOOLEAN, variable.short, name in needed),
         )
-        for name, variable in variables.table(shipped).items()
+        for name, variable in table(shipped).items()
     }
     inputs, outputs = (
         tuple(signal for causality, signal in known.values() if causality in wanted)

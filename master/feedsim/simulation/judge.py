@@ -13,8 +13,8 @@ import numpy as np
 
 from feedsim import linear
 from feedsim.foundation import units
-from feedsim.foundation.cache import cached
 from feedsim.foundation.errors import Wrong
+from feedsim.foundation.owned import cached
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 from feedsim.scenario.model import SCHEMES
@@ -25,8 +25,7 @@ from feedsim.simulation.nc import Program
 from feedsim.structure import Modes, checked_modes, read_modes
 from feedsim.structure.modes import damped_twice
 from feedsim.structure.mounts import factored, read_mounts
-from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, warnings
-from feedsim.structure.table_check import table_mismatch
+from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, table_mismatch, warnings
 
 if TYPE_CHECKING:
     from feedsim.structure.poses import GridAxis

@@ -17,7 +17,7 @@ import numpy as np
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import Fit, blocks_of, fit
 from feedsim.analysis.figures import Array
-from feedsim.estimation.interval import Covariance, student
+from feedsim.estimation.least_squares import Covariance, student
 
 # Orders that are tried: one wave a turn is an error of the pitch; of a torque at more than this frequency [Hz] at the
 # path speed an axis shows little.

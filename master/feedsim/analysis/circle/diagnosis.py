@@ -18,8 +18,7 @@ from feedsim.analysis.circle.model import ESSENTIAL, Fit
 from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circularity import fitted_centre
 from feedsim.analysis.figures import Array, averaged
-from feedsim.estimation.interval import shows
-from feedsim.estimation.least_squares import CHANGE_FLOOR
+from feedsim.estimation.least_squares import CHANGE_FLOOR, shows
 
 # --- Vibrations on a circle, between the reversals: of every axis whose position is known, else of the radius ---------
 

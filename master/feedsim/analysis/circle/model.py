@@ -52,8 +52,7 @@ from feedsim.analysis.circle.geometry import (
 )
 from feedsim.analysis.circle.setup import Offset, angle_offset, axle_by_clock, form_waves, set_up_moves
 from feedsim.analysis.figures import Array
-from feedsim.estimation.interval import pair_quantile, student
-from feedsim.estimation.least_squares import CHANGE_FLOOR, covariance_of, robust_fit, rounding
+from feedsim.estimation.least_squares import CHANGE_FLOOR, covariance_of, pair_quantile, robust_fit, rounding, student
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
 ANGLE_AHEAD, ANGLES_BEHIND = 2.0, (30.0, 45.0, 60.0)

@@ -5,7 +5,6 @@ Start with evaluate.py.
 """
 
 from feedsim.analysis.linear.evaluate import AxisResult, LinearResult, PositionLoop, SpeedLoop, evaluate, figures
-from feedsim.linear.drive import OperatingPoint
 from feedsim.linear.loops import (
     compliance,
     names,
@@ -35,6 +34,7 @@ from feedsim.linear.margins import (
     pairs,
     peak,
 )
+from feedsim.linear.plant import OperatingPoint
 from feedsim.linear.system import Closed, LinearSystem
 
 __all__ = [

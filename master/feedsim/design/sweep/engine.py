@@ -25,7 +25,7 @@ from typing import Any, Protocol
 
 from distributed import WorkerPlugin, get_worker
 
-from feedsim.design.sweep import cluster, provenance
+from feedsim.design.sweep import provenance, trial
 from feedsim.design.sweep.bundle import Bundle, Workplace
 from feedsim.design.sweep.design import Outcome, Task
 from feedsim.foundation.errors import InputError, SimulationError
@@ -232,9 +232,9 @@ def open_engine(
     ask("a study on several processes", "sweep")
     if scheduler is None:
         count = workers or _cores()
-        opened, where = cluster.local(count), f"{count} local process{'es'[: 2 * (count != 1)]}"
+        opened, where = trial.local(count), f"{count} local process{'es'[: 2 * (count != 1)]}"
     else:
-        opened, where = cluster.remote(scheduler, say), f"cluster at {scheduler}"
+        opened, where = trial.remote(scheduler, say), f"cluster at {scheduler}"
     with opened as client:
         engine = Crowd(client, bundle, where, own=scheduler is None)
         try:

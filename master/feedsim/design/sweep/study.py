@@ -23,7 +23,7 @@ from feedsim.design.sweep.bundle import Bundle
 from feedsim.design.sweep.design import Outcome, Task, design
 from feedsim.design.sweep.engine import Engine, open_engine
 from feedsim.design.sweep.table import RECORD, STEM, Format, Table, chosen, parquet, record_of, table_of, write_table
-from feedsim.files.regular import json_value
+from feedsim.files.source import json_value
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import FeedsimError, InputError, OutputError, SimulationError
 from feedsim.foundation.owned import Closing, claimed, held

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from feedsim.design.sweep.design import Array, Design, Outcome
 from feedsim.files.fields import did_you_mean
-from feedsim.files.regular import json_file, json_value
+from feedsim.files.source import json_file, json_value
 from feedsim.files.trace import matches
 from feedsim.files.trace.cells import named_columns, twice
 from feedsim.files.trace.files import written_whole

@@ -30,7 +30,7 @@ from feedsim.design.uncertainty import (
 )
 from feedsim.foundation.arguments import spelt
 from feedsim.foundation.owned import TemporaryFolder
-from feedsim.foundation.variables import parameters
+from feedsim.foundation.units import parameters
 from feedsim.linear.judgement import Candidates, Loop, judge
 from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.scenario.axis_units import Parameter

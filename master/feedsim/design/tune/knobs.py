@@ -23,8 +23,7 @@ import numpy as np
 from feedsim.analysis.figures import Array
 from feedsim.design.tune.proposals import MIN_RESET_TIME, NEUTRAL, NEUTRAL_SHARE, axis_lag, loop_lag, model_gain
 from feedsim.design.uncertainty import torque_scale
-from feedsim.foundation.units import convert
-from feedsim.foundation.variables import parameters
+from feedsim.foundation.units import convert, parameters
 from feedsim.scenario import Cycles, Drive, Filter, Friction, FrictionParameters, Machine
 from feedsim.scenario.axis_units import SHARED_WITH_GUIDE, Guide, Transmission
 from feedsim.structure import checked_modes

@@ -17,8 +17,7 @@ from feedsim.analysis.circle import Term
 from feedsim.analysis.circle import name as name_of_term
 from feedsim.analysis.circle.words import worth_telling
 from feedsim.foundation.errors import FeedsimError, InputError
-from feedsim.foundation.units import convert
-from feedsim.foundation.variables import parameters
+from feedsim.foundation.units import convert, parameters
 from feedsim.linear.judgement import Loop, judge
 from feedsim.scenario import Cycles, Drive, Machine
 from feedsim.simulation.cosim import Run

@@ -21,7 +21,7 @@ from feedsim.estimation.identify.inertia import REST_SPEED_SHARE, Inertia, inert
 from feedsim.estimation.identify.parameters import RIGID_AXIS_NAMES
 from feedsim.estimation.identify.plateaus import resolution, white
 from feedsim.estimation.identify.record import Array, Record, runs
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation.errors import InputError
 
 MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the heap

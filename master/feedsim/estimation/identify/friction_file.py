@@ -18,7 +18,7 @@ from feedsim.estimation.identify.parameters import PARAMETER_KINDS
 from feedsim.estimation.identify.read import Provenance, distinct
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Balance, Estimate, Identification
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.parameter import Prior
 from feedsim.files.checked import read_group
 from feedsim.files.fields import Quantity

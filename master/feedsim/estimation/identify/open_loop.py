@@ -32,8 +32,7 @@ from feedsim.estimation.identify.motion import RecordTorque, deflection
 from feedsim.estimation.identify.parameters import level
 from feedsim.estimation.identify.record import Array, Record
 from feedsim.estimation.identify.result import Balance, Drift, Estimate
-from feedsim.estimation.interval import NORMAL_95
-from feedsim.estimation.least_squares import Model
+from feedsim.estimation.least_squares import NORMAL_95, Model
 from feedsim.estimation.parameter import Parameter
 from feedsim.foundation.errors import InputError, SimulationError
 

@@ -16,7 +16,7 @@ import numpy as np
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.identify.result import Estimate, Status
 from feedsim.files.fields import Quantity
-from feedsim.foundation import units, variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Friction, GmsFriction
 from feedsim.scenario.roles import FRICTION_UNITS
@@ -24,10 +24,10 @@ from feedsim.scenario.roles import FRICTION_UNITS
 if TYPE_CHECKING:
     from feedsim.simulation.cosim.friction_law import FrictionLaw
 
-FRICTION_NAMES = tuple(variables.parameters("friction"))
+FRICTION_NAMES = tuple(units.parameters("friction"))
 # Of all laws; which of them a law has, it says itself (FrictionLaw.names).
-_TABLE = {**variables.parameters("friction"), **{name: row for unit in FRICTION_UNITS.values()
-          for name, row in variables.parameters(unit).items() if name not in FRICTION_NAMES}}  # fmt: skip
+_TABLE = {**units.parameters("friction"), **{name: row for unit in FRICTION_UNITS.values()
+          for name, row in units.parameters(unit).items() if name not in FRICTION_NAMES}}  # fmt: skip
 # What reversals determine (stage 2), and what plateaus of constant speed determine (stage 1), in the order in which it
 # is shown.
 PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma", "spread", "skew", "C")

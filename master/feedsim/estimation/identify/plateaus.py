@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from feedsim.estimation.identify.record import Array, Record, runs
 from feedsim.estimation.identify.result import Plateau
-from feedsim.estimation.interval import correlation_length
+from feedsim.estimation.least_squares import correlation_length
 
 # --- Averages of disturbed signals with an honest standard deviation: correlated noise, drift, quantised values -------
 

@@ -19,7 +19,7 @@ from math import log, nan
 import numpy as np
 
 from feedsim.estimation.identify.record import Array, Record
-from feedsim.estimation.interval import between_groups, correlation_length
+from feedsim.estimation.least_squares import between_groups, correlation_length
 from feedsim.foundation.errors import InputError
 
 MAX_SETPOINT_DELAY = 0.1  # [s]: no control delays its setpoint by more

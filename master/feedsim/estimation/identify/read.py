@@ -16,7 +16,7 @@ from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.identify.signals import Channel, Chosen, choose, column
 from feedsim.files.columns import Columns, Signal
 from feedsim.files.fields import no_axis
-from feedsim.files.regular import digest
+from feedsim.files.source import digest
 from feedsim.files.trace import Recording, read_recording
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Drive, Machine

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from feedsim.estimation.identify.record import Array
-from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason
+from feedsim.estimation.least_squares import ANY_VALUE, determined, half_width, reason
 
 Status = Literal["estimated", "held", "given", "undetermined"]
 

@@ -12,7 +12,7 @@ from feedsim.estimation.identify.inertia import REST_SPEED_SHARE
 from feedsim.estimation.identify.motion import START_PRIOR, STARTS, RecordTorque
 from feedsim.estimation.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
 from feedsim.estimation.identify.record import Array
-from feedsim.estimation.interval import correlation_length
+from feedsim.estimation.least_squares import correlation_length
 from feedsim.estimation.parameter import Parameter, Prior
 
 REACH = {"z": 1.0, "c": 0.5}

@@ -36,9 +36,9 @@ from feedsim.estimation.identify.read import Provenance, check_estimates, check_
 from feedsim.estimation.identify.record import Array, Record
 from feedsim.estimation.identify.result import Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
 from feedsim.estimation.identify.stribeck import FEW_SPEEDS, Points, stationary
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.parameter import Prior
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Friction, FrictionParameters, Machine
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
@@ -91,7 +91,7 @@ class Options:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        known = (*variables.parameters(FRICTION_UNITS.get(self.law, FRICTION_ROLE.shipped)), "M_0")
+        known = (*units.parameters(FRICTION_UNITS.get(self.law, FRICTION_ROLE.shipped)), "M_0")
         for name in (*self.hold, *self.free):
             if name not in known:
                 raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")

@@ -31,7 +31,7 @@ from feedsim.estimation.identify.parameters import (
 )
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.identify.result import Correlation, Plateau, Stationary, Status
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.parameter import Parameter
 from feedsim.foundation.errors import InputError
 

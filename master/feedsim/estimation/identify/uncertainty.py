@@ -13,7 +13,7 @@ from feedsim.estimation.identify.parameters import NO_EFFECT, PARAMETER_KINDS, P
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.identify.result import Stationary, Status
 from feedsim.estimation.identify.search import Search, Solution
-from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason, shows
+from feedsim.estimation.least_squares import ANY_VALUE, determined, half_width, reason, shows
 from feedsim.estimation.parameter import Prior
 
 # Of the record's RMS torque, and of the inertia: what the model itself is not better than (interpolation between the

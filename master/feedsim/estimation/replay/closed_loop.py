@@ -26,7 +26,7 @@ from feedsim.estimation.identify.clipping import without_clipped
 from feedsim.estimation.identify.inertia import Inertia, inertia
 from feedsim.estimation.identify.parameters import EXCESS
 from feedsim.estimation.identify.read import read_records
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.columns import Columns
 from feedsim.files.trace import Mark, Recording, read_recording
 from feedsim.files.trace.trace import Array

@@ -17,12 +17,19 @@ from feedsim.estimation.identify.inertia import inertia
 from feedsim.estimation.identify.parameters import EXCESS, estimate, inner_to_outer
 from feedsim.estimation.identify.position_loop import Constant, rms
 from feedsim.estimation.identify.result import Correlation, Estimate
-from feedsim.estimation.interval import NORMAL_95, Covariance, between_groups, correlation_length, half_width, stretched
+from feedsim.estimation.least_squares import (
+    NORMAL_95,
+    Covariance,
+    between_groups,
+    correlation_length,
+    half_width,
+    stretched,
+)
 from feedsim.estimation.replay.closed_loop import AxisRecord
 from feedsim.estimation.replay.machine_files import KEYS, ElasticMode, modes_of
 from feedsim.estimation.replay.tuning import Problem, Tuned
 from feedsim.files.trace.trace import Array
-from feedsim.foundation import variables
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Machine
 
@@ -32,7 +39,7 @@ ONE_WAY = 0.1  # share of the mean torque to which the constant load has to be k
 SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
 STRETCHES = 8  # of the motion, each of which is left out once
 PRIOR_SHARE = 0.8  # share of the usual deviation that is left: the record does not determine the value
-_CONTROLLER = variables.parameters("controller")
+_CONTROLLER = units.parameters("controller")
 ON_THE_MODEL = "{} it rests on an axis that is taken to be rigid"
 SHARED_LAG = "{} only the lag shows, T_dyn + T_sym + (1 - k_ffw)/K_v, and it may be shared otherwise"
 SHARING = ("T_sym", "k_ffw")

@@ -18,7 +18,14 @@ from feedsim.estimation.identify.clipping import tied_at_limit
 from feedsim.estimation.identify.inertia import inertia
 from feedsim.estimation.identify.parameters import EXCESS
 from feedsim.estimation.identify.position_loop import rms
-from feedsim.estimation.interval import Covariance, between_groups, correlation_length, half_width, shows, stretched
+from feedsim.estimation.least_squares import (
+    Covariance,
+    between_groups,
+    correlation_length,
+    half_width,
+    shows,
+    stretched,
+)
 from feedsim.estimation.replay.closed_loop import (
     AxisRecord,
     Begin,

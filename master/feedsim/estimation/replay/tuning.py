@@ -21,8 +21,7 @@ from feedsim.estimation.identify.clipping import limit_shown
 from feedsim.estimation.identify.parameters import EXCESS
 from feedsim.estimation.identify.position_loop import rms
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.interval import NORMAL_95, correlation_length, half_width
-from feedsim.estimation.least_squares import LeastSquares, Point, secant
+from feedsim.estimation.least_squares import NORMAL_95, LeastSquares, Point, correlation_length, half_width, secant
 from feedsim.estimation.parameter import Parameter
 from feedsim.estimation.replay.closed_loop import AxisRecord, Mask, Replay, of_cycle, per_row_of
 from feedsim.estimation.replay.machine_files import modes_of, with_modes

@@ -21,8 +21,8 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files import regular
-from feedsim.files.regular import check_depth
+from feedsim.files import source
+from feedsim.files.source import check_depth
 from feedsim.files.trace.cells import twice
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, recorded
 from feedsim.foundation.errors import InputError
@@ -470,11 +470,11 @@ def read_capture(path: Path) -> Capture:
 
 def _content(path: Path) -> _Content:
     """All that is read of a file, in UTF-8, or, where it is none, in UTF-16 or Windows-1252."""
-    with regular.opened(path) as file:
+    with source.opened(path) as file:
         wide = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
     for encoding in ("utf-16",) if wide else ("utf-8-sig", WINDOWS):
         try:
-            with regular.opened(path) as file, io.TextIOWrapper(file, encoding, newline="") as text:
+            with source.opened(path) as file, io.TextIOWrapper(file, encoding, newline="") as text:
                 return _walked(JsonStream(text, path), path)
         except UnicodeDecodeError as error:
             problem = error

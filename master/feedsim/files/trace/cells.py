@@ -22,7 +22,7 @@ from typing import Literal
 
 import numpy as np
 
-from feedsim.files.regular import content
+from feedsim.files.source import content
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recorded, suggest
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, few

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files import regular
+from feedsim.files import source
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.installation import need
@@ -216,7 +216,7 @@ def read_mat(path: Path) -> dict[str, Value]:
 
     Raises InputError: no such file, none of these versions, damaged, or one that inflates to more than is allowed.
     """
-    content = regular.content(path, pipes=True)
+    content = source.content(path, pipes=True)
     try:
         if is_hdf5(content):
             return variables(content)

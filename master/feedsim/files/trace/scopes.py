@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files import regular
+from feedsim.files import source
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError, few
 from feedsim.foundation.units import known_unit, spelled
@@ -57,13 +57,13 @@ def read_scope(path: Path) -> Signals | None:
     """The signals of such a file; None where it is another one. InputError with the line: what cannot be read."""
     if not path.is_file():
         return None  # a pipe is read once
-    with regular.opened(path) as file:
+    with source.opened(path) as file:
         raw = file.read(SCOPE_BYTES)
     head = _decoded(raw)
     if _HALSCOPE.match(head):
-        return _halscope(path, _decoded(regular.content(path)))
+        return _halscope(path, _decoded(source.content(path)))
     if result := _TWINCAT.search(head):
-        return _twincat(path, _decoded(regular.content(path)), result[1])
+        return _twincat(path, _decoded(source.content(path)), result[1])
     return None
 
 

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from feedsim.files import regular
+from feedsim.files import source
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.scopes import Signals, unique
 from feedsim.files.trace.trace import Array
@@ -40,7 +40,7 @@ class _Plain(ElementTree.TreeBuilder):
 def _root(path: Path) -> ElementTree.Element:
     parser = ElementTree.XMLParser(target=_Plain())
     try:
-        parser.feed(regular.content(path, MAX_TRACE_BYTES))
+        parser.feed(source.content(path, MAX_TRACE_BYTES))
         root: ElementTree.Element = parser.close()
     except ElementTree.ParseError as error:
         raise InputError(f"{path} is no XML file that can be read: {error}") from None

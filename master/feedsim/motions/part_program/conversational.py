@@ -14,10 +14,9 @@ from functools import cached_property
 from feedsim.motions.part_program.expressions import FUNCTIONS, Scanner, Value, calculate, equal, rounded, whole
 from feedsim.motions.part_program.geometry import Arc, arc_about, arc_of_radius, arc_tangent, sine
 from feedsim.motions.part_program.interpreter import MAX_CALLS, MAX_REPEATED
-from feedsim.motions.part_program.moves import Blending
 from feedsim.motions.part_program.recorder import ARC, MAX_COORDINATE, Corner, Fault, Options, Recorder
 from feedsim.motions.part_program.source import Place, Program
-from feedsim.motions.part_program.words import INCH, XY, YZ, ZX
+from feedsim.motions.part_program.words import INCH, XY, YZ, ZX, Blending
 
 _DECIMAL = re.compile(r"\d+\.?\d*|\.\d+")
 _Q = re.compile(r"Q(\d{1,4})(?![A-Z0-9])")

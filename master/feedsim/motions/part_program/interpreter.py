@@ -27,7 +27,6 @@ from feedsim.motions.part_program.geometry import (  # fmt: skip
     rotation,
     sine,
 )
-from feedsim.motions.part_program.moves import Blending
 from feedsim.motions.part_program.recorder import ARC, MAX_COORDINATE, Corner, Fault, Options, Recorder
 from feedsim.motions.part_program.source import Place, Program
 from feedsim.motions.part_program.words import (  # fmt: skip
@@ -43,6 +42,7 @@ from feedsim.motions.part_program.words import (  # fmt: skip
     VALUES,
     WITH_WAY,
     WORKPIECE_LENGTHS,
+    Blending,
     Modal,
     refusal_of,
     spelled,

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from feedsim.foundation.errors import InputError
-from feedsim.motions.part_program.moves import Moves
 from feedsim.motions.part_program.recorder import Fault, Recorder
 from feedsim.motions.part_program.source import DIALECTS, Folder, Program, detect_dialect, read_text
+from feedsim.motions.part_program.words import Moves
 
 TOLERANCE = 100e-6  # [m], the standard value of MD33100
 

@@ -29,7 +29,7 @@ from feedsim.motions.part_program.geometry import (  # fmt: skip
     rounding,
     unit,
 )
-from feedsim.motions.part_program.moves import Motion, Moves, Note, row_type
+from feedsim.motions.part_program.words import Motion, Moves, Note, row_type
 
 GEOMETRY_AXES = ("X", "Y", "Z")
 MAX_ROWS = 5_000_000  # some 170 bytes each

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 
-from feedsim.files.regular import content
+from feedsim.files.source import content
 from feedsim.foundation.errors import InputError
 from feedsim.motions.part_program.recorder import Fault
 

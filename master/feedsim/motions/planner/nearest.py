@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError
-from feedsim.motions.part_program.moves import Motion, Moves
+from feedsim.motions.part_program.words import Motion, Moves
 from feedsim.motions.planner import planned
 
 Array = NDArray[np.float64]

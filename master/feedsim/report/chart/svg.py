@@ -58,11 +58,18 @@ from feedsim.report.chart.model import (
     Panel,
     Part,
     Polar,
+    Range,
+    Ticks,
     along,
+    apart,
     extremes,
+    measured,
+    ranges,
+    round_step,
+    tick_text,
+    ticks,
 )
 from feedsim.report.chart.model import MOST_ROWS as MOST_IN_PAGE
-from feedsim.report.chart.scales import Range, Ticks, apart, measured, ranges, round_step, tick_text, ticks
 from feedsim.report.formatting import BLUE, GRID, INK, MUTED, PAGE_COLOURS, VERMILLION, Array, minus, named, three
 
 # --- A polar panel of an SVG: deviations about the programmed circle, with rings and the directions of the plane ------

@@ -11,7 +11,7 @@ import numpy as np
 from feedsim.estimation.identify import Identified, friction_file
 from feedsim.estimation.identify.friction_file import FRICTION_FILE
 from feedsim.estimation.identify.result import Balance, Correlation, Dynamic, Estimate, Identification, Stretch
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.report.chart import Axis, Chart, Curve, Grid, Level, Panel
 from feedsim.report.content import (
     FOLDER,

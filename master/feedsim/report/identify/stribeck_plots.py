@@ -11,7 +11,7 @@ from feedsim.estimation.identify import Identified
 from feedsim.estimation.identify.parameters import torque as motor_torque
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Estimate, Identification, Plateau, Stationary
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Panel
 from feedsim.report.content import Picture
 from feedsim.report.formatting import ORANGE, OTHERWISE, RECORDED, SIMULATED, Array, counted, powers

@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.estimation.interval import student
-from feedsim.foundation import units, variables
+from feedsim.estimation.least_squares import student
+from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.installation import checkout
-from feedsim.foundation.variables import Variable
+from feedsim.foundation.units import Variable
 from feedsim.linear.judgement import SHOWS, judge, locked_modes
 from feedsim.motions.circular import Circle, Circular
 from feedsim.motions.dwell import Dwell
@@ -164,7 +164,7 @@ def _of_axes(machine: Machine) -> list[Knob]:
         structure = _at_slide(described)
         for part, values, unit in (("drive", drive, "controller"), ("friction", friction, "friction"),
                                    ("", structure, "plant/axis")):  # fmt: skip
-            table = variables.parameters(unit)
+            table = units.parameters(unit)
             for name, value in values.items():
                 whole = f"{part}.{name}".removeprefix(".")
                 key, own = f"machine.axes.{axis}.{whole}", ((f"{axis}.{whole}", 1.0),)
@@ -184,7 +184,7 @@ def _of_axes(machine: Machine) -> list[Knob]:
 def _at_slide(axis: Axis) -> dict[str, Any]:
     """Hysteresis, friction of its own at the guide, not where it is a share of the axis's friction, and the play of a
     transmission: its stiffness makes other modes, which the page cannot."""
-    table = variables.parameters("plant/axis")
+    table = units.parameters("plant/axis")
     result = {name: row.start for name, row in table.items() if name.partition(".")[0] in ("hysteresis", "guide")}
     wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
     result |= {f"hysteresis.{name}": value for name, value in wound.items()}
@@ -209,18 +209,18 @@ def _friction_sets(described: Axis, axis: str, name: str) -> tuple[tuple[str, fl
 
 def _effects() -> dict[str, Any]:
     """Parameters of all effects of a drive, as they are where a machine has none."""
-    table = variables.parameters("controller")
+    table = units.parameters("controller")
     return {name: row.start for name, row in table.items() if name.partition(".")[0] in EFFECTS}
 
 
 def _of_structure(machine: Machine) -> list[Knob]:
     """Geometry of the guides, and factors of mounts that are not linear where there are any."""
-    given = {name: float(row.start) for name, row in variables.parameters("plant").items()
+    given = {name: float(row.start) for name, row in units.parameters("plant").items()
              if name.startswith("geometry.")}  # fmt: skip
     given |= {
         name: float(value) for name, value in machine.errors.items() if name in given or name.startswith("mounts.")
     }
-    table = variables.parameters("plant")
+    table = units.parameters("plant")
     return [
         _number(f"machine.{name}", "mounts" if name.startswith("mounts.") else "guides", name, value, table[name],
                 ((name, 1.0),))

@@ -26,9 +26,8 @@ from feedsim.report.content import Picture, Table
 from feedsim.report.formatting import PALETTE, display_unit, duration, shown, typeset
 from feedsim.report.live_page.content import Content, content, packed
 from feedsim.report.page import drawing, style
-from feedsim.report.run.axis_plots import positioning_picture
-from feedsim.report.run.circle_plots import contour_picture, torque_picture
-from feedsim.report.run.diagnosis import diagnosis_section
+from feedsim.report.run.axis_plots import contour_picture, positioning_picture, torque_picture
+from feedsim.report.run.pose import diagnosis_section
 from feedsim.simulation.judge import JudgedRun
 
 # --- The scripts and styles of a page: what computes, for a worker, and what shows, for the page itself ---------------

@@ -12,7 +12,7 @@ from feedsim.estimation.identify import AxisLimits, Provenance
 from feedsim.estimation.identify.friction_file import interval_text, value_text
 from feedsim.estimation.identify.read import recording_day
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.interval import NORMAL_95
+from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.compare import Comparison
 from feedsim.estimation.replay.drive import DriveFound
 from feedsim.estimation.replay.identified import DrivesFound

@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
 
-from feedsim.analysis import Approach, Figures, deviation
+import numpy as np
+
+from feedsim.analysis import Accuracy, Approach, Contour, Diagnosis, Figures, Turn, contour, deviation
 from feedsim.analysis.positioning import PLATEAU
 from feedsim.files.trace import Trace, release
 from feedsim.foundation.errors import InputError
-from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Mark, Panel, column_of
-from feedsim.report.content import Picture
+from feedsim.motions.circular import SENSE_WORDS
+from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Mark, Panel, Polar, column_of
+from feedsim.report.content import Picture, Section, Table
 from feedsim.report.formatting import (
     ALLOWED,
     AT_TOOL,
     BLUE,
+    CLOCKWISE,
     FRICTION,
     GREEN,
     INK,
     ORANGE,
+    OTHERWISE,
     PURPLE,
     RESIDUAL_COLOUR,
     SETPOINT,
     SIMULATED,
     SKY,
     VERMILLION,
+    Array,
     display_unit,
     minus,
+    number,
 )
 
 TIME = Axis("time", "s")
@@ -218,3 +226,247 @@ def signals_picture(trace: Trace, title: str) -> Picture:
             )
         )
     return Picture("signals", title, ", ".join(trace.names), Chart(panels))
+
+
+# --- Figures of a circular test: the magnified contour error, and the torques of the plane's axes over time and
+#     speed
+
+
+RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
+GAP = 5.0  # deg of a turn that is not recorded; curves break there
+COLOURS = {1: SIMULATED, -1: CLOCKWISE}  # by the sense of the turn, where there are two
+HIGHER = 10e-9  # m; a peak that is higher by less has the same height for a reader
+
+
+class OnCircle(Protocol):
+    """A circle: axes of its plane, radius [m]."""
+
+    @property
+    def axes(self) -> tuple[str, str]: ...
+    @property
+    def radius(self) -> float: ...
+
+
+def contour_picture(
+    trace: Trace, turn: Turn, stem: str, back: Turn | None = None, diagnosis: Diagnosis | None = None
+) -> Picture:
+    """Contour error of a turn in polar form, magnified, with scale rings and the peaks of the reversals.
+
+    back: the turn in the other sense, which is drawn over it. diagnosis: which has the heights of the peaks over the
+    fitted rest of the circle; without it the quadrant glitches are shown.
+    """
+    by_scale = contour(trace, turn)
+    on = circle(turn, float(np.abs(by_scale.deviation).max()))
+    curves = []
+    tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
+    if all(name in trace.columns for name in tool):
+        by_tool = contour(trace, turn, tool)
+        curves.append(turned(TOOL_TITLE, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
+    dash: Dash
+    over, seen = "", {turn.sense: by_scale}
+    if back is None:
+        curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
+    else:
+        seen[back.sense] = other = contour(trace, back)
+        for sense, own, dash, width in ((turn.sense, by_scale, "", 1.6), (back.sense, other, "dashed", 1.2)):
+            name = f"linear scales, {SENSE_WORDS[sense]}"
+            curves.append(turned(name, COLOURS[sense], own.angle, own.deviation, dash, width))
+        over = f" Dashed: {SENSE_WORDS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
+    title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
+    caption = (
+        f"Radius {turn.radius * 1e3:.6g} mm, {SENSE_WORDS[turn.sense]} from {turn.axes[0]} to {turn.axes[1]}, turn "
+        "from "
+        f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
+        f"at ±{on.ring:g} µm about the programmed circle. "
+    )
+    caption += (
+        "The markers show the reversal peaks, over the fitted rest of the circle"
+        f"{', in the direction that has the larger peak' if back is not None else ''}."
+        if diagnosis is not None
+        else "The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, less the "
+        "median of the turn."
+    )
+    if diagnosis is not None:
+        places = _peaks(diagnosis, seen)
+    else:
+        places = [(glitch.name, glitch.angle, glitch.deviation, glitch.height) for glitch in by_scale.glitches]
+    marks = [
+        Mark(angle, deviation * 1e6, f"{minus(name)}: {height * 1e6:.2f} µm", RESIDUAL_COLOUR)
+        for name, angle, deviation, height in places
+        if height
+    ]
+    medians = [] if diagnosis is not None else [Level(by_scale.median * 1e6, "median (scales)", dash="dotted")]
+    sense = turn.sense if back is None else 0
+    note = "quadrant glitches\n(less the median)" if diagnosis is None else ""
+    chart = circle_chart(on, curves, marks, medians, sense, note)
+    return Picture(stem, title, caption, chart)
+
+
+def _peaks(diagnosis: Diagnosis, seen: Mapping[int, Contour]) -> list[tuple[str, float, float, float]]:
+    """Name of the half axis, angle [rad], deviation [m] and height [m] of the largest peak where each half axis
+    reverses, 0 where none stands out; the place is in the first turn, unless the peak of the other one is higher."""
+    first = next(iter(seen))
+    result = []
+    for name in dict.fromkeys(peak.name for peak in diagnosis.peaks):
+        own = [peak for peak in diagnosis.peaks if peak.name == name and peak.sense in seen]
+        if own:
+            place = max(own, key=lambda peak: abs(peak.height) - (0.0 if peak.sense == first else HIGHER))
+            turn = seen[place.sense]
+            k = int(np.argmin(np.abs((turn.angle - place.angle + math.pi) % (2 * math.pi) - math.pi)))
+            height = max((peak.height for peak in own), key=abs)
+            result.append((name, float(turn.angle[k]), float(turn.deviation[k]), height))
+    return result
+
+
+def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:
+    """Torques of the plane's axes over time and over speed, during the evaluated turn; None where none is recorded.
+
+    signs: axis -> +-1, display sign of its torques.
+    """
+    axes = [axis for axis in turn.axes if f"{axis}.M_a" in trace.columns and f"{axis}.n_a" in trace.columns]
+    if not axes:
+        return None
+    row = (trace.time[-1] - trace.time[0]) / (len(trace) - 1)
+    part = trace.between(turn.begin, turn.end + row)  # the next row closes the loops
+    title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: driving torque and friction torque"
+    caption = (
+        f"Turn from {turn.begin:.4f} to {turn.end:.4f} s: over time, over the motor speed, and the friction torque "
+        "around the reversal of the motion, where its slope is that of the engaging transmission."
+        + reversed_note(axes, signs)
+    )
+    return Picture(stem, title, caption, _torques(part, axes, signs))
+
+
+def _torques(part: Trace, axes: Sequence[str], signs: Mapping[str, int]) -> Chart:
+    """Torques of a turn over time and over the motor speed, a row per axis."""
+    panels = []
+    for axis in axes:
+        sign, speed = signs.get(axis, 1), part[f"{axis}.n_a"]
+        torques = [("motor M_a", sign * part[f"{axis}.M_a"], SIMULATED)]
+        if f"{axis}.M_fr" in part.columns:
+            torques.append(("friction M_fr", sign * part[f"{axis}.M_fr"], FRICTION))
+        ordinate = torque_axis(sign)
+        n_a = Axis("motor speed n_a", "rad/s")
+        near = Axis(n_a.label, n_a.unit, span=_about_zero(0.12 * float(np.abs(speed).max() or 1.0)))
+        zero = [Level(0.0, dash=""), Level(0.0, upright=True, dash="")]
+        over = [Curve(name, part.time, torque, colour, width=1.2) for name, torque, colour in torques]
+        loops = [Curve(name, speed, torque, colour, width=1.2) for name, torque, colour in torques]
+        panels += [
+            Panel(f"Axis {axis}: torque over time", TIME, ordinate, over, zero[:1], linked="t"),
+            Panel("Torque over speed", n_a, ordinate, loops, zero),
+            Panel("Friction around the reversal", near, ordinate, loops[1:] or loops, zero),
+        ]
+    return Chart(panels, (1.25, 1.0, 1.0))
+
+
+def circle(on: OnCircle, largest: float) -> Polar:
+    """The programmed circle with rings that suit a deviation of up to ``largest`` [m]; no curves."""
+    ring = ring_step(largest * 1e6)
+    title = f"Contour error, {on.axes[0]}-{on.axes[1]}, R {on.radius * 1e3:g} mm"
+    return Polar(title, on.axes, on.radius * 1e3, ring, 1 if largest * 1e6 < 1.1 * ring else 2, ())
+
+
+def ring_step(largest: float) -> float:
+    """Distance of the scale rings [um] for an error of up to ``largest`` [um]: 10 um as long as that is readable."""
+    if RING / 5 <= largest <= 2 * RING:
+        return RING
+    decade = 10.0 ** math.floor(math.log10(max(largest, 0.1)))
+    return next(step for step in (decade, 2 * decade, 5 * decade, 10 * decade) if max(largest, 0.1) <= 1.5 * step)
+
+
+def turned(name: str, colour: str, angle: Array, off: Array, dash: Dash = "", width: float = 1.4) -> Curve:
+    """A turn [rad, m] as a curve of a polar panel."""
+    return Curve(name, angle, off * 1e6, colour, dash, width)
+
+
+def circle_chart(
+    on: Polar, curves: Sequence[Curve], marks: Sequence[Mark] = (), levels: Sequence[Level] = (), sense: int = 0,
+    note: str = "",
+) -> Chart:  # fmt: skip
+    """Turns about the circle and, beside it, over the angle. on: the circle, without curves."""
+    polar = Polar(on.title, on.axes, on.radius, on.ring, on.rings, curves, marks, sense, note)
+    return Chart([polar, unrolled(on.axes, curves, marks, levels)], (1.2, 1.0))
+
+
+def unrolled(axes: tuple[str, str], curves: Sequence[Curve], marks: Sequence[Mark], levels: Sequence[Level]) -> Panel:
+    """Turns over the angle [deg]."""
+    over = []
+    for curve in curves:
+        angle = np.rad2deg(curve.x % (2 * math.pi))
+        order = np.argsort(angle, kind="stable")
+        angle, off = angle[order], curve.y[order]
+        gap = int(np.diff(angle, append=angle[-1]).argmax())
+        if angle[gap + 1 : gap + 2].size and angle[gap + 1] - angle[gap] > GAP:  # an arc: nothing is drawn across
+            angle, off = np.insert(angle, gap + 1, angle[gap]), np.insert(off, gap + 1, math.nan)
+        over.append(Curve(curve.name, angle, off, curve.colour, curve.dash, curve.width))
+    return Panel(
+        "Over the angle",
+        Axis(f"angle from {axes[0]}+", "°", span=(0.0, 360.0)),
+        Axis("radius deviation", "µm"),
+        over,
+        [Level(0.0, dash=""), *levels],
+        marks=[Mark(math.degrees(mark.x % (2 * math.pi)), mark.y, "", mark.colour) for mark in marks],
+        linked="angle",
+    )
+
+
+def _about_zero(reach: float) -> tuple[float, float]:
+    return -reach, reach
+
+
+# --- Positioning accuracy in a report: target by target, as on acceptance sheets, as a picture and as a table ---------
+
+
+HEADS = (
+    "Target [mm]", "Mean upwards [µm]", "s upwards [µm]", "Mean downwards [µm]", "s downwards [µm]", "B [µm]", "R [µm]"
+)  # fmt: skip
+NOTE = (
+    "Deviation of the measured position from the target at the end of each rest: mean and standard deviation s of the "
+    "approaches from below (upwards) and from above (downwards), reversal value B and bidirectional repeatability R. "
+    "Letters after ISO 230-2."
+)
+SIDES = (("approached upwards", SIMULATED), ("approached downwards", OTHERWISE))
+
+
+def accuracy_picture(prefix: str, accuracy: Accuracy, stem: str) -> Picture:
+    """Deviations over the targets: every reading, means, and two standard deviations to either side of them."""
+    x = 1e3 * np.asarray(accuracy.targets)
+    readings, mean, s = 1e6 * accuracy.deviations, 1e6 * accuracy.mean, 1e6 * accuracy.s
+    runs = readings.shape[2]
+    title = f"Positioning accuracy of {prefix}"
+    caption = (
+        "Deviation of the measured position from its target at the end of each rest, by the linear scale: every "
+        "reading, the mean of each side, and the band of two standard deviations about it. "
+        f"A {number(accuracy.figures['A'].value, 3)} µm is from the top of the bands to their bottom."
+    )
+    bands = [
+        Band("", middle - 2 * spread, middle + 2 * spread, x, colour)
+        for (_, colour), middle, spread in zip(SIDES, mean, s, strict=True)
+    ]
+    curves = [
+        Curve(name, x, middle, colour, dash="dashed" if k else "")
+        for k, ((name, colour), middle) in enumerate(zip(SIDES, mean, strict=True))
+    ]
+    curves += [
+        Curve(name, np.repeat(x, runs), own.ravel(), colour, width=2.4, dots=True)
+        for (name, colour), own in zip(SIDES, readings, strict=True)
+    ]
+    reach = 0.03 * float(np.ptp(x))
+    low = min(float(np.min(mean - 2 * s)), float(np.min(readings)))
+    high = max(float(np.max(mean + 2 * s)), float(np.max(readings)))
+    across = Axis("target", "mm", span=(float(x[0]) - reach, float(x[-1]) + reach))
+    up = Axis("deviation", "µm", span=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
+    panel = Panel("Deviation at the targets", across, up, curves, [Level(0.0, dash="")], bands, height=1.6)
+    return Picture(stem, title, caption, Chart([panel]))
+
+
+def accuracy_section(prefix: str, accuracy: Accuracy, place: str = "") -> Section:
+    """Means, standard deviations, reversal value and repeatability of every target. place: "tool" by the tool point."""
+    columns = (*np.transpose([accuracy.mean, accuracy.s], (1, 0, 2)).reshape(4, -1), accuracy.B, accuracy.R)
+    rows = [
+        (f"{1e3 * target:.6g}", *(minus(f"{1e6 * float(column[i]):.3f}") for column in columns))
+        for i, target in enumerate(accuracy.targets)
+    ]
+    by = " by the tool point" if place else ""
+    anchor = f"accuracy-{prefix}" + (f"-{place}" if place else "")
+    return Section(f"Positioning accuracy of {prefix}{by}", [Table("rrrrrrr", HEADS, rows, NOTE)], anchor)

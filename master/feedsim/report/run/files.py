@@ -42,8 +42,7 @@ from feedsim.report.provenance import (
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.run import sheet
 from feedsim.report.run.contour import BLOCKS_FILE, blocks_csv, contour_part
-from feedsim.report.run.diagnosis import diagnosis_part
-from feedsim.report.run.pose import pose_part
+from feedsim.report.run.pose import diagnosis_part, pose_part
 from feedsim.report.run.report import (
     COUPLING,
     LOG,

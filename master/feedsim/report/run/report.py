@@ -40,11 +40,17 @@ from feedsim.report.provenance import (
     input_files,
 )
 from feedsim.report.run import sheet
-from feedsim.report.run.axis_plots import OVERSHOOT_TITLE, overview_picture, positioning_picture
-from feedsim.report.run.circle_plots import accuracy_picture, accuracy_section, contour_picture, torque_picture
+from feedsim.report.run.axis_plots import (
+    OVERSHOOT_TITLE,
+    accuracy_picture,
+    accuracy_section,
+    contour_picture,
+    overview_picture,
+    positioning_picture,
+    torque_picture,
+)
 from feedsim.report.run.contour import contour_pictures, contour_section, contour_words
-from feedsim.report.run.diagnosis import cause_tile, diagnosis_section
-from feedsim.report.run.pose import pose_section
+from feedsim.report.run.pose import cause_tile, diagnosis_section, pose_section
 from feedsim.scenario import Drive, Level, Logging
 from feedsim.simulation.judge import JudgedRun
 

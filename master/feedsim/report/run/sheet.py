@@ -20,7 +20,7 @@ from feedsim.foundation import outputs as sheets
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.content import Picture
 from feedsim.report.formatting import minus
-from feedsim.report.run.circle_plots import accuracy_picture, contour_picture
+from feedsim.report.run.axis_plots import accuracy_picture, contour_picture
 from feedsim.scenario import CircleTest, PositioningAccuracy, Scenario
 from feedsim.scenario.model import OF_CIRCLES, OF_POSITIONING, Sheet
 from feedsim.simulation.cosim import Run

@@ -18,8 +18,7 @@ from feedsim.files.control import Name, names_of
 from feedsim.foundation import outputs
 from feedsim.foundation.arguments import spelt
 from feedsim.foundation.errors import Note, Wrong
-from feedsim.foundation.units import convert
-from feedsim.foundation.variables import parameters
+from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
 from feedsim.report.changes import asked
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel

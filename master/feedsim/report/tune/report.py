@@ -16,8 +16,7 @@ from feedsim.design.uncertainty import interval, share_of
 from feedsim.files.control import Name, names_of
 from feedsim.foundation import outputs
 from feedsim.foundation.errors import Note, Wrong
-from feedsim.foundation.units import convert
-from feedsim.foundation.variables import parameters
+from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
 from feedsim.report.content import Paragraph, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value

@@ -9,7 +9,7 @@ from itertools import combinations
 from math import prod
 from pathlib import Path
 
-from feedsim.files import changes
+from feedsim.files import checked
 from feedsim.files.checked import check, describe, dotted, fetch, in_order, read_group
 from feedsim.files.fields import did_you_mean
 from feedsim.files.source import Source, at
@@ -74,7 +74,7 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
         goal=_goal(entry),
         explain=entry.explain or "",
         files=tuple(dict.fromkeys(files)),
-        overrides=tuple(changes.spread(overrides)),
+        overrides=tuple(checked.spread(overrides)),
         warnings=tuple(warnings),
         written=written,
     )
@@ -93,7 +93,7 @@ def _base(source: Source, overrides: Sequence[str], faults: list[str]) -> Base |
 
 def _settings(source: Source) -> list[Setting]:
     """The study's `set` group."""
-    return [*changes.entries(source, "set")] if isinstance(source.data.get("set"), dict) else []
+    return [*checked.entries(source, "set")] if isinstance(source.data.get("set"), dict) else []
 
 
 def _meant(base: Base, settings: Sequence[Setting]) -> list[str]:

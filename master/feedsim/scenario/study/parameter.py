@@ -12,7 +12,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from feedsim.files import changes
+from feedsim.files import checked
 from feedsim.files.checked import describe, dotted, quantity_of, reading
 from feedsim.files.fields import Quantity
 from feedsim.files.source import Mark, Place, Source, at
@@ -220,17 +220,17 @@ class Reader:
             here = self._at(name, "key", *([i] if len(entry.keys) > 1 else []))
             where = f"{self.source.mark(here).where}: {dotted(here)}"
             scratch = self.base.settled.source.copy()
-            result = list(changes.places(scratch, Scenario, key, Mark(where, Path())))
+            result = list(checked.places(scratch, Scenario, key, Mark(where, Path())))
             if not result:
                 raise InputError(f"{where}: {key} reaches nothing in {self.base.draft.path}")
             for place in result:
                 if place not in seen:
                     seen.add(place)
-                    parent = changes.expected(Scenario, scratch.data, place[:-1])
-                    annotation = changes.child(parent, place[-1])
-                    if place[-1] in _WORDS and changes.keys(parent) is not None:
+                    parent = checked.expected(Scenario, scratch.data, place[:-1])
+                    annotation = checked.child(parent, place[-1])
+                    if place[-1] in _WORDS and checked.keys(parent) is not None:
                         raise InputError(f"{where}: {dotted(place)} is only shown; it changes no run")
-                    if changes.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
+                    if checked.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
                         raise InputError(f"{where}: {dotted(place[:-1])} has no {place[-1]!r}")
                     yield Target(place, annotation, quantity_of(annotation), _is_whole(annotation))
 

@@ -5,9 +5,9 @@ Start with run.py: ``run``; then schedule.py, which says once what a control cyc
 """
 
 from feedsim.foundation.installation import fmus_directory
-from feedsim.simulation.cosim.binaries import executed, executing
-from feedsim.simulation.cosim.loop import Progress
+from feedsim.simulation.cosim.exchange import executed, executing
 from feedsim.simulation.cosim.run import Crossings, Follower, Run, check, follow, logged, run
+from feedsim.simulation.cosim.schedule import Progress
 
 __all__ = [
     "Crossings", "Follower", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
+import ctypes
 import os
 import platform
 import re
 import sys
 import zipfile
-from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -23,9 +24,75 @@ from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.owned import Closing, held
 from feedsim.simulation.cosim import unpacked
-from feedsim.simulation.cosim.arithmetic import restored
 from feedsim.simulation.cosim.unpacked import STORE, Content, check_there
 from feedsim.simulation.cosim.worker import calling, watched
+
+# --- How this process computes: rounding, denormal numbers, traps, which a program of another maker may leave
+#     changed
+# All units share it: one that rounds upward changes what every other unit computes. The native loop looks at it itself.
+
+
+# System, processor -> which words of its fenv_t hold settings, with a mask of what is no flag of a past operation.
+_SETTINGS = {
+    ("linux", "x86_64"): ((0, 0xFFFF), (7, 0xFFC0)),
+    ("darwin", "x86_64"): ((0, 0xFFFF), (1, 0xFFC0)),
+    ("linux", "aarch64"): ((0, 0xFFFFFFFF),),
+    ("darwin", "arm64"): ((2, 0xFFFFFFFF),),
+}
+_Words = ctypes.c_uint32 * 64  # no fenv_t is larger
+
+
+def _functions() -> tuple[Any, Any] | None:
+    """fegetenv and fesetenv of C's <fenv.h>; None where its fenv_t is not known: nothing is looked at there."""
+    if (sys.platform, platform.machine()) not in _SETTINGS:
+        return None
+    try:
+        library = ctypes.PyDLL("libm.so.6" if sys.platform == "linux" else None)
+        return library.fegetenv, library.fesetenv
+    except (OSError, AttributeError):  # another C library than the usual one
+        return None
+
+
+_FUNCTIONS = _functions()
+_MASKS = _SETTINGS.get((sys.platform, platform.machine()), ())
+_now = _Words()
+
+
+def settings() -> Any:
+    """Of now, for :func:`restore`."""
+    words = _Words()
+    if _FUNCTIONS is not None:
+        _FUNCTIONS[0](words)
+    return words
+
+
+def restore(kept: Any) -> bool:
+    """Go back to :func:`settings` of before. Whether anything but the flags of past operations has changed since."""
+    if _FUNCTIONS is None:
+        return False
+    get, put = _FUNCTIONS
+    get(_now)
+    for word, mask in _MASKS:
+        if (_now[word] ^ kept[word]) & mask:
+            put(kept)
+            return True
+    return False
+
+
+@contextmanager
+def restored(changed: Callable[[], None] | None = None) -> Iterator[None]:
+    """A block that calls another program; behind it this process computes as before. `changed` is called where the
+    program has left it otherwise."""
+    before = settings()
+    try:
+        yield
+    finally:
+        if restore(before) and changed is not None:
+            changed()
+
+
+# --- An FMU archive: unpacked, described, and its shared library for this platform loaded once ------------------------
+
 
 # --- Descriptions of archives that FMI 2.0 does not allow and that other programs run: what is made of them -----------
 # Exporters leave away what the standard demands, or write what it does not know. Of a description only the variables,

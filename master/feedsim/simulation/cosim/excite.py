@@ -24,12 +24,10 @@ from feedsim.motions.profile import speed_change
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation.cosim import worker
-from feedsim.simulation.cosim.binaries import any_foreign
-from feedsim.simulation.cosim.exchange import chosen
+from feedsim.simulation.cosim.exchange import any_foreign, chosen
 from feedsim.simulation.cosim.loads import LOAD_TAKEN_UP
-from feedsim.simulation.cosim.loop import Loop, Progress, Setpoints
 from feedsim.simulation.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
-from feedsim.simulation.cosim.schedule import Cycle
+from feedsim.simulation.cosim.schedule import Cycle, Loop, Progress, Setpoints
 from feedsim.simulation.cosim.system import TOOL_FORCES, System, controller
 from feedsim.simulation.cosim.unit import Floats, Log, Port
 from feedsim.simulation.cosim.worker import deliver

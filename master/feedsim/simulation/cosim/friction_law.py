@@ -47,7 +47,7 @@ class FrictionLaw(Closing):
 
     def __init__(self, fmus: Path | None = None, unit: str = FRICTION_ROLE.shipped) -> None:
         """Open the archive of `unit` in the folder `fmus` (default:
-        :func:`~feedsim.simulation.cosim.binaries.fmus_directory`).
+        :func:`~feedsim.simulation.cosim.exchange.fmus_directory`).
 
         Raises:
             InputError: no usable archive, or one without the functions.

@@ -19,8 +19,8 @@ from feedsim.foundation.errors import InputError
 from feedsim.motions.setpoints import Recorded
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.loads import LoadCourse, MotorLoad, Noise, ToolLoad
-from feedsim.simulation.cosim.loop import REPORTED_EVERY
 from feedsim.simulation.cosim.operations import Operation, When, copy, get_row, set_real
+from feedsim.simulation.cosim.schedule import REPORTED_EVERY
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Floats, Log, Port
 from feedsim.simulation.nc import Program
@@ -241,7 +241,7 @@ class _Account:
 
 
 class Loads:
-    """The loads of a run, a buffered part of a :class:`~feedsim.simulation.cosim.loop.Loop`: sent, and their work
+    """The loads of a run, a buffered part of a :class:`~feedsim.simulation.cosim.schedule.Loop`: sent, and their work
     counted.
 
     Attributes:

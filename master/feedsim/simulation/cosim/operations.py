@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation.errors import SimulationError
-from feedsim.simulation.cosim import arithmetic
+from feedsim.simulation.cosim import archive
 from feedsim.simulation.cosim.unit import ERROR, OK, WARNING, Floats, Log, Port, Unit, exchanging, not_finite
 from feedsim.simulation.cosim.worker import watched
 
@@ -305,14 +305,14 @@ class Interpreter(Executor):
 
     def run(self, begin: int, end: int) -> None:
         noted = None if self.mark is None else self.mark.numbers
-        own = arithmetic.settings()
+        own = archive.settings()
         for k in range(begin, end):
             t = k * self._T_c
             for at, act in enumerate(self._acts):
                 if noted is not None:
                     noted[0], noted[1] = k, at
                 status = act(k, t)
-                if noted is not None and arithmetic.restore(own) and (unit := self._operations[at].unit) is not None:
+                if noted is not None and archive.restore(own) and (unit := self._operations[at].unit) is not None:
                     unit.warn_of_arithmetic()
                 if not OK <= status <= WARNING:
                     self._fail(at, status)

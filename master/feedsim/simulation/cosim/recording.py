@@ -20,9 +20,8 @@ from feedsim.foundation.owned import held
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 from feedsim.simulation.cosim import system as wiring
-from feedsim.simulation.cosim.loop import REPORTED_EVERY, RING
 from feedsim.simulation.cosim.operations import Interpreter, Operation, When, copy, get_row
-from feedsim.simulation.cosim.schedule import Cycle
+from feedsim.simulation.cosim.schedule import REPORTED_EVERY, RING, Cycle
 from feedsim.simulation.cosim.unit import Floats, Log
 from feedsim.simulation.cosim.worker import watched
 from feedsim.simulation.nc import Program
@@ -79,7 +78,7 @@ def loaded_inputs(scenario: Scenario) -> list[str]:
 
 class Recording:
     """Rows of signals, one every `every` control cycles; a buffered part of a
-    :class:`~feedsim.simulation.cosim.loop.Loop`.
+    :class:`~feedsim.simulation.cosim.schedule.Loop`.
 
     Attributes:
         limited: axis and limit -> rows in which the drive was at it.

@@ -17,13 +17,11 @@ from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.foundation.installation import fmus_directory
 from feedsim.foundation.owned import Closing
 from feedsim.scenario import Coupling, Drive, Level, Logging, Machine, Scenario
-from feedsim.simulation.cosim.binaries import any_foreign
-from feedsim.simulation.cosim.exchange import chosen
+from feedsim.simulation.cosim.exchange import any_foreign, chosen
 from feedsim.simulation.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.simulation.cosim.loads import Acting, Loads, Work, acting
-from feedsim.simulation.cosim.loop import Loop, Progress, Setpoints
 from feedsim.simulation.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
-from feedsim.simulation.cosim.schedule import Cycle
+from feedsim.simulation.cosim.schedule import Cycle, Loop, Progress, Setpoints
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Floats
 from feedsim.simulation.cosim.whole import cycle_of, system_of

@@ -14,7 +14,7 @@ from feedsim.foundation.owned import Closing
 from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.simulation.cosim.archive import Archive
-from feedsim.simulation.cosim.binaries import is_shipped
+from feedsim.simulation.cosim.exchange import is_shipped
 from feedsim.simulation.cosim.plant import axes_of, open_plant
 from feedsim.simulation.cosim.roles import RoleUnit, archive_path, check_instances, filled
 from feedsim.simulation.cosim.unit import Floats, Port, Unexecuted, Unit

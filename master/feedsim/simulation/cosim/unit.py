@@ -23,8 +23,7 @@ from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLogge
 from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError, SimulationError
-from feedsim.simulation.cosim.archive import Archive
-from feedsim.simulation.cosim.arithmetic import restored
+from feedsim.simulation.cosim.archive import Archive, restored
 from feedsim.simulation.cosim.worker import calling
 
 Floats = NDArray[np.float64]

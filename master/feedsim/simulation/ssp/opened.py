@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.files.regular import closed
+from feedsim.files.source import closed
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.owned import TemporaryFolder
@@ -23,7 +23,7 @@ from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.unpacked import readable
 from feedsim.simulation.nc import Program, Segment, plan
 from feedsim.simulation.nc.program import MAX_POSITION_CYCLES
-from feedsim.simulation.ssp import archive, one, rebuilt, setpoints, system_structure
+from feedsim.simulation.ssp import archive, export, rebuilt, setpoints, system_structure
 from feedsim.simulation.ssp.rebuilt import STRUCTURE, Parts, values
 from feedsim.simulation.ssp.roles import roles
 from feedsim.simulation.ssp.setpoints import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
@@ -93,12 +93,12 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         with refusals_of(path):
             structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
             archives = _archives(structure, files, folder, path, stack)
-            result = one.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
+            result = export.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
             table = _table(archives[result.setpoint], f"{path}: {result.setpoint}")
             given = values(structure, files, archives, result.foreign, str(path))
-            coupling = one.coupling(result, given, str(path))
+            coupling = export.coupling(result, given, str(path))
             if coupling is not None:
-                archives, given = one.split(result, archives, given)
+                archives, given = export.split(result, archives, given)
             if problems := rebuilt.lacking(result, given, str(path)):
                 raise InputError.of(str(path), problems)
             own = rebuilt.annotation(structure.scenario, files, str(path))

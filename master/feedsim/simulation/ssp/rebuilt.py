@@ -15,8 +15,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from feedsim.files.fields import Quantity, did_you_mean
-from feedsim.files.regular import json_value
-from feedsim.files.source import is_program
+from feedsim.files.source import is_program, json_value
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Drive, Scenario

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.files import regular
+from feedsim.files import source
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.parts import AnsysStructure
 from feedsim.structure.assembly import DEGREES, counted
@@ -32,7 +32,7 @@ def read(structure: AnsysStructure) -> Raw:
             (constraint equations, lumped or unsymmetric matrices, degrees of freedom other than displacements).
     """
     file = structure.full
-    regular.refuse_unread(file)
+    source.refuse_unread(file)
     module = _reader()
     try:
         with warnings.catch_warnings():

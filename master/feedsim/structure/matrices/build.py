@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from feedsim.files import regular
+from feedsim.files import source
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.parts import (
@@ -94,7 +94,7 @@ def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
 
     Read here and not by SciPy, whose reader ends the interpreter on some files that are cut off.
     """
-    content = regular.content(file)
+    content = source.content(file)
     head, _, rest = content.partition(b"\n")
     words = head.decode("ascii", "replace").lower().split()
     if len(words) != 5 or words[:2] != ["%%matrixmarket", "matrix"] or words[2] not in ("coordinate", "array"):

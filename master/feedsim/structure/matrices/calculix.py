@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from feedsim.files import regular
-from feedsim.files.regular import referred
+from feedsim.files import source
+from feedsim.files.source import referred
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.parts import CalculixStructure
 from feedsim.structure.assembly import Integers
@@ -49,7 +49,7 @@ def _dofs(file: Path, mesh: Path | None) -> tuple[tuple[str, ...], Integers]:
     """Node and direction of each row: lines such as 12.3 for node 12, uz. mesh: for the message on a repeated row."""
     nodes, directions, seen = [], [], set[tuple[str, str]]()
     try:
-        lines = regular.content(file).decode("ascii").splitlines()
+        lines = source.content(file).decode("ascii").splitlines()
     except (InputError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: cannot be read: {error}") from error
     for line, text in enumerate(lines, start=1):
@@ -93,7 +93,7 @@ def _matrix(file: Path, size: int, dofs: Path) -> sparse.csc_array:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of an empty file, which is reported below
-            with regular.opened(file) as stream:
+            with source.opened(file) as stream:
                 table = np.loadtxt(stream, dtype=np.float64, ndmin=2, encoding="ascii")
     except ValueError as error:
         raise InputError(f"{file}: lines of row, column and value are expected: {error}") from error
@@ -222,7 +222,7 @@ class _Reader:
 def _cards(file: Path, depth: int = 0) -> Iterator[tuple[str, str]]:
     """Lines without comments, with file:line; included files where they are named."""
     try:
-        content = regular.content(file).decode("utf-8", "replace")
+        content = source.content(file).decode("utf-8", "replace")
     except InputError as error:
         raise InputError(f"{file}: cannot be read: {error}") from None
     for number, line in enumerate(content.splitlines(), start=1):

@@ -59,10 +59,12 @@ def truncation(structure: Structure, pose: Mapping[str, float]) -> Truncation | 
             f"{assembly.name}: all modes of {size} degrees of freedom would be needed; it is done up to "
             f"{MAX_MODES_IN_FULL}"
         )
-    corrected = solve(assembly, cutoff=structure.cutoff, damping=structure.damping, static_correction=True)
+    corrected = solve(
+        assembly, cutoff=structure.cutoff, damping=structure.damping, static_correction=True, described=False
+    )
     if not corrected.dropped:
         return None
-    full = solve(assembly, cutoff=math.inf, damping=structure.damping)
+    full = solve(assembly, cutoff=math.inf, damping=structure.damping, described=False)
     kept = len(corrected.modes.frequency) - corrected.corrections  # the pseudo-modes come last
     tables = {FULL: full.modes, REDUCED: _first(corrected.modes, kept), CORRECTED: corrected.modes}
     return Truncation(tables, structure.cutoff / (2 * math.pi))

@@ -501,6 +501,7 @@ def watching(quiet: bool) -> Iterator[TerminalWatch]:
         return
     from tqdm import tqdm
 
+    tqdm.monitor_interval = 0  # its thread would keep a process from being forked (foundation/parallel.py)
     with tqdm(unit_scale=True, leave=False, file=_plain_error()) as bar:
         yield TerminalWatch(bar, quiet)
 

@@ -348,8 +348,12 @@ class Replay(Closing):
         x_s, n_ffw = dict(program.x_s), dict(program.n_ffw)
         for axis, torque in self._torques.items():
             own, friction = machine.axes[axis], machine.shipped_friction(axis, "a replay from a torque at rest")
-            angle = run_in(friction, torque / scale - own.M_0, program.time / self.lead)
-            x_s[axis], n_ffw[axis] = x_s[axis] + own.I_P * angle, n_ffw[axis] + np.gradient(angle, T_pos)
+            # Behind the lead the angle stays: a point there, and one for the difference over it.
+            begin = int(np.searchsorted(program.time, self.lead)) + 2
+            angle = run_in(friction, torque / scale - own.M_0, program.time[:begin] / self.lead)
+            x_s[axis], n_ffw[axis] = x_s[axis] + own.I_P * angle[-1], n_ffw[axis] + 0.0
+            x_s[axis][:begin] = program.x_s[axis][:begin] + own.I_P * angle
+            n_ffw[axis][:begin] += np.gradient(angle, T_pos)
         return Program(program.time, x_s, n_ffw)
 
     def _planned(self, machine: Machine, T_pos: float) -> Program:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import hypot, pi
 from pathlib import Path
 
@@ -56,6 +57,7 @@ from feedsim.estimation.replay.tuning import decision, with_either
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.parallel import in_parallel
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.structure import checked_modes
 from feedsim.structure.modes import modes_text
@@ -292,26 +294,28 @@ def identify_drives(
     interval = next(iter(records.values())).record.interval
 
     def drives(cycle: float) -> tuple[dict[str, DriveFound], dict[str, str]]:
-        found, failed = {}, dict(refusals)
-        for axis, each in fitted.items():
-
-            def tell(what: str, done: int, total: int, axis: str = axis) -> None:
-                progress(f"{axis}: {what}", done, total)
-
-            begin = begins[axis]
+        def drive(axis: str, say: Callable[..., None]) -> DriveFound | str:
+            """Of one axis; or why it has none."""
+            each, begin = fitted[axis], begins[axis]
             if begin is not None:
                 begin = replace(begin, starts=[of_cycle(start, cycle, interval) for start in begin.starts])
             axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
-            with (
-                _refusing(axis, failed),
-                _begun(machine, name, note, axes, interval, cycle) as own,
-                Replay(own, {axis: each}, fmus=fmus) as replay,
-            ):
-                found[axis] = identify_drive(
-                    own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
-                    beside_cycle=_other(cycle, interval) if machine is None else None, modes=modes, progress=tell,
-                )  # fmt: skip
-        return found, failed
+            try:
+                with (
+                    _begun(machine, name, note, axes, interval, cycle) as own,
+                    Replay(own, {axis: each}, fmus=fmus) as replay,
+                ):
+                    return identify_drive(
+                        own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
+                        beside_cycle=_other(cycle, interval) if machine is None else None, modes=modes,
+                        progress=lambda what, done, total: say(f"{axis}: {what}", done, total),
+                    )  # fmt: skip
+            except InputError as error:
+                return str(error)
+
+        done = dict(zip(fitted, in_parallel([partial(drive, axis) for axis in fitted], progress), strict=True))
+        found = {axis: one for axis, one in done.items() if not isinstance(one, str)}
+        return found, dict(refusals) | {axis: one for axis, one in done.items() if isinstance(one, str)}
 
     # A drive that closes the position loop itself (DSC) does so in its own cycle; a control, in that of its rows.
     cycle = position_cycle or control_cycle(interval)
@@ -350,11 +354,11 @@ def identify_drives(
             files = machine_files(name, note, rigid, interval, cycle, control)
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
-        comparisons = [
-            replace(replayed(made[axis], {axis: each}, fmus, records)[axis], clipped=())
-            for axis, each in records.items()
-            if axis in found
-        ]
+
+        def comparison(axis: str, _: object) -> Comparison:
+            return replace(replayed(made[axis], {axis: records[axis]}, fmus, records)[axis], clipped=())
+
+        comparisons = in_parallel([partial(comparison, axis) for axis in records if axis in found])
     return DrivesFound(found, comparisons, files, outside, clipped, undecided, failed, limits_of_setpoints)
 
 

@@ -1,0 +1,93 @@
+"""Independent work in as many processes as there are cores, with the results of one.
+
+May use: nothing. Start reading at in_parallel().
+
+Processes are forked: they begin with all that this one has loaded, which takes milliseconds. What they compute is what
+this process would, bit for bit. Where forking is not safe (other systems than Linux, a process with several threads) or
+no core is free for it, the work is done here, one task after the other.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+Say = Callable[..., None]
+
+_state = {"forked": False}  # whether this process is one of those that work side by side
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def may_fork() -> bool:
+    """Whether tasks are worked side by side here."""
+    alone = sys.platform == "linux" and threading.active_count() == 1
+    return alone and not _state["forked"] and cores() > 1
+
+
+def in_parallel(tasks: Sequence[Callable[[Say], T]], say: Say = lambda *_: None) -> list[T]:
+    """The result of every task, in their order; the error of the first one that raises.
+
+    Args:
+        tasks: each is given what it may report to. What it changes of this process's objects may be lost; its result
+            and its reports can be pickled.
+        say: hears what tasks report.
+    """
+    count = min(cores(), len(tasks))
+    if count < 2 or not may_fork():
+        return [task(say) for task in tasks]
+    import multiprocessing
+    from multiprocessing.connection import Connection, wait
+
+    context = multiprocessing.get_context("fork")
+    ends: dict[Connection, Any] = {}
+    results: dict[int, tuple[bool, Any]] = {}
+    try:
+        for first in range(count):
+            here, there = context.Pipe(duplex=False)
+            process = context.Process(target=_work, args=(tasks, first, count, there), daemon=True)
+            process.start()
+            there.close()
+            ends[here] = process
+        while ends:
+            for end in wait(list(ends)):
+                assert isinstance(end, Connection)
+                try:
+                    number, content = end.recv()
+                except EOFError:
+                    ends.pop(end).join()
+                    continue
+                if number is None:
+                    say(*content)
+                else:
+                    results[number] = content
+    finally:
+        for process in ends.values():
+            process.terminate()
+        for process in ends.values():
+            process.join()
+    if missing := [k for k in range(len(tasks)) if k not in results]:
+        raise RuntimeError(f"{len(missing)} of {len(tasks)} tasks were not done: their process has ended")
+    for done, value in (results[k] for k in range(len(tasks))):
+        if not done:
+            raise value
+    return [results[k][1] for k in range(len(tasks))]
+
+
+def _work(tasks: Sequence[Callable[[Say], Any]], first: int, step: int, there: Any) -> None:
+    """Every `step`-th task from the `first` one on, in a process of its own."""
+    _state["forked"] = True
+    for k in range(first, len(tasks), step):
+        try:
+            content = True, tasks[k](lambda *words: there.send((None, words)))
+        except Exception as error:
+            content = False, error
+        there.send((k, content))
+    there.close()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +18,12 @@ const [file, asked] = process.argv.slice(2, 4).map(name => JSON.parse(require("f
 const plain = value => Array.from(value);
 work_of(file).then(async work => {
   const found = [];
-  for (const { state, axis, keep, frequency } of asked) {
+  for (const { state, axis, keep } of asked) {
     try {
-      if (frequency) {
-        const system = work.linear(state), loops = system.position_loops(frequency), gain = {}, drag = {};
-        for (const each of system.axes) {
-          gain[each] = system.position_reference(each, loops);
-          drag[each] = system.drag(each, loops);
-        }
-        found.push({ gain, drag, loops: await judge(work.linear(state, work.judged_plant), file.machine.locked) });
-        continue;
-      }
       const run = await work.run(state), trace = {};
       for (const name of keep || []) trace[name] = plain(run.trace[name]);
       const loop = axis ? await work.bode(state, axis) : null;
-      const causes = work.causes(state, run), warnings = await work.warnings(state, run);
-      found.push({ causes, figures: run.figures, warnings, trace, loop, segments: run.segments,
+      found.push({ figures: run.figures, warnings: run.warnings, trace, loop, segments: run.segments,
                    rows: keep ? plain(run.rows) : [] });
     } catch (error) { found.push({ problem: String(error.message || error) }); }
   }
@@ -43,10 +35,7 @@ work_of(file).then(async work => {
 
 
 def answers(data: dict[str, Any], asked: list[dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
-    """What the page's worker computes for states of its knobs: figures, warnings, columns to `keep`, `axis`'s loop.
-
-    With `frequency` [Hz]: its loops as judged, and x_a/x_s of the axes there, alone.
-    """
+    """What the page's worker computes for states of its knobs: figures, warnings, columns to `keep`, `axis`'s loop."""
     assert NODE is not None
     (folder / "data.json").write_text(json.dumps(data))
     (folder / "asked.json").write_text(json.dumps(asked))
@@ -56,3 +45,8 @@ def answers(data: dict[str, Any], asked: list[dict[str, Any]], folder: Path) -> 
     assert done.returncode == 0, done.stderr
     found: list[dict[str, Any]] = json.loads((folder / "found.json").read_text())
     return found
+
+
+def without_loops(warnings: Iterable[str]) -> list[str]:
+    """What a run warns of and a page does, too: a page does not judge loops, it has a frequency response."""
+    return sorted(str(text) for text in warnings if not re.match(r"axis \w+: the (speed|position) loop ", str(text)))

@@ -20,12 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.estimation.least_squares import student
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.installation import checkout
 from feedsim.foundation.units import Variable
-from feedsim.linear.judgement import SHOWS, judge, locked_modes
+from feedsim.linear.judgement import judge
 from feedsim.motions.circular import Circle, Circular
 from feedsim.motions.dwell import Dwell
 from feedsim.motions.move import Move, Straight
@@ -35,7 +34,6 @@ from feedsim.scenario.machine import Axis
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation.cosim import fmus_directory
 from feedsim.simulation.cosim.archive import Archive
-from feedsim.simulation.cosim.plant import plant_modes
 from feedsim.simulation.cosim.recording import LIMITS
 from feedsim.simulation.cosim.roles import controller_parameters
 from feedsim.simulation.cosim.system import plant_parameters
@@ -43,7 +41,7 @@ from feedsim.simulation.cosim.whole import open_whole, parameters
 from feedsim.simulation.judge import check as judged_ahead
 from feedsim.simulation.judge import control, exchange_stability, left_grid
 from feedsim.simulation.nc import Program
-from feedsim.structure import Modes, checked_modes
+from feedsim.structure import checked_modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
 from feedsim.structure.pose_change import LARGE_SHIFT, MIN_POSE_DISTANCE, over_axis, pose_change, warnings
 from feedsim.structure.poses import GridAxis, read_grid
@@ -427,12 +425,8 @@ def _steps(far: float, near: float) -> list[float]:
 # Longer runs take a phone more than a second or two at every turn of a knob.
 MAX_RUN_TIME = 60.0  # s
 MOST_CYCLES = 1_000_000
-# [1/s]: with no larger K_v does a page look closely at modes with the motors held.
-MOST_K_V = 1e4
 PER_AXIS = ("x_a", "n_a", "x_e", "M_a", "M_fr")
 TOOL_COLUMNS = ("tcp.x_X", "tcp.x_Y", "tcp.x_Z")
-# Of so many degrees of freedom and more, the page has a series for Student's quantile, as feedsim.analysis has.
-SERIES_FREEDOM = 20
 TYPE_LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b"}
 
 
@@ -519,41 +513,30 @@ def _machine(scenario: Scenario, archive: Archive) -> dict[str, Any]:
         "signs": {name: axis.display_sign for name, axis in machine.axes.items()},
         "feeds": [_reference(archive, f"{axis}.{name}")[0] for axis in axes for name in ("x_s", "n_ffw")],
         "every": round(scenario.recording.interval / cycles.T_c), "signals": signals, "flags": list(LIMITS),
-        "students": [student(free) for free in range(2, SERIES_FREEDOM)],
         "references": {name: _reference(archive, name) for name in names}, "longest": MAX_RUN_TIME,
     }  # fmt: skip
 
 
 def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path) -> dict[str, Any]:
-    """What the page needs to say what it warns of: modes, and what its knobs have nothing to do with."""
+    """What the page needs to say what it warns of, and what its knobs have nothing to do with."""
     machine, coupling = scenario.machine, scenario.coupling
-    modes, here = checked_modes(machine), plant_modes(machine)[0]
-    omega, damping, peak = (locked_mode.tolist() for locked_mode in locked_modes(machine, modes))
+    modes = checked_modes(machine)
     said = {
         *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
         *sentences(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
-    own = machine.plant is not None or machine.transmitted or machine.mounts  # not the modes that the unit holds
-    tables = {} if not own else {"table": _table(modes, machine), "pose": _table(here, machine)}
-    scheme = SCHEMES[coupling.scheme]
+    scheme, step = SCHEMES[coupling.scheme], machine.cycles.T_c / coupling.substeps
+    bounds = {name: scheme.stable_share * 2 * modes.J_inf(name) / step for name in machine.axes}
     # Judged is all friction of an axis, wherever it acts.
     friction = {f"{name}.friction.{key}": value for name, axis in machine.axes.items()
                 if axis.guide is not None and axis.guide.share
                 for key, value in machine.shipped_friction(name, "a page").parameters().items()}  # fmt: skip
     return {
-        "friction": friction, "reach": described(machine, program, resources), "modes": tables,
+        "friction": friction, "reach": described(machine, program, resources),
         "warnings": [str(warning) for warning in ahead],
-        "locked": [list(entry) for entry in zip(omega, damping, peak, strict=True) if MOST_K_V * entry[2] > SHOWS],
-        "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "substeps": coupling.substeps},
+        "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "bounds": bounds},
     }  # fmt: skip
-
-
-def _table(modes: Modes, machine: Machine) -> dict[str, Any]:
-    """Modes as the page has them from a table of its own."""
-    rows = {kind: [modes.ports[f"{kind}_{axis}"].tolist() for axis in machine.axes] for kind in ("n", "x")}
-    omega = (2 * np.pi * modes.frequency).tolist()
-    return {"omega_0": omega, "damping": modes.damping.tolist(), "rotor": rows["n"], "scale": rows["x"]}
 
 
 def _reference(archive: Archive, name: str) -> list[Any]:

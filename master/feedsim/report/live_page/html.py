@@ -20,6 +20,7 @@ from typing import Any
 
 from feedsim.analysis import CircleTask, Diagnosis, Figure, PositioningTask, evaluate, tasks
 from feedsim.analysis.circle import answer, swinging
+from feedsim.analysis.evaluate import cause_figures
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import InputError
 from feedsim.report.content import Picture, Table
@@ -33,10 +34,7 @@ from feedsim.simulation.judge import JudgedRun
 # --- The scripts and styles of a page: what computes, for a worker, and what shows, for the page itself ---------------
 
 
-COMPUTING = (
-    "packed.js", "unit.js", "plan.js", "figures.js", "algebra.js", "circle_model.js", "circle_diagnosis.js", "signs.js",
-    "circle_words.js", "linear.js", "judgement.js", "bode.js", "work.js",
-)  # fmt: skip
+COMPUTING = ("packed.js", "unit.js", "plan.js", "figures.js", "warnings.js", "bode.js", "work.js")
 SHOWING = ("packed.js", "figures.js", "signs.js", "pictures.js", "lessons.js", "page.js")
 
 
@@ -114,7 +112,7 @@ def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
     scenario, machine = run.scenario, run.scenario.machine
     shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
     moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
-    figures = evaluate(run)
+    figures = _computed(run, shown_tasks)
     planes = [list(task.turn.axes) for task in shown_tasks if isinstance(task, CircleTask)]
     data = contents.data | {
         "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
@@ -183,6 +181,13 @@ def _row(k: int, knob: Mapping[str, Any]) -> str:
     return f'<div class="knob" id="knob-{k}"><label for="value-{k}"><b>{name}</b> {about}</label>{control}{back}</div>'
 
 
+def _computed(run: JudgedRun, shown_tasks: Sequence[CircleTask | PositioningTask]) -> dict[str, Figure]:
+    """Figures that a page computes, too: without those of causes."""
+    causes = {task.prefix: task.diagnosis(run.trace) for task in shown_tasks if isinstance(task, CircleTask)}
+    left_out = {f"{prefix}.{name}" for prefix, found in causes.items() if found for name in cause_figures(found)}
+    return {name: figure for name, figure in evaluate(run).items() if name not in left_out}
+
+
 def _pictures(run: JudgedRun, shown: Sequence[CircleTask | PositioningTask]) -> Iterable[str]:
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     for task in shown:
@@ -207,7 +212,7 @@ def _slug(prefix: str) -> str:
 
 
 def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
-    """Why a circle is not round: the answer, and a row for every cause."""
+    """Why a circle is not round, of the scenario as written: the answer, and a row for every cause."""
     table = next(part for part in diagnosis_section(prefix, diagnosis).parts if isinstance(part, Table))
     kinds = {"l": "", "r": ' class="number"', "p": ' class="meaning"'}
     marks = [kinds[letter] for letter in table.columns]
@@ -219,8 +224,8 @@ def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
     words = typeset(" ".join(filter(None, [answer(diagnosis), swinging(diagnosis)])))
     return (
         f'<section id="why-{end}" aria-labelledby="why-head-{end}"><h2 id="why-head-{end}">{escape(prefix)}: why the '
-        f'circle is not round</h2><p class="answer">{escape(words[:1].upper() + words[1:])}</p><details><summary>All '
-        'causes, their amounts and shares</summary><div class="scroll"><table>'
+        f'circle is not round, as written</h2><p class="answer">{escape(words[:1].upper() + words[1:])}</p>'
+        '<details><summary>All causes, their amounts and shares</summary><div class="scroll"><table>'
         f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div></details></section>"
     )
 
@@ -240,11 +245,7 @@ def _keys(shown_tasks: Sequence[CircleTask | PositioningTask], figures: Mapping[
     for task in shown_tasks:
         if isinstance(task, CircleTask):
             words = {"G": "circular deviation G"}
-            for axis in task.turn.axes:  # the one height of a peak on a page, where a diagnosis has it
-                known = f"{task.prefix}.peak_{axis}" in figures
-                words[f"{'peak' if known else 'glitch'}_{axis}"] = (
-                    f"reversal peak of {axis}" if known else f"quadrant glitch where {axis} reverses"
-                )
+            words |= {f"glitch_{axis}": f"quadrant glitch where {axis} reverses" for axis in task.turn.axes}
             words |= {"G_b": "G(b), both directions"} if task.back is not None else {}
         else:
             axis = task.approach.axis

@@ -205,6 +205,35 @@ function circularity(trace, turn) {
   return result;
 }
 
+// ISO 230-4's figures of two turns in opposite senses, about the centre of the circle fitted to both.
+const ANGLES = 720, spread_of = values => largest(values) - least(values);
+const concatenated = parts => { const result = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0)); let at = 0; for (const part of parts) { result.set(part, at); at += part.length; } return result; };
+function bidirectional(trace, turn, back) {
+  const turns = [turn, back].map(entry => contour(trace, entry)), [p, q] = fitted_centre({ angle: concatenated(turns.map(entry => entry.angle)), deviation: concatenated(turns.map(entry => entry.deviation)) }, turn.radius);
+  const around = turns.map(({ angle, deviation }) => {
+    const x = angle.map((entry, k) => (turn.radius + deviation[k]) * Math.cos(entry) - p), y = angle.map((entry, k) => (turn.radius + deviation[k]) * Math.sin(entry) - q);
+    return { angle: x.map((entry, k) => Math.atan2(y[k], entry)), deviation: x.map((entry, k) => length_of(entry, y[k]) - turn.radius) };
+  });
+  const even = Float64Array.from({ length: ANGLES }, (_, k) => k * (2 * Math.PI / ANGLES) - Math.PI), [there, again] = around.map(({ angle, deviation }) => {
+    const order = Array.from(angle.keys()).sort((a, b) => angle[a] - angle[b]);
+    return interpolated(even, order.map(k => angle[k]), order.map(k => deviation[k]), 2 * Math.PI);
+  }), um = value => [value * 1e6, "um"];
+  return { G_b: um(spread_of(concatenated(around.map(entry => entry.deviation)))), D: um((mean(there) + mean(again)) / 2), H: um(largest(there.map((entry, k) => Math.abs(entry - again[k])))) };
+}
+
+// Linear between points with ascending x; level beyond their ends, or repeated with a period.
+function interpolated(wanted, x, y, period = 0) {
+  const n = x.length, X = period ? [x[n - 1] - period, ...x, x[0] + period] : x, Y = period ? [y[n - 1], ...y, y[0]] : y;
+  let k = 0;
+  return Float64Array.from(wanted, at => {
+    if (k && at < X[k]) k = 0;
+    while (k + 2 < X.length && at >= X[k + 1]) k++;
+    if (at <= X[0]) return Y[0];
+    if (at >= X[X.length - 1]) return Y[Y.length - 1];
+    return Y[k] + (Y[k + 1] - Y[k]) / (X[k + 1] - X[k]) * (at - X[k]);
+  });
+}
+
 // --- all that the scenario asks for -----------------------------------------------------------------------------------
 
 function tasks_of(evaluate, segments, duration) {
@@ -227,33 +256,6 @@ function figures_of(trace, tasks) {
       for (const [name, figure] of Object.entries(circularity(trace, task.back))) own[`clockwise.${name}`] = figure;
     }
     for (const name in own) result[`${task.prefix}.${name}`] = own[name];
-  }
-  return result;
-}
-
-// Why circles are not round: of every one its cause figures, what was found, and in words. known: see diagnosed().
-function causes_of(trace, tasks, figures, known) {
-  const result = {};
-  for (const { kind, prefix, turn, back } of tasks) {
-    const diagnosis = kind === "circle" ? diagnosed(trace, back ? [turn, back] : [turn], known) : null;
-    if (!diagnosis) continue;
-    const own = Object.fromEntries(Object.entries(figures).filter(([name]) => name.startsWith(`${prefix}.`)).map(([name, figure]) => [name.slice(prefix.length + 1), figure]));
-    result[prefix] = {
-      figures: Object.fromEntries(Object.entries(cause_figures(diagnosis)).map(([name, figure]) => [`${prefix}.${name}`, figure])), answer: answer_of(diagnosis), swinging: swinging_words(diagnosis),
-      rows: diagnosis.terms.map(term => cause_row(diagnosis, term)),
-      peaks: diagnosis.peaks.map(({ name, sense, height }) => ({ name, sense, height })),
-      doubts: misleading(diagnosis, own).map(sentence => `${prefix}: ${sentence}`),
-    };
-  }
-  return result;
-}
-
-// What a run's own limits tell a reader to doubt, in the words of feedsim run (feedsim.simulation.judge).
-function limit_warnings(machine, trace) {
-  const result = [], percent = value => general(value, 2);
-  for (const axis of machine.axes) for (const limit of machine.flags) {
-    const flags = trace[`${axis}.${limit}`], share = flags.reduce((sum, entry) => sum + (entry ? 1 : 0), 0) / flags.length;
-    if (share > 0) result.push(`axis ${axis}: ${limit.replace("_", " ")} in ${percent(100 * share)} % of the recorded instants`);
   }
   return result;
 }

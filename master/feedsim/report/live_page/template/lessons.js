@@ -2,11 +2,10 @@
 const circle_of = held => held.evaluate.find(entry => entry.kind === "circle") && held.plane, stop_axis = held => (held.evaluate.find(entry => entry.kind === "positioning") || {}).axis;
 const key_of = (axis, name) => `machine.axes.${axis}.${name}`;
 const has = (held, axes, names) => axes.every(axis => names.every(name => held.knobs.some(knob => knob.key === key_of(axis, name))));
-// null while the figure is not known: causes come after the pictures.
 const figure_of = (view, end) => { const name = Object.keys(view.result.figures).find(entry => entry.endsWith(end) && !entry.includes("tool.") && !entry.includes("clockwise.")); return name ? view.result.figures[name][0] : null; };
 const COMPENSATION = "drive.backlash_compensation.value";
 const written_of = (held, end) => held.written[Object.keys(held.written).find(entry => entry.endsWith(end))][0];
-const um = value => value === null ? "…" : `${value.toFixed(1)} µm`;
+const um = value => `${value.toFixed(1)} µm`;
 
 // Of a turn: half the difference of its radii at 45° and 135°, what axes of unequal delay make.
 function oblique({ result }) {
@@ -32,8 +31,8 @@ const LESSONS = [
     turn: held => ["F_C", "F_S", "sigma_0"].map(name => key_of(held.plane[1], `friction.${name}`)),
     text: ({ plane: [, b] }) => [`Where ${b} reverses, its friction changes sign. The drive needs a moment to turn its torque over; meanwhile the axis stands, and the contour leaves the circle.`,
       `Halve the friction of ${b} (F_C, then F_S) and see what becomes of the glitch. Then put it back and make the bristles softer (sigma_0): the change of sign takes a longer way.`],
-    look: (held, view) => { const at = figure_of(view, `.peak_${held.plane[1]}`), first = written_of(held, `.peak_${held.plane[1]}`);
-      return { done: at !== null && at < 0.6 * first, text: `The peak where ${held.plane[1]} reverses is ${um(at)} high, at first ${um(first)}.` }; },
+    look: (held, view) => { const at = figure_of(view, `.glitch_${held.plane[1]}`), first = written_of(held, `.glitch_${held.plane[1]}`);
+      return { done: at < 0.6 * first, text: `The glitch where ${held.plane[1]} reverses is ${um(at)} high, at first ${um(first)}.` }; },
     after: "Less friction to turn over, a smaller glitch. On a real machine friction is what it is: the last lesson turns the drive.",
   },
   {
@@ -42,9 +41,9 @@ const LESSONS = [
     start: held => ({ [key_of(held.plane[1], COMPENSATION)]: 10e-6 }),
     turn: held => [key_of(held.plane[1], COMPENSATION)],
     text: ({ plane: [, b] }) => [`Somebody has seen a glitch where ${b} reverses and taken it for backlash: the control now adds half of 10 µm to the setpoint of ${b}, with the direction of its motion. The figure glitch_${b} has become smaller.`,
-      `But look at the contour beside the reversals, and at what the diagnosis says: the axis does not lose motion there, it gains it, and G is larger than without. Turn the backlash compensation of ${b} back until no motion is gained.`],
-    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `.lost_motion_${b}`), G = um(figure_of(view, ".G")), glitch = um(figure_of(view, `.glitch_${b}`));
-      return { done: at !== null && Math.abs(at) < 1, text: `glitch_${b} ${glitch}, G ${G}${at === null ? "" : `, ${b} ${at > 0 ? "loses" : "gains"} ${um(Math.abs(at))}`}.` }; },
+      `But look at the contour beside the reversals, and at G: the axis gains motion there that it has never lost, and G is larger than without. Turn the backlash compensation of ${b} back until G is as small as it was.`],
+    look: (held, view) => { const b = held.plane[1], at = figure_of(view, ".G"), first = written_of(held, ".G");
+      return { done: at < 1.02 * first, text: `glitch_${b} ${um(figure_of(view, `.glitch_${b}`))}, G ${um(at)}; without compensation G is ${um(first)}.` }; },
     after: "A compensation takes away what it is made for. Friction needs one of its own (docs/tuning.md), and too much of that dents the contour just so.",
   },
   {
@@ -64,10 +63,10 @@ const LESSONS = [
     turn: held => ["K_v", "K_p", "T_n"].map(name => key_of(held.plane[1], `drive.${name}`)),
     text: ({ plane: [, b] }) => [`A stiffer drive turns its torque over sooner: K_v and K_p of ${b} up, T_n down, and the glitch shrinks. The open position loop below shows what that costs.`,
       `Bring the glitch of ${b} to two thirds, and keep 6 dB and 30° of margin.`],
-    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `.peak_${b}`), first = written_of(held, `.peak_${b}`), { loop } = view;
-      if (!loop || loop.axis !== b || !loop.frequency.length) return { done: false, text: `The peak where ${b} reverses is ${um(at)} high; show the frequency response of ${b} to see its margins.` };
+    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `.glitch_${b}`), first = written_of(held, `.glitch_${b}`), { loop } = view;
+      if (!loop || loop.axis !== b || !loop.frequency.length) return { done: false, text: `The glitch where ${b} reverses is ${um(at)} high; show the frequency response of ${b} to see its margins.` };
       const dB = 20 * Math.log10(loop.gain_margin), kept = !loop.growing && dB >= 6 && loop.phase_margin >= 30;
-      return { done: kept && at !== null && at < 0.667 * first, text: `The peak where ${b} reverses is ${um(at)} high, at first ${um(first)}; margins ${dB.toFixed(1)} dB and ${loop.phase_margin.toFixed(0)}°${kept ? "" : ": too little"}.` }; },
+      return { done: kept && at < 0.667 * first, text: `The glitch where ${b} reverses is ${um(at)} high, at first ${um(first)}; margins ${dB.toFixed(1)} dB and ${loop.phase_margin.toFixed(0)}°${kept ? "" : ": too little"}.` }; },
     after: "The margin is of this structure and this pose. Elsewhere the machine may be softer: docs/position-dependence.md.",
   },
 ];

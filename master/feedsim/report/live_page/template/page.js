@@ -1,7 +1,7 @@
 // The page: knobs, states, what the worker answers, figures, exports. Charts are made by pictures.js and drawn as in reports.
 const HELD = JSON.parse(document.getElementById("feedsim-page").textContent), KNOBS = HELD.knobs;
 const by = id => document.getElementById(id), START = KNOBS.map(knob => knob.value);
-const view = { state: [...START], undo: [], redo: [], result: null, causes: {}, loop: null, kept: null, kept_loop: null, lesson: null, step: 0 };
+const view = { state: [...START], undo: [], redo: [], result: null, loop: null, kept: null, kept_loop: null, lesson: null, step: 0 };
 const STEPS = 400; // of a slider
 
 // --- values -------------------------------------------------------------------------------------------------------------
@@ -39,21 +39,6 @@ function answered({ data }) {
   if (data.id !== asked) return;
   if (data.share !== undefined) { by("progress").value = data.share; return; }
   by("progress").value = 1;
-  if (data.causes) {
-    view.causes = data.causes;
-    for (const entry of Object.values(data.causes)) Object.assign(view.result.figures, entry.figures);
-    show_causes();
-    for (const task of view.result.tasks) if (data.causes[task.prefix]) draw_chart(`contour-${slug(task.prefix)}`, contour_now(task));
-    show_figures();
-    lesson_look();
-    return;
-  }
-  if (data.warnings) {
-    view.result.warnings = data.warnings;
-    show_warnings();
-    document.documentElement.dataset.warned = String(asked);
-    return;
-  }
   if (data.loop) {
     view.loop = data.loop;
     show_loop();
@@ -67,9 +52,7 @@ function answered({ data }) {
     document.documentElement.dataset.shown = String(asked);
   } else {
     view.result = data.result;
-    view.causes = null;
-    for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.add("stale");
-    by("warned").classList.add("stale");
+    for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.toggle("stale", changed().length > 0);
     show();
   }
   if (again) ask();
@@ -128,7 +111,7 @@ function draw_on() {
 
 // A kept state, where it has the circles and stops of the present one.
 const comparable = () => view.kept && view.kept.tasks.map(entry => entry.prefix).join() === view.result.tasks.map(entry => entry.prefix).join() ? view.kept : null;
-const contour_now = task => contour_chart(task, view.result, comparable(), view.causes?.[task.prefix]?.peaks);
+const contour_now = task => contour_chart(task, view.result, comparable());
 
 function show() {
   tell("");
@@ -144,11 +127,13 @@ function show() {
   drawing = asked;
   draw_on();
   show_figures();
+  show_warnings();
   lesson_look();
 }
 
 function show_loop() {
   const { loop } = view, { axis } = loop;
+  show_warnings();
   if (!loop.frequency.length) by("margins").textContent = loop.problem || `The loops of axis ${axis} are unstable with any K_v tried: there is no frequency response to show.`;
   else {
     draw_chart("bode", bode_chart(loop, view.kept_loop && view.kept_loop.axis === axis ? view.kept_loop : null));
@@ -159,35 +144,14 @@ function show_loop() {
 }
 
 function show_warnings() {
-  const list = view.result ? view.result.warnings.map(typeset) : [];
+  const { result, loop } = view, grows = loop && loop.growing ? [`axis ${loop.axis}: its loops are unstable with these values: what an impulse leaves grows`] : [];
+  const list = [...grows, ...(result ? result.warnings : [])].map(typeset);
   by("warnings").replaceChildren(...list.map(text => { const item = document.createElement("li"); item.textContent = text; return item; }));
   by("warned").hidden = !list.length;
-  by("warned").classList.remove("stale");
 }
 
 const three_digits = (value, unit) => Number.isFinite(value) ? `${three(value)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
 const four = (value, unit) => Number.isFinite(value) ? `${number(value, 4)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
-
-// Of every circle why it is not round, once that is known.
-function show_causes() {
-  for (const [prefix, { answer, swinging, rows }] of Object.entries(view.causes)) {
-    const section = by(`why-${slug(prefix)}`);
-    if (!section) continue;
-    section.querySelector(".answer").textContent = typeset([answer[0].toUpperCase() + answer.slice(1), swinging].filter(entry => entry).join(" "));
-    section.querySelector("tbody").replaceChildren(...rows.map(cells => {
-      const row = document.createElement("tr");
-      cells.forEach((text, k) => element("td", { class: ["", "number", "number", "number", "meaning"][k] }, row, text));
-      return row;
-    }));
-  }
-  for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.toggle("stale", !Object.keys(view.causes).some(prefix => section.id === `why-${slug(prefix)}`));
-}
-
-// Names of figures in the order of a run: those of causes, which come later, behind those of their circle.
-function figure_names({ figures, tasks }) {
-  const known = [...new Set([...Object.keys(figures), ...(view.causes ? [] : Object.keys(HELD.written))])];
-  return tasks.flatMap(({ prefix }) => known.filter(name => name.startsWith(`${prefix}.`)));
-}
 
 // Rows stay as long as their names and columns do: only what has changed is written.
 function show_figures() {
@@ -197,7 +161,7 @@ function show_figures() {
     tile.querySelector("small").textContent = `as written ${three_digits(...written)}`;
     tile.classList.toggle("changed", Boolean(figure) && three_digits(...figure) !== three_digits(...written));
   }
-  const { result, kept } = view, heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"], names = figure_names(result), table = by("figures"), body = table.tBodies[0];
+  const { result, kept } = view, heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"], names = Object.keys(result.figures), table = by("figures"), body = table.tBodies[0];
   const text = figures => name => figures[name] ? four(...figures[name]) : "–", columns = [name => result.figures[name] ? four(...result.figures[name]) : null, ...(kept ? [text(kept.figures)] : []), text(HELD.written)];
   const layout = [...heads, ...names].join("\n");
   if (table.dataset.layout !== layout) {

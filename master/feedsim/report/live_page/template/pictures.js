@@ -37,10 +37,8 @@ function ring_step(most) {
   return [1, 2, 5, 10].map(entry => entry * decade).find(entry => Math.max(most, 0.1) <= 1.5 * entry);
 }
 
-const HIGHER = 10e-9; // m; a peak that is higher by less has the same height for a reader
-
-// peaks: heights over the fitted rest of the circle, once they are known; until then the marks carry no number.
-function contour_chart(task, result, kept, peaks) {
+// The height at a reversal is the figure glitch_X+ and so on, the larger one where both directions are driven.
+function contour_chart(task, result, kept) {
   const { turn, back } = task, seen = contour(result.trace, turn), curves = [], unrolled = [];
   const draw = (name, measured, colour, look = {}) => {
     const y = measured.deviation.map(entry => entry * 1e6), degrees = measured.angle.map(entry => modulo(entry * 180 / Math.PI, 360));
@@ -55,15 +53,11 @@ function contour_chart(task, result, kept, peaks) {
   draw(words(turn.sense), seen, hue(turn.sense), { width: 1.6 });
   if (back) draw(words(back.sense), contour(result.trace, back), hue(back.sense), { dash: "dashed", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
-  // The height is that of the figures, the larger of the two directions; its place is in the first turn, unless that of the other is higher.
-  const glitches = new Map([turn, ...back ? [back] : []].map(entry => [entry.sense, contour(result.trace, entry).glitches]));
   const marks = seen.glitches.map(({ name, angle, deviation }, quarter) => {
     // The largest deviation at the border of its quadrant is the shape's, no peak behind a reversal.
     if (Math.abs(modulo(angle - quarter * Math.PI / 2 + Math.PI, 2 * Math.PI) - Math.PI) > 40 / 180 * Math.PI) return null;
-    if (!peaks) return mark(angle, deviation * 1e6, "");
-    const own = peaks.filter(entry => entry.name === name), highest = less => own.reduce((best, entry) => Math.abs(entry.height) - less(entry) > Math.abs(best.height) - less(best) ? entry : best);
-    const { height } = highest(() => 0), place = glitches.get(highest(entry => entry.sense === turn.sense ? 0 : HIGHER).sense).find(entry => entry.name === name);
-    return height && mark(place.angle, place.deviation * 1e6, `${name.replace("-", "−")}: ${fixed(height * 1e6, 2)} µm`);
+    const directions = [contour(result.trace, turn), ...back ? [contour(result.trace, back)] : []], height = largest(directions.map(entry => entry.glitches.find(other => other.name === name).height));
+    return mark(angle, deviation * 1e6, `${name.replace("-", "−")}: ${fixed(height * 1e6, 2)} µm`);
   }).filter(Boolean);
   return { widths: [1.2, 1], panels: [
     { kind: "polar", title: `Contour error, ${turn.axes.join("-")}, R ${number(turn.radius * 1e3)} mm`, axes: turn.axes, radius: turn.radius * 1e3, ring, rings: most < 1.1 * ring ? 1 : 2, curves, marks,

@@ -22,11 +22,6 @@ onmessage = async ({ data: asked }) => {
     const result = await work.run(state, on);
     if (!result) return;
     postMessage({ id, result });
-    if (!(await latest())) return;
-    postMessage({ id, causes: work.causes(state, result) });
-    const warnings = await work.warnings(state, result, latest);
-    if (!warnings) return;
-    postMessage({ id, warnings });
   } catch (error) { postMessage({ id, problem: String(error.message || error) }); }
   if (!axis || !(await latest())) return;
   try {

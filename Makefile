@@ -92,7 +92,7 @@ $(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h src/machine_
 	$(PY) -m feedsim_packager variables --out $@
 
 # The native cycle loop and the path planner lie beside the archives.
-LIBRARY := $(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
+LIBRARY := $(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,$(if $(filter aarch64,$(shell uname -m)),-aarch64).so))
 LIBRARIES := exchange$(LIBRARY) planner$(LIBRARY)
 
 fmus: $(LIBRARIES:%=fmus/%)
@@ -143,7 +143,7 @@ $(foreach unit,$(UNITS),$(eval fmus/$(unit).fmu $(BUILD)/fmus-all/$(unit).fmu: \
 
 # Made anew they are the same, byte for byte.
 DIST := dist
-release: docs $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheels, source archive, archives in one file, bill of materials and sums, into dist/
+release: docs $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheel, source archive, archives in one file, bill of materials and sums, into dist/
 	PYTHONPATH=src/distribution $(PY) -m feedsim_distribution.release --archives $(BUILD)/fmus-all --site $(BUILD)/site --out $(DIST)
 
 # --- run -----------------------------------------------------------------------------------------------------------

@@ -102,7 +102,8 @@ def _main(given: Sequence[str]) -> int:
             sys.stdout.flush()
         return code
     except FeedsimError as error:
-        _say(_kind_meant(command, options) if error.exit_code == 2 else "", error)
+        wrong_kind = error.exit_code == 2 and not command.missing_file(options)
+        _say(_kind_meant(command, options) if wrong_kind else "", error)
         return _code(command, error.exit_code)
     except ModuleNotFoundError as error:
         if (missing_package := missing(error, options.called)) is None:

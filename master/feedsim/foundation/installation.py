@@ -63,7 +63,7 @@ def mend(what: str) -> str:
     """What to do where `what` (such as "the archives") is missing or does not fit."""
     if checkout():
         return f"`make fmus` builds {what}"
-    return f"installing feedsim anew, from the wheel for this platform, brings {what} along"
+    return f"installing feedsim anew brings {what} along"
 
 
 # --- Packages that only some of the work needs: what is said where one is missing -------------------------------------
@@ -141,7 +141,10 @@ def _told(what: str, lacking: Iterable[str], extras: Iterable[str]) -> MissingPa
 # May use: installation. Start reading at library().
 
 
+# A wheel holds those of all platforms, of Linux for two processors.
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+if hasattr(os, "uname") and (sys.platform, os.uname().machine) == ("linux", "aarch64"):
+    _SUFFIX = "-aarch64.so"
 
 # By name and SHA-256 of the file: each study lays out a copy of its own, and what is loaded stays until the end.
 _loaded: dict[tuple[str, bytes], ctypes.CDLL] = {}

@@ -1,8 +1,8 @@
 """What pip calls (PEP 517): wheels and the source archive. An editable installation is left to setuptools.
 
 Without a setting a wheel is for this machine, by its own compiler or, where it has none, by zig from PyPI.
-`--config-settings platform=win64` makes the one for another platform, with archives for all, by zig;
-`--config-settings archives=DIR` takes those archives as they are.
+`--config-settings platform=any` makes the one for all platforms, by zig; with `--config-settings archives=DIR` it takes
+archives for all as they are.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from setuptools.build_meta import (
 )
 
 from feedsim_packager import toolchain
-from feedsim_packager.errors import CompilerError
+from feedsim_packager.errors import CompilerError, InputError
 
 from . import sdist, shipped, wheel
 from .project import configuration
@@ -57,11 +57,13 @@ def build_sdist(sdist_directory: str, config_settings: Settings = None) -> str:
 
 
 def build_wheel(wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None) -> str:
-    """A wheel, for this machine or the platform that is asked for."""
+    """A wheel, for this machine or all platforms."""
     asked = config_settings or {}
     if platform := asked.get("platform"):
+        if platform != shipped.ANY:
+            raise InputError(f"platform {platform}: no wheel is made for it; there is {shipped.ANY}, for all platforms")
         archives = Path(asked["archives"]) if "archives" in asked else None
-        made = shipped.for_platform(platform, shipped.zig(), archives)
+        made = shipped.for_every_machine(shipped.zig(), archives)
     else:
         made = shipped.for_this_machine(toolchain.find_compiler())
     return wheel.write(Path(wheel_directory), made)

@@ -54,11 +54,10 @@ def _lines() -> Iterator[str]:
     yield "Description-Content-Type: text/markdown"
 
 
-def wheel(platforms: str) -> str:
-    """WHEEL, of a wheel for platforms as its file name has them."""
-    tags = "".join(f"Tag: py3-none-{platform}\n" for platform in platforms.split("."))
-    pure = str(platforms == "any").lower()
-    return f"Wheel-Version: 1.0\nGenerator: {GENERATOR}\nRoot-Is-Purelib: {pure}\n{tags}"
+def wheel(platform: str) -> str:
+    """WHEEL, of a wheel for a platform as its file name has it."""
+    pure = str(platform == "any").lower()
+    return f"Wheel-Version: 1.0\nGenerator: {GENERATOR}\nRoot-Is-Purelib: {pure}\nTag: py3-none-{platform}\n"
 
 
 def entry_points() -> str:

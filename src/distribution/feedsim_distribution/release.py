@@ -1,6 +1,6 @@
 """Everything that is handed out of a version: ``python -m feedsim_distribution.release`` (make release).
 
-Wheels for all platforms, the source archive, the archives for other simulators in one file, the section of the
+The wheel, the source archive, the archives for other simulators in one file, the section of the
 changelog, a bill of materials, the packages that a wheel needs with their hashes, and SHA-256 sums over all of them.
 The same sources give the same bytes.
 """
@@ -49,10 +49,7 @@ def write(folder: Path, archives: Path, site: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     version = str(table()["version"])
     notes = _notes(version)
-    names = [
-        wheel.write(folder, shipped.for_platform(platform, shipped.zig(), archives, site)) for platform in _platforms()
-    ]
-    names.append(sdist.write(folder))
+    names = [wheel.write(folder, shipped.for_every_machine(shipped.zig(), archives, site)), sdist.write(folder)]
     made = {
         f"feedsim-fmus-{version}.zip": _units(archives, version),
         f"feedsim-{version}.cdx.json": sbom.describe(),
@@ -64,10 +61,6 @@ def write(folder: Path, archives: Path, site: Path) -> list[Path]:
     written = sorted(folder / name for name in (*names, *made))
     archive.write(folder / SUMS, _sums({path.name: path.read_bytes() for path in written}))
     return [*written, folder / SUMS]
-
-
-def _platforms() -> tuple[str, ...]:
-    return (*shipped.TAGS, shipped.ANY)
 
 
 def _units(archives: Path, version: str) -> bytes:

@@ -15,19 +15,14 @@ from .project import PROJECT, files
 
 PLACE = "feedsim/shipped/"  # where feedsim.foundation.installation looks
 SCENARIOS = "scenarios"
-# Folder under binaries/ -> what pip calls a platform that such a binary runs on. glibc 2.17 and macOS 11 as in targets.
-TAGS = {
-    "linux64": "manylinux_2_17_x86_64.manylinux2014_x86_64",
-    "aarch64-linux": "manylinux_2_17_aarch64.manylinux2014_aarch64",
-    "win64": "win_amd64",
-    "darwin64": "macosx_11_0_universal2",
-}
+# Whose native libraries the wheel of all platforms holds: of each, the file that its machines look for.
+PLATFORMS = ("linux64", "aarch64-linux", "win64", "darwin64")
 ANY = "any"
 
 
 @dataclass(frozen=True)
 class Shipped:
-    """Files by their paths in the wheel, and the platforms that pip may install them on."""
+    """Files by their paths in the wheel, and the platform that pip may install them on, as a file name has it."""
 
     files: dict[str, bytes]
     platform: str
@@ -39,17 +34,16 @@ def for_this_machine(compiler: Sequence[str]) -> Shipped:
     return Shipped(_archives(compiler, None) | _libraries(compiler, None) | _page(None) | _plain(compiler), tag)
 
 
-def for_platform(name: str, compiler: Sequence[str], archives: Path | None = None, site: Path | None = None) -> Shipped:
-    """For another machine, by zig: archives for all platforms, native libraries for one, or none at all for "any".
+def for_every_machine(compiler: Sequence[str], archives: Path | None = None, site: Path | None = None) -> Shipped:
+    """By zig: archives and native libraries for all platforms.
 
     archives: folder that has them already, for all platforms. site: folder of the documentation that `make docs` built.
     """
-    if name not in (*TAGS, ANY):
-        raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
     units = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
-    libraries = {} if name == ANY else _libraries(compiler, targets.ALL[name])
+    for name in PLATFORMS:
+        units |= _libraries(compiler, targets.ALL[name])
     page = _page(zig_for_pages())
-    return Shipped(units | libraries | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
+    return Shipped(units | page | _documentation(site) | _plain(compiler), ANY)
 
 
 def _documentation(site: Path | None) -> dict[str, bytes]:

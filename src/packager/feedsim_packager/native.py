@@ -35,7 +35,7 @@ def build(name: str, folder: Path, compiler: Sequence[str], target: Target | Non
     wanted = target or compile.host_target()
     files, functions = LIBRARIES[name]
     with tempfile.TemporaryDirectory(dir=folder, prefix=f".{name}-") as scratch:
-        fresh = Path(scratch) / f"{name}{wanted.suffix}"
+        fresh = Path(scratch) / f"{name}{wanted.ending}"
         compile.shared_library(
             name, SOURCES / name, files, fresh, compiler, wanted, functions, for_others=target is not None,
             extra=shlex.split(os.environ.get(compile.EXTRA_FLAGS, "")),

@@ -21,6 +21,11 @@ class Target:
     suffix: str
     zig: tuple[str, ...]
 
+    @property
+    def ending(self) -> str:
+        """Of a library that lies beside those of all platforms: Linux has two, whose suffix is the same."""
+        return f"-aarch64{self.suffix}" if self.folder == "aarch64-linux" else self.suffix
+
 
 _MAC_X86_64 = f"x86_64-macos.{OLDEST_MACOS}"
 _MAC_ARM64 = f"aarch64-macos.{OLDEST_MACOS}"

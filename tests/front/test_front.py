@@ -162,7 +162,10 @@ def test_figures_are_a_table(circle: fs.Result) -> None:
     frame = circle.figures.to_pandas()
     assert list(frame.columns) == ["value", "unit", "low", "high", "meaning"]
     assert frame.loc["XZ.G", "value"] == circle.figures["XZ.G"].value
-    assert np.isnan(frame["low"]).all()
+    assert np.isnan(frame.loc["XZ.G", "low"])
+    mismatch = frame.loc["XZ.servo_mismatch"]
+    half = next(term.half for term in circle.causes["XZ"].terms if term.key == "servo")
+    assert (mismatch["high"] - mismatch["low"]) == pytest.approx(2e3 * half, rel=1e-9)  # s, ms
     known = circle.figures.with_intervals({"XZ.G": (8.0, 8.4), "none": (0.0, 1.0), "XZ.H": (math.nan, math.nan)})
     assert known.to_pandas().loc["XZ.G", ["low", "high"]].tolist() == [8.0, 8.4]
     assert known["XZ.H"] == circle.figures["XZ.H"]

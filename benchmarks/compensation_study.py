@@ -23,7 +23,6 @@ import yaml
 
 import feedsim as fs
 from feedsim.design.tune.compensators import COMPENSATOR_KINDS
-from feedsim.jobs.tune_compensation import TuneCompensationResult
 from feedsim.structure.modes import Modes, write_modes
 
 CIRCLE = Path(__file__).resolve().parents[1] / "scenarios" / "xz_circle.yaml"
@@ -175,7 +174,7 @@ def scenarios(folder: Path, names: list[str]) -> Iterator[tuple[str, Path]]:
             yield name, written(MACHINES[name], own)
 
 
-def row(name: str, kind: str, result: TuneCompensationResult, taken: float) -> str:
+def row(name: str, kind: str, result: fs.Result, taken: float) -> str:
     """Median and least reduction [%] of the error and of what friction makes of it, the latter on changed machines."""
     found = {key: float(figure) for key, figure in result.figures.items()}
 

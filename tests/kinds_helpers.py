@@ -7,11 +7,10 @@ from pathlib import Path
 from command_helpers import feedsim
 from feedsim.analysis import evaluate
 from feedsim.foundation.arguments import Call, calling
-from feedsim.jobs.identify import IdentifyResult
+from feedsim.jobs.identify import result_of
 from feedsim.jobs.parameters import command_line
-from feedsim.report import run as report
 from identification_helpers import identified
-from report_helpers import circle_run, positioning_run
+from report_helpers import circle_run, positioning_run, write_run
 from ssp_helpers import short_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
@@ -75,11 +74,11 @@ class Kinds:
             return place
         if kind == "identify":
             with calling(Call({}, command_line)):
-                IdentifyResult(identified()).save(place)
+                result_of(identified()).save(place)
         elif kind in ("circle", "stop"):
             run = circle_run() if kind == "circle" else positioning_run()
             with calling(Call({"scenario": run.scenario}, command_line)):
-                report.write(run, evaluate(run), place)
+                write_run(run, evaluate(run), place)
         else:
             needs, words = COMMANDS[kind]
             for each in needs:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
@@ -10,8 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from feedsim.analysis import Figure, Named, diagnoses
 from feedsim.files.trace import Trace
+from feedsim.jobs.run import result_of
 from feedsim.motions import Circle, Dwell, Move
+from feedsim.report.page import Partial
+from feedsim.report.run import changes
 from feedsim.scenario import CircleTest, Positioning, Scenario
 from feedsim.simulation.cosim.loads import Work
 from feedsim.simulation.judge import PoseUse
@@ -36,6 +41,16 @@ class FakeRun:
     loads: tuple[Work, ...] = ()
     log: Trace | None = None
     native: bool = True
+
+
+def write_run(
+    run: Any, figures: Mapping[str, Figure], folder: Path, recorded: Partial | None = None, *, drawn: Sequence[str] = ()
+) -> tuple[Path, ...]:
+    """What the job leaves of a run with these figures."""
+    evaluated, causes = copy.copy(run), diagnoses(run)
+    own = {"figures": Named(figures), "causes": causes, "changes": changes(run, figures, causes)}
+    vars(evaluated).update(own, page="", uncertainty=None)
+    return result_of(evaluated, recorded).save(folder, figures=drawn)
 
 
 def run_of(described: Scenario, **changes: Any) -> FakeRun:

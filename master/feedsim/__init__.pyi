@@ -11,7 +11,6 @@ from feedsim.foundation.errors import SimulationError as SimulationError
 from feedsim.jobs.check import check as check
 from feedsim.jobs.circle import circle as circle
 from feedsim.jobs.compare import compare as compare
-from feedsim.jobs.diff import Overlay as Overlay
 from feedsim.jobs.diff import diff as diff
 from feedsim.jobs.export import export as export
 from feedsim.jobs.frf import frf as frf
@@ -27,7 +26,6 @@ from feedsim.jobs.machine_import import machine_import as machine_import
 from feedsim.jobs.replay import replay as replay
 from feedsim.jobs.result import Made as Made
 from feedsim.jobs.result import Result as Result
-from feedsim.jobs.run import RunResult as RunResult
 from feedsim.jobs.run import load as load
 from feedsim.jobs.run import run as run
 from feedsim.jobs.sweep import sweep as sweep

@@ -36,11 +36,13 @@ def scenario_file(tmp_path: Path) -> Path:
     return file
 
 
-def test_run_writes_results_and_one_line(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
+def test_run_writes_results_and_says_what_has_moved(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
     done = feedsim_process("run", scenario_file, "--out", tmp_path / "out", fmus=fmus, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    first, _, command, last = done.stdout.splitlines()
-    assert first.startswith("short move: ")
+    moved, nothing, line, _, command, last = done.stdout.splitlines()
+    assert moved.startswith("Z moves within ")
+    assert "nothing that is evaluated" in nothing
+    assert line.startswith("short move: ")
     assert command.startswith("  feedsim ")
     assert last == f"-> {tmp_path / 'out' / 'report.html'}"
     assert {"result.csv", "summary.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}

@@ -19,7 +19,7 @@ from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.files.trace.response_files import read_response_csv, write_response
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.jobs.frf import FrfResult
+from feedsim.jobs.frf import MachineResponses, result_of
 from feedsim.linear.loops import names, response, unit_of
 from feedsim.report import frf as report
 from feedsim.report.content import Picture
@@ -342,22 +342,22 @@ def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("one_picture")
 def test_a_report_is_replaced_whole(tmp_path: Path) -> None:
-    FrfResult(subject(), responses()).save(tmp_path)
+    result_of(MachineResponses(subject(), responses())).save(tmp_path)
     first = contents(tmp_path)
     assert "frf_measured.csv" in first
     (tmp_path / "notes.txt").write_text("mine")
-    FrfResult(subject(), responses(measured=False)).save(tmp_path)
+    result_of(MachineResponses(subject(), responses(measured=False))).save(tmp_path)
     second = contents(tmp_path)
     assert "frf_measured.csv" not in second, "the curves of an earlier measurement are left"
     assert set(first) - set(second) == {"frf_measured.csv"}
     assert (tmp_path / "notes.txt").read_text() == "mine"
-    FrfResult(subject(), responses(measured=False)).save(tmp_path)
+    result_of(MachineResponses(subject(), responses(measured=False))).save(tmp_path)
     assert contents(tmp_path) == second
 
 
 @pytest.mark.usefixtures("one_picture")
 def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    FrfResult(subject(), responses()).save(tmp_path)
+    result_of(MachineResponses(subject(), responses())).save(tmp_path)
     before = contents(tmp_path)
     move = Path.replace
 
@@ -368,7 +368,7 @@ def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(Path, "replace", failing)
     with pytest.raises(OutputError, match="No space left on device"):
-        FrfResult(subject(), responses(measured=False)).save(tmp_path)
+        result_of(MachineResponses(subject(), responses(measured=False))).save(tmp_path)
     assert contents(tmp_path) == before
 
 
@@ -384,7 +384,7 @@ def test_names_and_warnings_cannot_break_the_page() -> None:
 @pytest.mark.usefixtures("one_picture")
 def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> None:
     found = responses(figures={"Z.speed.bandwidth_first": Figure(float("nan"), "Hz", "m")})
-    FrfResult(subject(), found).save(tmp_path)
+    result_of(MachineResponses(subject(), found)).save(tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["figures"]["Z.speed.bandwidth_first"]["value"] is None
     assert "not determined" in (tmp_path / "report.html").read_text(encoding="utf-8")

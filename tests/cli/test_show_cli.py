@@ -16,9 +16,8 @@ import pytest
 from command_helpers import feedsim
 from feedsim import cli
 from feedsim.analysis import diagnoses, evaluate
-from feedsim.report import run as report
 from feedsim.report.show import _beside, _figures
-from report_helpers import circle_run
+from report_helpers import circle_run, write_run
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +27,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     run = circle_run()
     first, second = folder / "as_is", folder / "changed"
     for place in (first, second):
-        report.write(run, evaluate(run), place)
+        write_run(run, evaluate(run), place)
     told = json.loads((second / "summary.json").read_text())
     told["machine"]["axes"]["X"]["drive"]["K_v"]["value"] *= 1.25
     told["figures"]["XZ.G"]["value"] += 1.0

@@ -14,7 +14,6 @@ from feedsim.files.trace import Trace, read_csv
 from feedsim.foundation.errors import InputError
 from feedsim.motions import Move
 from feedsim.motions.constant_speed import Strokes
-from feedsim.report import run as report
 from feedsim.scenario import Logging
 from feedsim.scenario.model import Signal
 from feedsim.simulation import cosim
@@ -22,6 +21,7 @@ from feedsim.simulation.cosim import logged
 from feedsim.simulation.cosim.recording import recorded_columns
 from feedsim.simulation.cosim.run import logged_axes
 from feedsim.simulation.judge import judged
+from report_helpers import write_run
 from scenario_helpers import MACHINE
 from scenario_helpers import scenario as described
 
@@ -267,7 +267,7 @@ def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path
     expected = np.interp(np.maximum(clean.time - 0.3e-3, 0), run.trace.time, run.trace["Z.i_q"])
     assert clean["Z.i_q"] == pytest.approx(expected, abs=1e-12)
 
-    report.write(run, {}, tmp_path / "out")
+    write_run(run, {}, tmp_path / "out")
     written = read_csv(tmp_path / "out" / "log.csv")
     for name in run.log:
         np.testing.assert_array_equal(written[name], run.log[name])
@@ -287,7 +287,7 @@ def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path
 
 def test_without_logging_nothing_is_logged_and_an_older_log_goes(tmp_path: Path, fmus: Path) -> None:
     first = judged(cosim.run(load(tmp_path, SHORT + "logging: {}"), fmus=fmus))
-    report.write(first, {}, tmp_path / "out")
+    write_run(first, {}, tmp_path / "out")
     assert (tmp_path / "out" / "log.csv").is_file()
     run = judged(cosim.run(load(tmp_path, SHORT), fmus=fmus))
     assert (run.log, run.fine) == (None, None)
@@ -295,7 +295,7 @@ def test_without_logging_nothing_is_logged_and_an_older_log_goes(tmp_path: Path,
         np.testing.assert_array_equal(run.trace[name], first.trace[name])
     with pytest.raises(InputError, match="the run has no signals at the control cycle"):
         logged(run)
-    report.write(run, {}, tmp_path / "out")
+    write_run(run, {}, tmp_path / "out")
     assert not (tmp_path / "out" / "log.csv").exists()
 
 

@@ -25,6 +25,7 @@ from feedsim.simulation.cosim.unit import Log
 from feedsim.simulation.judge import judged
 from feedsim.simulation.nc import program
 from feedsim.simulation.nc import program as spline
+from report_helpers import write_run
 
 ROOT = Path(__file__).resolve().parents[2]
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
@@ -226,7 +227,7 @@ def test_finished_run_has_no_partial_file(fmus: Path, tmp_path: Path) -> None:
     loaded = scenario.load(CIRCLE, [*SHORT])
     with report.growing(tmp_path) as partial:
         run = judged(cosim.run(loaded, fmus=fmus, sink=partial))
-        report.write(run, {}, tmp_path, partial)
+        write_run(run, {}, tmp_path, partial)
     assert not partial.path.exists()
     write_csv(tmp_path / "afterwards.csv", run.trace)
     assert (tmp_path / "result.csv").read_bytes() == (tmp_path / "afterwards.csv").read_bytes()
@@ -260,7 +261,7 @@ def test_rows_stay_where_results_cannot_be_written(
     run = judged(cosim.run(loaded, fmus=fmus, sink=partial))
     _failing(monkeypatch, name, tmp_path, away=away)
     with replacing(), pytest.raises(OutputError, match="Permission denied"), partial:
-        report.write(run, {}, tmp_path, partial)
+        write_run(run, {}, tmp_path, partial)
     monkeypatch.undo()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["report.html", "result.csv", "result.partial.csv"]
     assert (tmp_path / "result.csv").read_text() == "old result.csv"
@@ -288,7 +289,8 @@ def test_run_that_never_begins_takes_no_rows_away(fmus: Path, tmp_path: Path) ->
 MEMORY = """
 import sys, tracemalloc
 from pathlib import Path
-from feedsim import cosim, nc, scenario
+from feedsim import scenario
+from feedsim.simulation import cosim
 from feedsim.report import run as report
 from feedsim.files.trace import trace as table
 table.IN_MEMORY = 0

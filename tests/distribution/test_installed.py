@@ -178,7 +178,7 @@ def test_programs_around_it_are_checked_by_its_types(installed: Installation, tm
     code.write_text(
         "import feedsim as fs\n"
         'result = fs.run("xz_circle.yaml", set={"motions.0.radius": "20 mm"})\n'
-        "reveal_type(result)\nreveal_type(fs.compare(result, result).same)\nreveal_type(fs.load('a.yaml'))\n"
+        "reveal_type(result)\nreveal_type(fs.compare(result, result).value.same)\nreveal_type(fs.load('a.yaml'))\n"
         "fs.run(3)\n"
     )
     command = [sys.executable, "-m", "mypy", "--strict", "--config-file=", "--python-executable", str(installed.python)]
@@ -187,7 +187,7 @@ def test_programs_around_it_are_checked_by_its_types(installed: Installation, tm
         [*command, str(code)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     revealed = [line.partition('"')[2].rstrip('"') for line in done.stdout.splitlines() if "Revealed type" in line]
-    expected = ["feedsim.jobs.run.RunResult", "bool", "feedsim.scenario.model.Scenario"]
+    expected = ["feedsim.jobs.result.Result[feedsim.jobs.run.EvaluatedRun]", "bool", "feedsim.scenario.model.Scenario"]
     assert [each.removeprefix("builtins.") for each in revealed] == expected, done.stdout + done.stderr
     errors = [line for line in done.stdout.splitlines() if ": error: " in line]
     assert len(errors) == 1

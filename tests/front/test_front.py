@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import doctest
+import math
 import subprocess
 import sys
 from importlib import import_module
@@ -69,8 +71,8 @@ def test_results_over_each_other(folder: Path, circle: fs.Result, tmp_path: Path
     assert (first.value, second.value) == (circle.figures["XZ.G"].value, stiff.figures["XZ.G"].value)
     assert list(over.parameters) == ["machine.axes.Z.drive.K_v"]
     assert over.pictures
-    first_line, changed, differs = repr(over).splitlines()
-    assert first_line == f"Overlay of {circle.scenario.name}, stiff"
+    assert repr(over).startswith("Result of diff: XZ: circular deviation G 8.19 -> ")
+    changed, differs = over.lines
     assert changed.startswith("XZ: circular deviation G 8.19 -> ")
     assert differs.startswith("differs: machine.axes.Z.drive.K_v")
     html = over._repr_html_()
@@ -133,15 +135,42 @@ def test_representations_are_short(circle: fs.Result, folder: Path) -> None:
         assert "\n" not in text
         assert 10 < len(text) < 300, text
         assert len(str(each)) < 300
-    assert "XZ.G 8.19" in repr(circle)
+    assert repr(circle).startswith("Result of run: XZ: G = 8.2 um. Main cause: reversal peaks of Z ")
 
 
-def test_a_notebook_shows_figures_a_picture_and_that_it_is_synthetic(circle: fs.Result) -> None:
+def test_a_notebook_shows_the_report_and_that_it_is_synthetic(circle: fs.Result) -> None:
     page = circle._repr_html_()
-    assert "XZ.G" in page
-    assert "data:image/png;base64," in page
-    assert "Synthetic machine" in page
-    assert len(page) < 1_000_000
+    assert page.startswith("<iframe")
+    for shown in ("XZ.G", "contour", "Synthetic machine"):
+        assert shown in page
+
+
+def test_what_the_value_has_the_result_has(circle: fs.Result) -> None:
+    """Attributes, items and completion; a name that is nowhere is said to be none of the value."""
+    assert circle.value.trace is circle.trace
+    assert circle["Z.x_a"] is circle.value["Z.x_a"]
+    assert {"trace", "causes", "figures", "findings", "answers", "save", "plot", "kind"} <= set(dir(circle))
+    assert not [name for name in dir(circle) if name.startswith("_")]
+    assert "resonance" not in dir(circle)
+    with pytest.raises(AttributeError, match="resonance"):
+        _ = circle.resonance
+    assert copy.copy(circle).kind == "run"
+
+
+def test_figures_are_a_table(circle: fs.Result) -> None:
+    """With an interval where one is known."""
+    frame = circle.figures.to_pandas()
+    assert list(frame.columns) == ["value", "unit", "low", "high", "meaning"]
+    assert frame.loc["XZ.G", "value"] == circle.figures["XZ.G"].value
+    assert np.isnan(frame.loc["XZ.G", "low"])
+    mismatch = frame.loc["XZ.servo_mismatch"]
+    half = next(term.half for term in circle.causes["XZ"].terms if term.key == "servo")
+    assert (mismatch["high"] - mismatch["low"]) == pytest.approx(2e3 * half, rel=1e-9)  # s, ms
+    known = circle.figures.with_intervals({"XZ.G": (8.0, 8.4), "none": (0.0, 1.0), "XZ.H": (math.nan, math.nan)})
+    assert known.to_pandas().loc["XZ.G", ["low", "high"]].tolist() == [8.0, 8.4]
+    assert known["XZ.H"] == circle.figures["XZ.H"]
+    assert known._repr_html_().count("<tr>") == len(known) + 1
+    assert "8 to 8.4" in known._repr_html_()
 
 
 def test_pictures(circle: fs.Result, tmp_path: Path) -> None:

@@ -20,11 +20,11 @@ SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
 
 @pytest.fixture(scope="module")
-def stop() -> fs.RunResult:
+def stop() -> fs.Result:
     return fs.run(SCENARIOS / "z_positioning.yaml", set={"motions.0.by.Z": "5 mm"})
 
 
-def test_a_picture_is_drawn_on_axes_that_are_there(stop: fs.RunResult) -> None:
+def test_a_picture_is_drawn_on_axes_that_are_there(stop: fs.Result) -> None:
     figure, axes = plt.subplots(2)
     assert stop.plot("Z.x_a", "Z.M_fr", ax=axes) is axes
     assert [one.get_ylabel() for one in axes] == ["position [m]", "torque [N·m]"]
@@ -38,7 +38,7 @@ def test_a_picture_is_drawn_on_axes_that_are_there(stop: fs.RunResult) -> None:
     assert figure
 
 
-def test_a_figure_and_a_signal_that_there_are_not_raise_the_same_error(stop: fs.RunResult) -> None:
+def test_a_figure_and_a_signal_that_there_are_not_raise_the_same_error(stop: fs.Result) -> None:
     for names, wrong, near in ((stop.figures, "Z.overshot", "Z.overshoot"), (stop, "Z.x_b", "Z.x_")):
         with pytest.raises(fs.InputError, match=f"no .* '{wrong}'; did you mean '{near}") as raised:
             names[wrong]
@@ -47,7 +47,9 @@ def test_a_figure_and_a_signal_that_there_are_not_raise_the_same_error(stop: fs.
 
 def test_signatures_show_types_alone() -> None:
     shown = str(inspect.signature(fs.run))
-    assert shown.startswith("(scenario: str | Path | Scenario, *, set: Changes = None, page: bool = False")
+    assert shown.startswith(
+        "(scenario: str | Path | Scenario, *, machine: str | Path | None = None, set: Changes = None"
+    )
     assert "Annotated" not in shown
     assert "0x" not in shown
 

@@ -14,7 +14,7 @@ from feedsim import scenario
 from feedsim.analysis import compensation as module
 from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
 from feedsim.foundation.errors import InputError, severity
-from feedsim.jobs.tune_feedforward import CompensateResult
+from feedsim.jobs.tune_feedforward import Compensated, result_of
 from feedsim.linear.plant import LinearDrive
 from feedsim.report.compensate import rows_of
 from feedsim.scenario import Axis, Machine, Scenario
@@ -195,7 +195,7 @@ def test_table_runs_are_those_of_the_whole_program(done: Compensation, fmus: Pat
 
 
 def test_results_have_the_table(done: Compensation, tmp_path: Path) -> None:
-    CompensateResult(done, {}).save(tmp_path / "out")
+    result_of(Compensated(done, {})).save(tmp_path / "out")
     with (tmp_path / "out" / "compensation.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [(row["compensation"], row["error"], row["unit of the error"]) for row in rows] == [
@@ -223,7 +223,7 @@ def test_a_changed_machine_has_the_same_compensation(done: Compensation, tmp_pat
         assert pytest.approx(expected.G, rel=1e-6) == left.G
         assert left.dip["Z"] == pytest.approx(expected.dip["Z"], rel=1e-6, abs=1e-12)
     assert found.after.dip["Z"] < 3 * done.left_after.dip["Z"] < 0  # too much now: a dip
-    CompensateResult(done, {}).save(tmp_path / "out")
+    result_of(Compensated(done, {})).save(tmp_path / "out")
     assert "With other effects of the machine" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import evaluate
-from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import Picture, Report
 from feedsim.report.formatting import PALETTE
 from feedsim.report.page import html
 from page_browsers import drawn
-from report_helpers import FakeRun, circle_run, positioning_run
+from report_helpers import FakeRun, circle_run, positioning_run, write_run
 
 OPEN_WITHIN = 0.5  # s of a processor, so that a reader does not wait
 # Rows of the table that floats beside the cursor: first what stands at the top, then a curve each.
@@ -30,7 +29,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[FakeRun, P
     found = {}
     for name, run in (("circle", circle_run()), ("stop", positioning_run())):
         place = tmp_path_factory.mktemp(name)
-        report.write(run, evaluate(run), place)
+        write_run(run, evaluate(run), place)
         found[name] = (run, place / "report.html")
     return found
 

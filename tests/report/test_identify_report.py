@@ -17,7 +17,7 @@ from agreement_helpers import assert_numbers_agree
 from feedsim.estimation.identify.friction_file import open_loop_line
 from feedsim.estimation.identify.result import Balance, Correlation, Identification
 from feedsim.foundation.errors import OutputError
-from feedsim.jobs.identify import IdentifyResult
+from feedsim.jobs.identify import KIND, result_of
 from feedsim.report.chart import Grid
 from feedsim.report.identify import headline, rigid_line, table_lines, terminal_warnings
 from feedsim.report.identify.report import (
@@ -44,7 +44,7 @@ FIGURES = {"stribeck", "plateaus", "loops-speed", "loops-position", "residuals",
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("identified") / "out"
-    IdentifyResult(identified()).save(folder, figures=("png",))
+    result_of(identified()).save(folder, figures=("png",))
     return folder
 
 
@@ -65,7 +65,7 @@ def test_a_friction_that_cannot_be_is_not_written(tmp_path: Path) -> None:
     found = identification()
     wrong = {**found.estimates, "gamma": replace(found.estimates["gamma"], value=1.2)}
     with pytest.raises(OutputError, match=r"friction\.yaml is not written: gamma"):
-        IdentifyResult(identified(found=replace(found, estimates=wrong))).save(tmp_path / "out")
+        result_of(identified(found=replace(found, estimates=wrong))).save(tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -145,7 +145,7 @@ def open_loop_text(found: Identification) -> str:
 
 def test_position_in_open_loop(tmp_path: Path) -> None:
     found = identification(balance=balance())
-    IdentifyResult(identified(found=found)).save(tmp_path)
+    result_of(identified(found=found)).save(tmp_path)
     before = balance().position[0]
     assert open_loop_line(found) == (
         f"position off by {100 * before * I_P:.3g} mm rms instead of {1e3 * before * I_P:.3g} mm; "
@@ -172,13 +172,13 @@ def test_position_in_open_loop(tmp_path: Path) -> None:
     drift = balance().drifts[0]
     for column, values in zip((1, 2, 3, 4), (drift.time, drift.angle, drift.before, drift.after), strict=True):
         assert [float(row[column]) for row in rows[1:]] == list(values)
-    IdentifyResult(identified()).save(tmp_path)
+    result_of(identified()).save(tmp_path)
     assert not (tmp_path / "open_loop.csv").exists()
 
 
 def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
     found = identification(balance=balance(applied=False, reason="F_C would change by +23 %"))
-    IdentifyResult(identified(found=found)).save(tmp_path)
+    result_of(identified(found=found)).save(tmp_path)
     assert open_loop_line(found) == "not applied: F_C would change by +23 %"
     text = open_loop_text(found)
     assert "Not applied: F_C would change by +23 %." in text
@@ -190,7 +190,7 @@ def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
 def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
     sines = Balance({}, False, "sine.csv: sines; the open loop needs general motion", applies=False)
     found = identification(balance=sines)
-    IdentifyResult(identified(found=found)).save(tmp_path)
+    result_of(identified(found=found)).save(tmp_path)
     assert open_loop_line(found) == ""
     assert "sine.csv: sines" in open_loop_text(found)
     assert "rms" not in open_loop_text(found)
@@ -208,7 +208,7 @@ def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
     assert stage is not None
     doubtful = replace(stage, warnings=("F_log sits at its bound 0",))
     apart = identified(found=identification(stationary=doubtful, prior=False))
-    IdentifyResult(apart).save(tmp_path)
+    result_of(apart).save(tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert text.index("<main>") < text.index("F_log sits at its bound 0")  # in its section, not above all
     assert told(tmp_path)["curve"]["warnings"] == ["F_log sits at its bound 0"]
@@ -240,7 +240,7 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
 def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
     changes: dict[str, Any] = {absent: None} if absent != "both warnings" else {"warnings": (), "advice": ()}
     whole = identified(found=identification(**changes), subject=None)
-    names = {path.name for path in IdentifyResult(whole).save(tmp_path, figures=("png",))}
+    names = {path.name for path in result_of(whole).save(tmp_path, figures=("png",))}
     assert ("plateaus.csv" in names) == (absent != "stationary")
     assert ("residuals.csv" in names) == (absent != "dynamic")
     assert {"friction.yaml", "report.html", "correlation.png"} <= names
@@ -251,8 +251,8 @@ def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
 
 
 def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
-    IdentifyResult(identified()).save(tmp_path)
-    IdentifyResult(identified(found=identification(dynamic=None))).save(tmp_path)
+    result_of(identified()).save(tmp_path)
+    result_of(identified(found=identification(dynamic=None))).save(tmp_path)
     assert set(contents(tmp_path)) == set(told(tmp_path)["files"])
     assert not (tmp_path / "residuals.csv").exists()
 
@@ -260,8 +260,8 @@ def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
 def test_place_is_checked_ahead(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="is a file"):
-        IdentifyResult.check_place(tmp_path / "file")
-    IdentifyResult.check_place(tmp_path / "new")
+        KIND.check_place(tmp_path / "file")
+    KIND.check_place(tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 

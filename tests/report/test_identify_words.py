@@ -18,7 +18,7 @@ from feedsim.report.formatting import counted
 from feedsim.report.identify import headline
 from feedsim.report.identify.report import report_of
 from feedsim.report.identify.stribeck_plots import speeds_of, stribeck_picture, stribeck_title
-from feedsim.report.identify.summary import summary
+from feedsim.report.identify.summary import details
 from feedsim.report.page import html
 from identification_helpers import I_P, TRUE, J, curve, identification, identified, records
 from report_helpers import Page
@@ -55,7 +55,7 @@ def test_few_speeds_make_no_curve(count: int) -> None:
     known = ("known to ±", "curve within", "error of the curve", "95 % band of the curve")
     for (where, text), words in zip(texts.items(), known, strict=True):
         assert (words in text) == (count == 3), where
-    said = summary(identified(found=found), [])["curve"]
+    said = details(identified(found=found))["curve"]
     assert (said["error"]["value"] is None, said["distinct_speeds"]) == (count < 3, count)
     if count < 3:
         speeds = "1 speed" if count == 1 else "2 speeds"

@@ -13,9 +13,8 @@ import pytest
 from feedsim.cli import main
 from feedsim.foundation.errors import InputError
 from feedsim.motions import Dwell, Move
-from feedsim.report import run as report
 from feedsim.report.page import html
-from feedsim.report.run.files import summary
+from feedsim.report.run.files import details
 from feedsim.report.run.report import report_of
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.checks import load_structure
@@ -23,7 +22,7 @@ from feedsim.simulation import cosim, judge
 from feedsim.simulation.judge import judged
 from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.pose_change import LARGE_SHIFT, MAX_MODE_FREQUENCY, PoseChange, pose_change, warnings
-from report_helpers import positioning_run
+from report_helpers import positioning_run, write_run
 from scenario_helpers import MACHINE, default_machine, scenario
 from structure_helpers import default_structure, dense_modes
 
@@ -133,7 +132,7 @@ def test_poses_that_are_not_known_are_said_to_be_so(structure: Path | None, reas
 
 
 def part_of(run: judge.JudgedRun) -> Mapping[str, object]:
-    part = json.loads(json.dumps(summary(run, {}, ())))["pose"]
+    part = json.loads(json.dumps(details(run, {})))["pose"]
     assert isinstance(part, dict)
     return part
 
@@ -144,7 +143,7 @@ def test_a_run_with_one_pose(units: Path, tmp_path: Path) -> None:
     assert run.pose.crossings is None
     assert sum("axis Z moves 200 mm away" in warning for warning in run.warnings) == 1
     assert judge.check(plan, run.program)[-1] in run.warnings
-    report.write(run, {}, tmp_path)
+    write_run(run, {}, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'id="pose"' in text
     assert "Modes over the positions of Z" in text

@@ -7,13 +7,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from feedsim.report import run as report
 from feedsim.report.page import html
 from feedsim.report.provenance import archives, input_files
-from feedsim.report.run.files import summary
+from feedsim.report.run.files import details
 from feedsim.report.run.report import report_of
 from feedsim.scenario import load
-from report_helpers import FakeRun, Page, positioning_run, small_run
+from report_helpers import FakeRun, Page, positioning_run, small_run, write_run
 from scenario_helpers import MACHINE
 
 
@@ -36,7 +35,7 @@ def test_each_archive_stands_once() -> None:
 
 def test_coupling_is_one_table_with_the_share(tmp_path: Path) -> None:
     coupling = {"Z.residual": -2e-5, "Z.residual_peak": 3e-5, "Z.friction_work": 80.0, "X.residual": 0.0}
-    report.write(replace(positioning_run(), coupling=coupling), {}, tmp_path)
+    write_run(replace(positioning_run(), coupling=coupling), {}, tmp_path)
     words = " ".join(Page((tmp_path / "report.html").read_text(encoding="utf-8")).words)
     assert "Z 80 −2×10⁻⁵ 2.5×10⁻⁷" in words
     assert "X – 0 –" in words
@@ -52,7 +51,7 @@ def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     described = load(tmp_path / "test.yaml", ["machine.axes.Z.friction.gamma=0.5"])
-    content = summary(FakeRun(described, positioning_run().program, positioning_run().trace), {}, ())
+    content = details(FakeRun(described, positioning_run().program, positioning_run().trace), {})
     paths = {
         "scenario": tmp_path / "test.yaml",
         "machine": MACHINE / "machine.yaml",
@@ -74,7 +73,7 @@ def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
 
 def test_parameters_of_every_axis_are_in_si_under_the_names_of_the_units() -> None:
     run = small_run()
-    axes = summary(run, {}, ())["machine"]["axes"]
+    axes = details(run, {})["machine"]["axes"]
     assert list(axes) == ["X", "Y", "Z"]
     for name, axis in run.scenario.machine.axes.items():
         assert axes[name]["pitch"] == {"value": axis.pitch, "unit": "m"}

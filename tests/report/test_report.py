@@ -32,9 +32,9 @@ from feedsim.report.chart.model import embedded
 from feedsim.report.content import Tile
 from feedsim.report.formatting import PAGE_COLOURS
 from feedsim.report.page import script
-from feedsim.report.run.files import summary
+from feedsim.report.run.files import details
 from feedsim.report.run.report import HEADER, moved_words, real_time_factor, tile
-from report_helpers import Page, circle_run, contents, positioning_run, run_of
+from report_helpers import Page, circle_run, contents, positioning_run, run_of, write_run
 from scenario_helpers import scenario
 
 # -- what is written --------------------------------------------------------------------------------------------------
@@ -43,7 +43,7 @@ from scenario_helpers import scenario
 def test_files_of_a_positioning_run(tmp_path: Path) -> None:
     run = positioning_run()
     figures = evaluate(run)
-    written = report.write(run, figures, tmp_path / "new" / "folder")
+    written = write_run(run, figures, tmp_path / "new" / "folder")
     directory = tmp_path / "new" / "folder"
     names = {"result.csv", "report.html", "summary.json"}
     assert set(contents(directory)) == names
@@ -56,23 +56,23 @@ def test_files_of_a_positioning_run(tmp_path: Path) -> None:
 
 def test_figures_are_drawn_where_they_are_asked_for(tmp_path: Path) -> None:
     run = positioning_run()
-    report.write(run, evaluate(run), tmp_path, drawn=("png", "svg"))
+    write_run(run, evaluate(run), tmp_path, drawn=("png", "svg"))
     drawn = {f"figures/{stem}.{kind}" for stem in ("positioning-Z", "overview") for kind in ("png", "svg")}
     assert set(contents(tmp_path)) == drawn | {"result.csv", "report.html", "summary.json"}
     assert (tmp_path / "figures/positioning-Z.png").read_bytes().startswith(b"\x89PNG")
     svg = (tmp_path / "figures/positioning-Z.svg").read_text(encoding="utf-8")
     assert ElementTree.fromstring(svg.replace("xlink:href", "href")).tag.endswith("svg")
     assert "var(--" not in svg, "a file of its own has no style sheet beside it"
-    report.write(run, evaluate(run), tmp_path)
+    write_run(run, evaluate(run), tmp_path)
     assert set(contents(tmp_path)) == {"result.csv", "report.html", "summary.json"}
 
 
 def test_charts_as_files_need_no_matplotlib(tmp_path: Path) -> None:
     """It takes longer to load than a run."""
     script = (
-        "import sys; from pathlib import Path; sys.path.insert(0, 'tests'); from report_helpers import circle_run;"
-        "from feedsim.analysis import evaluate; from feedsim.report import run as report;"
-        "run = circle_run(); report.write(run, evaluate(run), Path(sys.argv[1]), drawn=('png',));"
+        "import sys; from pathlib import Path; sys.path.insert(0, 'tests');"
+        "from feedsim.analysis import evaluate; from report_helpers import circle_run, write_run;"
+        "run = circle_run(); write_run(run, evaluate(run), Path(sys.argv[1]), drawn=('png',));"
         "print('matplotlib' in sys.modules)"
     )
     done = subprocess.run(
@@ -84,7 +84,7 @@ def test_charts_as_files_need_no_matplotlib(tmp_path: Path) -> None:
 def test_summary_holds_every_figure_and_where_it_comes_from(tmp_path: Path) -> None:
     run = circle_run()
     figures = dict(evaluate(run)) | {"XZ.none": Figure(math.nan, "ms", "not in this trace")}
-    report.write(run, figures, tmp_path)
+    write_run(run, figures, tmp_path)
     text = (tmp_path / "summary.json").read_text(encoding="utf-8")
     summary = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     assert set(summary["figures"]) == set(figures)
@@ -103,7 +103,7 @@ def test_summary_holds_every_figure_and_where_it_comes_from(tmp_path: Path) -> N
 @pytest.mark.parametrize("make", [positioning_run, circle_run])
 def test_page_is_self_contained_and_well_formed(tmp_path: Path, make: Any) -> None:
     run = make()
-    report.write(run, evaluate(run), tmp_path)
+    write_run(run, evaluate(run), tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     page = Page(text)
     own = re.findall(r"<script[^>]*>(.*?)</script>", text, re.DOTALL)
@@ -137,13 +137,13 @@ def test_page_is_self_contained_and_well_formed(tmp_path: Path, make: Any) -> No
 def test_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a", "b"):
         run = circle_run()
-        report.write(run, evaluate(run), tmp_path / name)
+        write_run(run, evaluate(run), tmp_path / name)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
 def test_names_from_files_cannot_break_the_page(tmp_path: Path) -> None:
     run = positioning_run(name='<script>"&', note="a < b & c")
-    report.write(run, evaluate(run), tmp_path)
+    write_run(run, evaluate(run), tmp_path)
     page = Page((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert page.tags.count("script") == 2
     curves = [Curve("<b>", np.arange(2.0), np.ones(2))]
@@ -156,18 +156,18 @@ def test_names_from_files_cannot_break_the_page(tmp_path: Path) -> None:
 
 def test_warnings_stand_at_the_top(tmp_path: Path) -> None:
     run = replace(positioning_run(), warnings=("Z: the torque was < limited",))
-    report.write(run, evaluate(run), tmp_path)
+    write_run(run, evaluate(run), tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     warning = text.index("<strong>Warning:</strong> Z: the torque was &lt; limited")
     assert text.index("<h1>") < warning < text.index('class="note"') < text.index('class="keys"')
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["warnings"] == list(run.warnings)
-    report.write(positioning_run(), {}, tmp_path)
+    write_run(positioning_run(), {}, tmp_path)
     assert 'role="alert"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = (Note("as built"), "doubtful", Wrong("worse than < before"), "doubtful")
-    report.write(replace(positioning_run(), warnings=found), {}, tmp_path)
+    write_run(replace(positioning_run(), warnings=found), {}, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     wrong = page.index('<p class="wrong"><strong>Wrong:</strong> worse than &lt; before</p>')
     assert wrong < page.index("<strong>Warning:</strong> doubtful") < page.index('<p class="note">as built</p>')
@@ -187,7 +187,7 @@ def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.C
 def test_real_time_factor_is_simulated_over_elapsed_time() -> None:
     run = replace(positioning_run(), wall_time=0.25)
     assert real_time_factor(run) == pytest.approx(4 * run.program.duration, rel=1e-15)
-    assert summary(run, {}, ())["performance"]["real_time_factor"]["value"] == real_time_factor(run)
+    assert details(run, {})["performance"]["real_time_factor"]["value"] == real_time_factor(run)
     assert f"({4 * run.program.duration:.2g} times real time)" in report.summary_line(run, {})
     fast = replace(run, wall_time=run.program.duration / 104.2)
     assert "(100 times real time)" in report.summary_line(fast, {})
@@ -209,7 +209,7 @@ def test_tiles_speak_in_words_and_in_few_digits() -> None:
 
 
 def test_page_fits_on_paper(tmp_path: Path) -> None:
-    report.write(positioning_run(), {}, tmp_path)
+    write_run(positioning_run(), {}, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     paper = text[text.index("@media print") : text.index("</style>")]
     assert "max-height: 150mm" in paper
@@ -220,7 +220,7 @@ def test_motions_have_their_path_and_a_note_on_their_start(tmp_path: Path) -> No
     arc = Arc(plane=("X", "Z"), centre_by={"X": 0.015, "Z": 0.0}, angle=math.pi / 2, feed=0.05)
     run = run_of(scenario(arc, Dwell(duration=0.1), Move(by={"X": 0.003, "Y": 0.004}, feed=0.05)))
     assert [segment.way for segment in run.program.segments] == ["R 15 mm, 90°", "", "length 5 mm"]
-    report.write(run, {}, tmp_path)
+    write_run(run, {}, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "R 15 mm, 90°" in text
     assert "next instant of the interpolator (T_ipo 2 ms)" in text

@@ -16,12 +16,11 @@ from feedsim.analysis import evaluate
 from feedsim.foundation.arguments import Call, calling
 from feedsim.foundation.errors import Wrong
 from feedsim.jobs.parameters import command_line
-from feedsim.report import run as report
 from feedsim.report.content import FOLDER, Report, Step, typed
 from feedsim.report.page import html
 from kinds_helpers import Kinds
 from page_browsers import drawn
-from report_helpers import positioning_run
+from report_helpers import positioning_run, write_run
 
 SHOWN = """() => {
   const words = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
@@ -54,7 +53,7 @@ def unstable(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "K_v = 27.5 (m/min)/mm"
     )
     run, folder = replace(positioning_run(), warnings=(said,)), tmp_path_factory.mktemp("unstable")
-    report.write(run, evaluate(run), folder)
+    write_run(run, evaluate(run), folder)
     return folder / "report.html"
 
 

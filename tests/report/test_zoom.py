@@ -14,13 +14,12 @@ import pytest
 
 from feedsim.analysis import evaluate
 from feedsim.files.trace import read_csv
-from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.model import BLOCK_ROWS, embedded, steps, ticks
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from kinds_helpers import KINDS, Kinds
-from report_helpers import circle_run
+from report_helpers import circle_run, write_run
 
 ZOOMS = 60
 SUPER = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
@@ -257,7 +256,7 @@ def test_saved_curves_have_all_digits(browser: Any, tmp_path: Path) -> None:
 
 def test_the_polar_picture_stays_one_at_its_largest_magnification(browser: Any, tmp_path: Path) -> None:
     run = circle_run()
-    report.write(run, evaluate(run), tmp_path)
+    write_run(run, evaluate(run), tmp_path)
     page = opened(browser, tmp_path / "report.html")
     inside = page.evaluate(
         """() => { const found = [];

@@ -21,7 +21,7 @@ from feedsim.report import sweep as report
 from feedsim.report.chart.svg import EDGE
 from feedsim.report.formatting import scale
 from feedsim.report.page import html
-from feedsim.report.sweep.account import Account, quantile_interval, summary
+from feedsim.report.sweep.account import Account, details, quantile_interval
 from feedsim.report.sweep.figure_plots import running_median
 from feedsim.report.sweep.report import pictures_of, report_of
 from feedsim.scenario.study import Study, load_study
@@ -270,7 +270,7 @@ def test_the_laws_numbers_and_the_nominal_value_are_told(tmp_path: Path) -> None
     ]
     assert cells(text, "XZ.G")[2] == "9.60"
     assert ">Nominal<" in text
-    assert summary(account, [])["figures"]["XZ.G"]["nominal"] == pytest.approx(9.6e-6)
+    assert details(account)["figures"]["XZ.G"]["nominal"] == pytest.approx(9.6e-6)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.95])

@@ -113,9 +113,10 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
     }  # fmt: skip
     for term in sorted(diagnosis.terms, key=lambda term: (FIGURE_ORDER.index(term.key), term.axis, term.order)):
         factor, unit = FIGURE_UNITS[term.unit]
-        figures[figure_name(term)] = Figure(
-            factor * term.value, unit, meanings[term.key].format(axis=term.axis, order=term.order)
-        )
+        ends = factor * (term.value - term.half), factor * (term.value + term.half)
+        meaning = meanings[term.key].format(axis=term.axis, order=term.order)
+        known = ends if math.isfinite(term.half) else None
+        figures[figure_name(term)] = Figure(factor * term.value, unit, meaning, known)
     if diagnosis.lag is not None:
         meaning = "part of the mean radius deviation that path lag makes, by the response of the position loops"
         figures["radius_lag"] = Figure(1e6 * diagnosis.lag, "um", meaning)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,10 @@ from numpy.typing import NDArray
 from feedsim.files.trace import Trace
 from feedsim.files.trace.trace import suggest
 from feedsim.foundation.errors import InputError, UnknownName
+from feedsim.foundation.installation import need
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 
@@ -23,7 +29,8 @@ SAME_INSTANT = 1e-6
 class Figure:
     """One derived number. ``value`` is NaN where the trace does not contain what the definition asks for.
 
-    ``float(figure)`` is its value.
+    ``float(figure)`` is its value. interval: its ends of 95 %, or of the share that was asked for, in its unit; None:
+    not known.
 
     >>> import feedsim as fs
     >>> figure = fs.run("z_positioning.yaml").figures["Z.overshoot"]
@@ -36,6 +43,7 @@ class Figure:
     value: float
     unit: str
     meaning: str
+    interval: tuple[float, float] | None = None
 
     def __float__(self) -> float:
         return self.value
@@ -48,7 +56,9 @@ Figures = Mapping[str, Figure]
 
 
 class Named(dict[str, Figure]):
-    """Figures by name; a name that is none raises UnknownName, which says which is the nearest.
+    """Figures by name, a table: :meth:`to_pandas`, and as notebooks show it.
+
+    A name that is none raises UnknownName, which says which is the nearest.
 
     >>> Named({"Z.overshoot": Figure(3.1, "um", "")})["Z.overshot"]
     Traceback (most recent call last):
@@ -57,6 +67,27 @@ class Named(dict[str, Figure]):
 
     def __missing__(self, name: str) -> Figure:
         raise UnknownName(f"no figure {name!r}{suggest(name, self)}")
+
+    def with_intervals(self, intervals: Mapping[str, tuple[float, float]]) -> Named:
+        """The same with intervals of some; ends that are NaN are not known."""
+        known = {name: ends for name, ends in intervals.items() if name in self and math.isfinite(ends[0])}
+        return Named(self | {name: replace(self[name], interval=ends) for name, ends in known.items()})
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row per figure: value, unit, low and high end of its interval, meaning. Needs the package pandas."""
+        rows = [(f.value, f.unit, *(f.interval or (math.nan, math.nan)), f.meaning) for f in self.values()]
+        return need("pandas", "a DataFrame").DataFrame(
+            rows, index=list(self), columns=["value", "unit", "low", "high", "meaning"]
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, str(f), "" if f.interval is None else f"{f.interval[0]:.4g} to {f.interval[1]:.4g}", f.meaning)
+            for name, f in self.items()
+        ]
+        cells = ["".join(f"<td style='text-align:left'>{escape(cell)}</td>" for cell in row) for row in rows]
+        heads = "".join(f"<th>{head}</th>" for head in ("figure", "value", "interval", "meaning"))
+        return f"<table><tr>{heads}</tr>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def column(trace: Trace, name: str, purpose: str) -> Array:

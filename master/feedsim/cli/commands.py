@@ -593,7 +593,8 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         print(*_plain_lines(result), sep="\n")
         return 0
     quiet = bool(options.quiet or options.json is True)
-    findings = ranked(result.findings_shown(quiet) if isinstance(result, Result) else result.findings)
+    said = () if quiet or not isinstance(result, Result) else result.in_lines
+    findings = ranked(text for text in result.findings if text not in said)
     warn(findings)
     code = getattr(result, "exit_code", 0)
     try:
@@ -618,11 +619,11 @@ def _lines(result: Any, verbose: bool, out: Any) -> Iterator[str]:
     from feedsim.jobs.result import Result
 
     own = isinstance(result, Result)
-    yield from map(visible, result.lines_shown(verbose) if own else result.answers)
+    yield from map(visible, (result.all_lines if verbose else result.lines) if own else result.answers)
     if (place := getattr(result, "place", None) or out) is not None:
         if own and (step := _next_step(Path(place))):
             yield from map(visible, (f"Next: {step['words']}:", f"  {step['command']}"))
-        yield visible(f"-> {Path(place) / result.main_file if own else place}")
+        yield visible(f"-> {Path(place) / result._kind.main_file if own else place}")
 
 
 def _next_step(folder: Path) -> dict[str, str]:

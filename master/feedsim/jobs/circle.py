@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from feedsim.analysis import Diagnosis, Figure, Named
+from feedsim.analysis import Diagnosis, Named
 from feedsim.analysis.circle import diagnose, further
 from feedsim.analysis.circle.changed import Change
 from feedsim.analysis.circle.records import SAME_FEED, RecordedCircle, read_circle
@@ -17,9 +17,8 @@ from feedsim.files.columns import load_columns
 from feedsim.foundation.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report import circle as page
-from feedsim.report.content import Report
 from feedsim.report.page import sheet_html
 from feedsim.report.results import Content
 from feedsim.report.run import sheet
@@ -27,8 +26,11 @@ from feedsim.report.run import sheet
 LENGTH_NEEDED = "AXIS=LENGTH is needed, e.g. X=10mm"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class CircleResult(Result):
+KIND = Kind("circle", (sheet.HTML, sheet.CSV))
+
+
+@dataclass(frozen=True, eq=False)
+class CircleDiagnosis:
     """A recorded circle taken apart.
 
     recorded: turns, axes, radius [m], speed [m/s]. diagnosis: the causes, each with interval and share of G. records:
@@ -38,73 +40,57 @@ class CircleResult(Result):
     recorded: RecordedCircle
     diagnosis: Diagnosis
     records: Sequence[Path]
-    after: CircleResult | None = None
-
-    kind = "circle"
-    may_write = (sheet.HTML, sheet.CSV)
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """The records."""
-        return [*self.records, *(self.after.records if self.after is not None else ())]
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """As of a run: "XY.G", "XY.squareness", ...; of records after a change "after.XY.G", ..."""
-        later = {} if self.after is None else {f"after.{name}": one for name, one in self.after.figures.items()}
-        return Named({**page.figures_of(self.recorded, self.diagnosis), **later})
+    after: CircleDiagnosis | None = None
 
     @property
     def changes(self) -> Sequence[Change]:
         """What the records after a change show of every cause; none without them."""
-        return [] if self.after is None else page.changes_of(self._taken, self.after._taken)
+        return [] if self.after is None else page.changes_of(self.taken, self.after.taken)
 
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is the matter with the records."""
-        return [*self.recorded.doubts, *(self.after.recorded.doubts if self.after is not None else ())]
+    @cached_property
+    def taken(self) -> page.Taken:
+        """With its figures."""
+        figures = page.figures_of(self.recorded, self.diagnosis)
+        return page.Taken(self.recorded, self.diagnosis, figures, self.records)
 
-    @property
-    def answers(self) -> Sequence[str]:
-        """Why the circle is not round; with records after a change what has changed."""
-        if self.after is not None:
-            return page.answers_of_both(self._taken, self.after._taken)
-        return page.answers(self.diagnosis)
 
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answer, what to type, and how the files were read."""
-        if self.after is not None:
-            return page.lines_of_both(self._taken, self.after._taken)
-        action = page.first_action(self.diagnosis)
-        notes = (f"  {note}" for note in self.recorded.notes)
-        return [*self.answers, *filter(None, [action]), *further(self.diagnosis), *notes]
+def result_of(circle: CircleDiagnosis) -> Result[CircleDiagnosis]:
+    """Why a recorded circle is not round; figures are named as those of a run, "XY.G"."""
+    diagnosis = circle.diagnosis
+    if circle.after is not None:
+        return _result_of_both(circle, circle.taken, circle.after.taken)
+    return Result(
+        KIND,
+        circle,
+        lambda: page.report_of(circle.recorded, diagnosis, circle.taken.figures, circle.records),
+        figures=Named(circle.taken.figures),
+        details=lambda: page.details(circle.recorded, diagnosis, circle.records),
+        inputs=circle.records,
+        rows=[*further(diagnosis), *(f"  {note}" for note in circle.recorded.notes)],
+    )
 
-    @property
-    def _taken(self) -> page.Taken:
-        return page.Taken(self.recorded, self.diagnosis, self.figures, self.records)
 
-    def report(self) -> Report:
-        """Content of report.html."""
-        if self.after is not None:
-            return page.report_of_both(self._taken, self.after._taken)
-        return page.report_of(self.recorded, self.diagnosis, self.figures, self.records)
+def _result_of_both(circle: CircleDiagnosis, before: page.Taken, after: page.Taken) -> Result[CircleDiagnosis]:
+    """What a change has done to a circle; figures of the records after it are "after.XY.G", ..."""
+    inputs = [*before.files, *after.files]
 
-    def files(self) -> Mapping[str, Content]:
-        """Of records before and after a change the acceptance sheet of both."""
-        if self.after is None:
-            return {}
-        sheets = page.sheets_of_both(self._taken, self.after._taken)
-        title = f"Circle {axis_letters(self.recorded.circle.axes)}, before and after"
+    def files() -> Mapping[str, Content]:
+        sheets = page.sheets_of_both(before, after)
+        title = f"Circle {axis_letters(circle.recorded.circle.axes)}, before and after"
         return {sheet.HTML: sheet_html(title, sheets, ""), sheet.CSV: sheet.table(sheets)}
 
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        content = page.summary(self.recorded, self.diagnosis, self.figures, self.inputs, names)
-        if self.after is None:
-            return content
-        changes = page.changes_part(self._taken, self.after._taken)
-        return {**content, "answer": list(self.answers), "changed": changes}
+    return Result(
+        KIND,
+        circle,
+        partial(page.report_of_both, before, after),
+        figures=Named({**before.figures, **{f"after.{name}": one for name, one in after.figures.items()}}),
+        details=lambda: {
+            **page.details(circle.recorded, circle.diagnosis, inputs),
+            "changed": page.changes_part(before, after),
+        },
+        files=files,
+        inputs=inputs,
+    )
 
 
 @job("why a recorded circle is not round")
@@ -134,7 +120,7 @@ def circle(
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> CircleResult:
+) -> Result[CircleDiagnosis]:
     """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch errors.
 
     Each cause has an interval and its share of G. Files are CSV with units in the header, with positions of both axes
@@ -181,7 +167,7 @@ def circle(
         [Path(file) for file in ([given] if isinstance(given, str | Path) else given)] for given in (after, columns)
     )
 
-    def taken(from_files: Sequence[Path], radius: float | None) -> CircleResult:
+    def taken(from_files: Sequence[Path], radius: float | None) -> CircleDiagnosis:
         recorded = read_circle(
             from_files,
             (plane[0], plane[1]),
@@ -192,12 +178,12 @@ def circle(
             mappings=[load_columns(file) for file in mappings],
         )
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
-        return CircleResult(recorded, diagnosis, from_files)
+        return CircleDiagnosis(recorded, diagnosis, from_files)
 
-    with kept(out, CircleResult.check_place, watch, [*files, *later, *mappings], force=force):
-        result = taken(files, r)
+    with kept(out, KIND, watch, [*files, *later, *mappings], force=force):
+        circle = taken(files, r)
         if later:
-            own = result.recorded.circle  # its radius counts for both: files of positions do not have it
+            own = circle.recorded.circle  # its radius counts for both: files of positions do not have it
             second = taken(later, own.radius)
             if abs(second.recorded.circle.speed / own.speed - 1) > SAME_FEED:
                 raise InputError(
@@ -205,7 +191,8 @@ def circle(
                     f"records before {6e4 * own.speed:.4g} mm/min; allowed: {100 * SAME_FEED:g} % apart, as peaks and "
                     "lags grow with it"
                 )
-            result = replace(result, after=second)
+            circle = replace(circle, after=second)
+        result = result_of(circle)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -24,15 +24,13 @@ from feedsim.foundation.arguments import Value, amount, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.outputs import forced, replacing
 from feedsim.jobs.parameters import Argument, Force, Option, job
-from feedsim.jobs.result import Result
+from feedsim.jobs.result import Kind, Result
 from feedsim.report import compare as page
-from feedsim.report.content import Report
-from feedsim.report.results import Content
 
 if TYPE_CHECKING:
-    from feedsim.analysis import Figure
+    from feedsim.analysis import Figures
     from feedsim.files.trace import Array
-    from feedsim.jobs.run import RunResult
+    from feedsim.jobs.run import EvaluatedRun
     from feedsim.simulation.cosim import Run
 
 File = str | Path
@@ -42,8 +40,11 @@ JSON, XML = "compare.json", "compare.xml"
 Pairs = Mapping[str, str] | Sequence[str]  # name -> text, or texts NAME=TEXT
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class CompareResult(Result):
+KIND = Kind("compare", (JSON, XML))
+
+
+@dataclass(frozen=True, eq=False)
+class Comparisons:
     """Comparisons, one for each pair of files.
 
     asked: files and folders that were given, in turn. tolerances: the tolerance file that was asked for.
@@ -54,9 +55,6 @@ class CompareResult(Result):
     asked: Sequence[Path] = ()
     tolerances: Path | None = None
     durations: Sequence[float] = ()
-
-    kind = "compare"
-    may_write = (JSON, XML)
 
     @property
     def verdict(self) -> Verdict:
@@ -79,78 +77,55 @@ class CompareResult(Result):
         variables = [pair.worst for pair in self.comparisons if pair.worst is not None]
         return max(variables, key=lambda variable: (variable.ratio, variable.deviation), default=None)
 
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """Variable -> its largest deviation, in its unit; of several pairs "result: variable"."""
-        from feedsim.analysis import Figure, Named
-
-        alone = len(self.comparisons) == 1
-        return Named(
-            (
-                variable.name if alone else f"{pair.result}: {variable.name}",
-                Figure(variable.deviation, variable.unit, f"largest deviation; allowed {variable.allowed:.4g}"),
-            )
-            for pair in self.comparisons
-            for variable in pair.those("same", "different")
-        )
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What cannot be compared, and rows that were not compared."""
-        return self.report().warnings
-
-    def findings_shown(self, quiet: bool) -> Sequence[str]:
-        """Pairs that cannot be compared, where the lines do not say so."""
-        return [f"{pair.result}: {pair.line}" for pair in self.comparisons if pair.verdict == "unusable" and quiet]
-
-    def lines_shown(self, verbose: bool) -> Sequence[str]:
-        """What differs; verbose: every variable."""
-        return self.listed(everything=verbose)
-
     @property
     def json(self) -> str:
         """All figures, for programs."""
         return page.to_json(self.comparisons)
 
-    @property
-    def answers(self) -> Sequence[str]:
-        """The verdict of every pair."""
-        return [f"{pair.result} against {pair.reference}: {pair.line}" for pair in self.comparisons]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """What differs: of every pair its worst variables, and what is to be known."""
-        return self.listed(everything=False)
-
     def listed(self, *, everything: bool) -> list[str]:
-        """As ``lines``; everything: every variable."""
+        """What differs: of every pair its worst variables, and what is to be known; everything: every variable."""
         return lines_of(self.comparisons, self.asked, self.tolerances, everything=everything)
 
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.comparisons)
 
-    def files(self) -> Mapping[str, Content]:
-        """All figures as JSON, and JUnit XML for CI servers."""
-        return {JSON: page.to_json(self.comparisons), XML: page.junit(self.comparisons, self.durations)}
+def result_of(value: Comparisons) -> Result[Comparisons]:
+    """Comparisons: figures are the largest deviations by variable, of several pairs by "result: variable"."""
+    pairs = value.comparisons
 
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return {"verdict": self.verdict, "answer": list(self.answers), "files": list(names)}
+    def figures() -> Figures:
+        from feedsim.analysis import Figure, Named
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files that were compared."""
-        return [Path(name) for pair in self.comparisons for name in (pair.result, pair.reference)]
+        return Named(
+            (
+                variable.name if len(pairs) == 1 else f"{pair.result}: {variable.name}",
+                Figure(variable.deviation, variable.unit, f"largest deviation; allowed {variable.allowed:.4g}"),
+            )
+            for pair in pairs
+            for variable in pair.those("same", "different")
+        )
 
-    def __repr__(self) -> str:
-        return f"Comparison: {self.comparisons[0].line}" if len(self.comparisons) == 1 else "; ".join(self.lines[-1:])
+    findings = [f"{pair.result}: {pair.line}" for pair in pairs if pair.verdict == "unusable"] + page.not_seen(pairs)
+    answers = [f"{pair.result} against {pair.reference}: {pair.line}" for pair in pairs]
+    return Result(
+        KIND,
+        value,
+        partial(page.report_of, pairs),
+        figures=figures,
+        details={"verdict": value.verdict, "answer": answers},
+        files=lambda: {JSON: page.to_json(pairs), XML: page.junit(pairs, value.durations)},
+        inputs=[Path(name) for pair in pairs for name in (pair.result, pair.reference)],
+        answers=answers,
+        findings=findings,
+        lines=partial(value.listed, everything=False),
+        all_lines=partial(value.listed, everything=True),
+        in_lines=findings,
+    )
 
 
 @job("compare results with references, for CI: 0 same, 1 different", needs=())
 def compare(
     *files: Annotated[
-        File | Trace | Run | RunResult, Argument("RESULT REFERENCE", "CSV files in turn, or two folders", many=True)
+        File | Trace | Run | Result[EvaluatedRun],
+        Argument("RESULT REFERENCE", "CSV files in turn, or two folders", many=True),
     ],
     tol: Annotated[
         str | Sequence[str],
@@ -249,7 +224,7 @@ def compare(
     ] = None,
     junit: Annotated[File | None, Option("FILE.xml", "JUnit XML for CI servers", group="output", writes=True)] = None,
     force: Force = False,
-) -> CompareResult:
+) -> Result[Comparisons]:
     r"""Compare results with references: every row must lie in a tube of value and time around the reference.
 
     Columns of the reference that the result lacks count as different; further columns of the result do not matter. Exit
@@ -319,7 +294,7 @@ def compare(
             own = [asked.tolerances, asked.ours.mapping, asked.theirs.mapping]
             page.check_writable(outputs, [*(path for pair in pairs for path in pair), *filter(None, own)])
             comparisons, durations = asked.of_files(pairs)
-        result = CompareResult(comparisons, paths, asked.tolerances, durations)
+        result = result_of(Comparisons(comparisons, paths, asked.tolerances, durations))
         page.write(comparisons, **outputs, durations=durations)
     return result
 

@@ -1,13 +1,13 @@
-"""RunResults and records over each other, at a prompt and in a notebook."""
+"""Results and records over each other, at a prompt and in a notebook."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, TypeVar
 
 from feedsim.analysis import Figure, Named
 from feedsim.analysis.side_by_side import Source, aligned, differing, named_apart, read_sources
@@ -16,29 +16,25 @@ from feedsim.files.columns import Columns, load_columns
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
-from feedsim.jobs.result import Result, kept
-from feedsim.jobs.run import RunResult
+from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.run import EvaluatedRun
+from feedsim.jobs.run import result_of as result_of_run
 from feedsim.report import show as page
-from feedsim.report.content import Report
 from feedsim.simulation import cosim
 from feedsim.simulation.judge import judged
 
-Shown = str | Path | RunResult
+Shown = str | Path | Result[EvaluatedRun]
 
 
-class Overlay(Result):
-    """Results and records over each other: what :func:`feedsim.diff` returns.
+KIND = Kind("diff")
+
+
+class Overlay:
+    """Results and records over each other.
 
     Attributes:
         names: of the results, in their order.
-
-    >>> import feedsim as fs
-    >>> over: fs.Overlay = fs.diff(fs.run("z_positioning.yaml"))
-    >>> over.names
-    ('Z positioning',)
     """
-
-    kind = "diff"
 
     def __init__(self, results: Mapping[str, Shown], mappings: Sequence[Columns] = ()) -> None:
         """results: name -> a result, its folder, or a CSV file. mappings: which columns of records are what.
@@ -47,61 +43,53 @@ class Overlay(Result):
         """
         if not results:
             raise InputError("nothing can be shown: no result is given")
-        self.place: Path | None = None  # where it was written
         self.names = tuple(results)
         # The report reads results from where they are written; those of a prompt are written for as long as this lives.
         self._folder = TemporaryFolder()
         paths = [_at(value, self._folder.path / str(k)) for k, value in enumerate(results.values())]
         result = zip(self.names, read_sources(paths, mappings), strict=True)
-        self._sources = aligned([replace(source, name=name) for name, source in result])
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """Name -> figure, of the first result that has it."""
-        own = [(name, source) for source in reversed(self._sources) for name in source.figures]
-        return Named((name, Figure(*source.figures[name], "")) for name, source in own)
+        self.sources = aligned([replace(source, name=name) for name, source in result])
 
     @property
     def side_by_side(self) -> dict[str, tuple[Figure | None, ...]]:
         """Name -> the figure of every result; None where it has none of that name."""
-        names = dict.fromkeys(name for source in self._sources for name in source.figures)
-        return {name: tuple(_figure(source, name) for source in self._sources) for name in names}
+        names = dict.fromkeys(name for source in self.sources for name in source.figures)
+        return {name: tuple(_figure(source, name) for source in self.sources) for name in names}
 
     @property
     def parameters(self) -> dict[str, tuple[str, ...]]:
         """Parameters in which the results differ: name -> the value of every result, "" of records."""
-        return {name: tuple(values) for name, values in differing(self._sources)}
+        return {name: tuple(values) for name, values in differing(self.sources)}
 
-    @property
-    def findings(self) -> Sequence[str]:
-        """What a reader of the records should know; results of feedsim have their own."""
-        return [note for source in self._sources for note in source.recording.notes]
 
-    @property
-    def answers(self) -> Sequence[str]:
-        """What differs, and how far the leading figures are from the first result's."""
-        return page.answers(self._sources)
+Laid = TypeVar("Laid", bound=Overlay)
 
-    @property
-    def lines(self) -> list[str]:
-        """Parameters that differ, leading figures, how all was aligned."""
-        return page.lines(self._sources)
 
-    @property
-    def inputs(self) -> list[Path]:
-        """The files that the results are read from."""
-        return page.files_of(self._sources)
+def result_of(
+    over: Laid,
+    findings: Sequence[str] | None = None,
+    lines: Callable[[], Sequence[str]] | None = None,
+    place: Path | None = None,
+) -> Result[Laid]:
+    """Results over each other; a figure is that of the first result that has it.
 
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self._sources)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self._sources, names)
-
-    def __repr__(self) -> str:
-        return "\n".join([f"Overlay of {', '.join(self.names)}", *self.lines])
+    findings: None: those of records; results of feedsim have their own. lines, place: as of `Result`.
+    """
+    sources = over.sources
+    of_records = [note for source in sources for note in source.recording.notes]
+    return Result(
+        KIND,
+        over,
+        partial(page.report_of, sources),
+        figures=Named(
+            (name, Figure(*source.figures[name], "")) for source in reversed(sources) for name in source.figures
+        ),
+        details=partial(page.details, sources),
+        inputs=page.files_of(sources),
+        findings=of_records if findings is None else findings,
+        lines=partial(page.lines, sources) if lines is None else lines,
+        place=place,
+    )
 
 
 @job("what differs between results and records, for people")
@@ -119,7 +107,7 @@ def diff(
     control: ControlName = "",
     watch: Watch = NO_WATCH,
     **named: Shown,
-) -> Overlay:
+) -> Result[Overlay]:
     """Lay results over each other.
 
     Contours of circles, stops, following error, torque, speed, position and spectra, a table of figures with their
@@ -146,13 +134,17 @@ def diff(
     >>> over.parameters["machine.axes.Z.drive.K_v"]
     ('66.6666667 1/s', '83.3333333 1/s')
     """
+    if other := [one.kind for one in (*results, *named.values()) if isinstance(one, Result) and one.kind != "run"]:
+        raise InputError(
+            f"a result of kind {other[0]} cannot be laid over others; runs, their folders and CSV files can"
+        )
     given: dict[str, Shown] = {}
-    files = list(dict.fromkeys(str(result) for result in results if not isinstance(result, RunResult)))
+    files = list(dict.fromkeys(str(result) for result in results if not isinstance(result, Result)))
     names = dict(zip(files, named_apart([Path(file) for file in files]), strict=True))
     for run_result in results:
         plain = (
             run_result.scenario.name
-            if isinstance(run_result, RunResult)
+            if isinstance(run_result, Result)
             else _called(str(run_result), names[str(run_result)])
         )
         same = sum(re.fullmatch(rf"{re.escape(plain)}( \(\d+\))?", name) is not None for name in given)
@@ -162,9 +154,9 @@ def diff(
             raise InputError(f"two results are called {name!r}; give one of them another name")
         given[name] = run_result
     mappings = [columns] if isinstance(columns, str | Path) else columns
-    over = Overlay(given, [load_columns(file) for file in mappings])
+    over = result_of(Overlay(given, [load_columns(file) for file in mappings]))
     if out is not None:
-        with kept(out, Overlay.check_place, watch, over.inputs, force=force):
+        with kept(out, KIND, watch, over.inputs, force=force):
             over.save(out, figures=figures, force=force, control=control)
     return over
 
@@ -176,12 +168,12 @@ def _called(text: str, name: str) -> str:
 
 def _at(entry: Shown, folder: Path) -> Path:
     """Where a result stands; one of the prompt, and a run of a study, is written there."""
-    if not isinstance(entry, RunResult):
+    if not isinstance(entry, Result):
         chosen = case(str(entry))
         if chosen is None:
             return Path(entry)
         scenario, fmus = scenario_of(chosen)
-        entry = RunResult.of(judged(cosim.run(scenario, fmus=fmus)))
+        entry = result_of_run(EvaluatedRun.of(judged(cosim.run(scenario, fmus=fmus))))
     entry.save(folder)
     return folder
 

@@ -30,7 +30,7 @@ from feedsim.jobs.parameters import (
     job,
     out_file,
 )
-from feedsim.jobs.result import Kind, Made, announce_archive
+from feedsim.jobs.result import Made, MadeKind, announce_archive
 from feedsim.jobs.run import on_machine
 from feedsim.report.live_page.content import content
 from feedsim.report.live_page.html import MARK, page
@@ -202,7 +202,7 @@ def export(
 
 
 PACKED = archive_with("modelDescription.xml", b'generationTool="feedsim')
-UNIT_KIND = Kind("pack", "unit", PACKED)
+UNIT_KIND = MadeKind("pack", "unit", PACKED)
 
 
 def pack(
@@ -294,7 +294,7 @@ def _check_loads(plan: Scenario) -> None:
 # --- A scenario's machine as one page that computes, with knobs -------------------------------------------------------
 
 
-PAGE_KIND = Kind("page", "page", begins_with(MARK))
+PAGE_KIND = MadeKind("page", "page", begins_with(MARK))
 
 
 def write_page(
@@ -348,7 +348,7 @@ def write_page(
 # --- A scenario as one SSP file, for other people's simulators --------------------------------------------------------
 
 
-SSP_KIND = Kind("ssp", "SSP file", archive_with(STRUCTURE, b'generationTool="feedsim'))
+SSP_KIND = MadeKind("ssp", "SSP file", archive_with(STRUCTURE, b'generationTool="feedsim'))
 
 
 def write_ssp(
@@ -412,7 +412,7 @@ def _inside(done: Exported, T_c: float) -> str:
 # --- A machine at a pose, or over a grid of poses, in a plant archive -------------------------------------------------
 
 
-PLANT_KIND = Kind("machine pack", "unit", PACKED, makes_folder=True)
+PLANT_KIND = MadeKind("machine pack", "unit", PACKED, makes_folder=True)
 # A cell takes a tenth of a second and, with two axes and a hundred modes, 0.2 MB in the archive and in the plant.
 MOST_CELLS = 3000
 # Positions that are typed twice are the same where they differ by less [m].

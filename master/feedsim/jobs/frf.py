@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from feedsim.analysis import Figure, Named, linear, responses, truncation
+from feedsim.analysis import Named, linear, responses, truncation
 from feedsim.analysis.campaign import Plan, run_campaign
 from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
 from feedsim.analysis.truncation import Truncation
@@ -28,11 +29,9 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
-from feedsim.report.content import Report
-from feedsim.report.results import Content
 from feedsim.scenario import Coupling, Machine, Subject, load_subject
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation.cosim.plant import plant_modes
@@ -51,8 +50,11 @@ UNSTABLE = (
 )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FrfResult(Result, Mapping[str, Complexes]):
+KIND = Kind("frf", page.FILES)
+
+
+@dataclass(frozen=True, eq=False)
+class MachineResponses(Mapping[str, Complexes]):
     """Frequency responses: a mapping of the closed form, name -> (F,) complex values over ``frequency``.
 
     Names say what of what, such as "Z.n_a/Z.M_a". subject: what they are of; responses: all that was found.
@@ -60,9 +62,6 @@ class FrfResult(Result, Mapping[str, Complexes]):
 
     subject: Subject
     responses: Responses
-
-    kind = "frf"
-    may_write = page.FILES
 
     @property
     def response(self) -> FrequencyResponse:
@@ -96,43 +95,21 @@ class FrfResult(Result, Mapping[str, Complexes]):
     def __len__(self) -> int:
         return len(self.response.names)
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the machine, and of the curves laid over."""
-        return [*(file for _, file in self.subject.files), *(overlay.file for overlay in self.responses.overlays)]
 
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "Z.speed.phase_margin", "Z.position.bandwidth_first", ..."""
-        return Named(self.responses.figures)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the curves are believed."""
-        return self.responses.warnings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """Stable or not, bandwidths and margins, and what to do next."""
-        return page.answers(self.responses)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers."""
-        first, *further = self.answers
-        return [f"{self.subject.name}: {first}", *(f"  {line}" for line in further)]
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.subject, self.responses, page.draw(self.responses))
-
-    def files(self) -> Mapping[str, Content]:
-        """The curves as CSV."""
-        return page.files_of(self.responses)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.subject, self.responses, names)
+def result_of(value: MachineResponses) -> Result[MachineResponses]:
+    """Frequency responses of a machine: stable or not, bandwidths and margins."""
+    subject, responses = value.subject, value.responses
+    first, *others = page.answers(responses)
+    return Result(
+        KIND,
+        value,
+        lambda: page.report_of(subject, responses, page.draw(responses)),
+        figures=Named(responses.figures),
+        details=partial(page.details, subject, responses),
+        files=partial(page.files_of, responses),
+        inputs=[*(file for _, file in subject.files), *(overlay.file for overlay in responses.overlays)],
+        lines=[f"{subject.name}: {first}", *(f"  {line}" for line in others)],
+    )
 
 
 @job("frequency responses of drives and structure")
@@ -226,7 +203,7 @@ def frf(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> FrfResult:
+) -> Result[MachineResponses]:
     """Frequency responses of feed drives and structure, in closed form and, friction off, measured on the units.
 
     Speed-controlled system n/M, reference frequency response of the speed controller, position loop, loop gains with
@@ -281,7 +258,7 @@ def frf(
     if machine.mounts is not None:
         warnings.append(mount_words(machine, deflection))
     inputs = [*(file for _, file in loaded.files), *(overlay.file for overlay in overlays)]
-    with kept(out, FrfResult.check_place, watch, inputs, texts, force=force):
+    with kept(out, KIND, watch, inputs, texts, force=force):
         watch.progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
         linear_result = linear.evaluate(system, chosen)
@@ -325,7 +302,7 @@ def frf(
             figures=numbers,
             warnings=tuple(warnings),
         )
-        result = FrfResult(loaded, done)
+        result = result_of(MachineResponses(loaded, done))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

@@ -5,16 +5,15 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Named
 from feedsim.analysis.history import Array, Scatter, Series, changes, crossing, scatter
 from feedsim.estimation.identify.friction_file import fleet_yaml
 from feedsim.estimation.least_squares import NORMAL_95
@@ -36,10 +35,9 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.jobs.run import load, run
 from feedsim.report import history as page
-from feedsim.report.content import Report
 from feedsim.report.history import Entry, Followed, History
 from feedsim.report.results import SUMMARY, Content
 from feedsim.scenario import Friction, GmsFriction
@@ -51,62 +49,27 @@ LIST_COLUMNS = ("result", "date", "machine", "kind", "law", "quantity", "value",
 EXAMPLE = "results/z_march@2026-03-01"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class HistoryResult(Result):
-    """Results over time: what :func:`feedsim.history` returns.
+KIND = Kind("history", page.FILES, keeps=(page.FLEET,))
 
-    history: all values with their dates, what has changed of them, limits, and the scatter between machines.
-    """
 
-    history: History
+def result_of(history: History) -> Result[History]:
+    """Results over time: values with their dates, what has changed of them, and the scatter between machines."""
+    figures = Named(page.figures_of(history))
 
-    kind = "history"
-    may_write = page.FILES
+    def files() -> Mapping[str, Content]:
+        fleet = {page.FLEET: fleet_yaml(page.fleet_axes(history), history.machines)} if history.scatters else {}
+        return {page.VALUES: page.values_csv(history), **(fleet or {page.CHANGES: page.changes_csv(history)})}
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Summaries and lists that were read, and the scenario."""
-        return self.history.files
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """Rates "Z.F_C.rate" and steps "Z.F_C.step" of what has changed; scatter "Z.F_C.between" of machines."""
-        return Named(page.figures_of(self.history))
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What was left out, and what the results leave open."""
-        return self.history.findings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """What has changed, a sentence each, the surest first."""
-        return page.answers(self.history)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers, and a table of all quantities."""
-        return page.terminal_lines(self.history)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.history, self.figures)
-
-    def files(self) -> Mapping[str, Content]:
-        """All values, and what has changed, as CSV; fleet.yaml of machines."""
-        files: dict[str, Content] = {page.VALUES: page.values_csv(self.history)}
-        if self.history.scatters:
-            return files | {page.FLEET: fleet_yaml(page.fleet_axes(self.history), self.history.machines)}
-        return files | {page.CHANGES: page.changes_csv(self.history)}
-
-    @property
-    def keeps(self) -> Sequence[str]:
-        """fleet.yaml."""
-        return (page.FLEET,)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.history, self.figures, names)
+    return Result(
+        KIND,
+        history,
+        partial(page.report_of, history, figures),
+        figures=figures,
+        details=partial(page.details, history),
+        files=files,
+        inputs=history.files,
+        lines=partial(page.terminal_lines, history),
+    )
 
 
 @job("what has changed over months, from results with their dates")
@@ -154,7 +117,7 @@ def history(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> HistoryResult:
+) -> Result[History]:
     """Lay results of several dates beside each other: what has changed, at which rate, and when a limit is reached.
 
     Takes results of identify friction, identify drive, circle and replay. A change is named where the test of
@@ -198,14 +161,12 @@ def history(
         "set": " ".join(texts), "machines": "yes" if machines else "",
     }  # fmt: skip
     asked = {name: text for name, text in asked.items() if text}
-    with kept(
-        out, HistoryResult.check_place, watch, files, [f"{name}={text}" for name, text in asked.items()], force=force
-    ):
+    with kept(out, KIND, watch, files, [f"{name}={text}" for name, text in asked.items()], force=force):
         if machines:
             fields = _of_machines(entries, chosen)
         else:
             fields = _of_dates(entries, chosen, limits, scenario, texts, fmus, watch)
-        result = HistoryResult(History(entries, files=files, settings=asked, scenario=str(scenario or ""), **fields))
+        result = result_of(History(entries, files=files, settings=asked, scenario=str(scenario or ""), **fields))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Annotated
 
 from feedsim.analysis import Figure, Named
-from feedsim.estimation.identify import STAGES, Asked, Estimate, Identification, Identified, named_apart, read_traces
+from feedsim.estimation.identify import STAGES, Asked, Identified, named_apart, read_traces
 from feedsim.estimation.identify.friction_file import FRICTION_FILE, read_fleet
 from feedsim.estimation.identify.parameters import PARAMETER_KINDS
 from feedsim.estimation.identify.stages import identify as identified_from
@@ -19,10 +20,8 @@ from feedsim.files.columns import load_columns
 from feedsim.foundation.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, FigureKinds, File, Force, Option, Watch, job, out
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report import identify as page
-from feedsim.report.content import Report
-from feedsim.report.results import Content
 from feedsim.scenario import Friction, load_subject
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
 from feedsim.simulation import cosim
@@ -32,81 +31,27 @@ ESTIMATE = "estimate"  # of inertia and delay: whatever mapping and machine say
 AXIS = "{axis}"  # in the name of a folder: the axis, in small letters
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class IdentifyResult(Result):
-    """Friction of an axis, identified.
+KIND = Kind("identify", page.FILES, keeps=(FRICTION_FILE,))
 
-    identified: what was found, and what it rests on. inputs_read: the files. place: where it was written.
-    """
 
-    identified: Identified
-    inputs_read: Sequence[Path] = ()
-    place: Path | None = None
-
-    kind = "identify"
-    may_write = page.FILES
-
-    @property
-    def found(self) -> Identification:
-        """Both stages, their estimates and correlations."""
-        return self.identified.found
-
-    @property
-    def estimates(self) -> Mapping[str, Estimate]:
-        """Every friction parameter, M_0, J and delay, by name: value, interval, status."""
-        return self.found.estimates
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Traces, mapping and files of the machine."""
-        return self.inputs_read
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """The estimates as figures, "Z.F_C"."""
-        return Named(
-            (f"{self.found.axis}.{name}", Figure(estimate.value, estimate.unit, estimate.meaning))
-            for name, estimate in self.estimates.items()
-        )
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the values are believed."""
-        return self.identified.warnings
-
-    def findings_shown(self, quiet: bool) -> Sequence[str]:
-        """Without the table all findings: it has the reasons that some only repeat."""
-        return self.findings if quiet else page.terminal_warnings(self.identified)
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """How well curve and pre-sliding are known."""
-        return [f"axis {self.found.axis}: {page.headline(self.identified)}"]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The table of all values with their intervals."""
-        return page.terminal_lines(self.identified, self.place)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.identified, page.draw(self.identified))
-
-    def files(self) -> Mapping[str, Content]:
-        """friction.yaml, and what the figures show as CSV."""
-        return page.files_of(self.identified)
-
-    @property
-    def keeps(self) -> Sequence[str]:
-        """friction.yaml."""
-        return (FRICTION_FILE,)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.identified, names)
-
-    def __repr__(self) -> str:
-        return repr(self.found)
+def result_of(identified: Identified, inputs: Sequence[Path] = (), place: Path | None = None) -> Result[Identified]:
+    """Friction of an axis, identified. inputs: files that it rests on. place: the folder that it is written to."""
+    found = identified.found
+    in_table = page.terminal_warnings(identified)
+    return Result(
+        KIND,
+        identified,
+        lambda: page.report_of(identified, page.draw(identified)),
+        figures=Named(
+            (f"{found.axis}.{name}", Figure(one.value, one.unit, one.meaning)) for name, one in found.estimates.items()
+        ).with_intervals({f"{found.axis}.{name}": one.interval for name, one in found.estimates.items()}),
+        details=partial(page.details, identified),
+        files=partial(page.files_of, identified),
+        inputs=inputs,
+        lines=lambda: page.terminal_lines(identified, place),
+        in_lines=[text for text in identified.warnings if text not in in_table],
+        place=place,
+    )
 
 
 @job("friction of an axis from recorded traces")
@@ -182,7 +127,7 @@ def identify_friction(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> IdentifyResult:
+) -> Result[Identified]:
     r"""Identify the friction of an axis: the Stribeck curve from constant speeds, pre-sliding from reversals.
 
     Leaves friction.yaml, which scenarios and machine files take as it is, a report with figures, and what the figures
@@ -232,14 +177,14 @@ def identify_friction(
     inputs += [file for _, file in subject.files] if subject is not None else []
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
     asked_for = [f"{name}={value}" for name, value in settings.items()]
-    with kept(folder, IdentifyResult.check_place, watch, inputs, asked_for, force=force):
+    with kept(folder, KIND, watch, inputs, asked_for, force=force):
         for sentence in cosim.executing(archives / f"{unit}.fmu", "friction law") if archives is not None else ():
             watch.announce(sentence)
         with FrictionLaw(archives, unit) as friction:
             identification = identified_from(records, friction, known, watch.progress)
         identification = replace(identification, seconds=reading | dict(identification.seconds))
         identified = Identified(identification, records, sources, subject, settings, date.today().isoformat())
-        result = IdentifyResult(identified, inputs, folder)
+        result = result_of(identified, inputs, folder)
         if folder is not None:
             result.save(folder, figures=figures, force=force)
     return result

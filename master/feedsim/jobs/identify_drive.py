@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Named
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import MOST_MODES
 from feedsim.foundation.arguments import Value, quantity, spelt
@@ -32,75 +32,25 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import Result, announce, kept
-from feedsim.report.content import Report
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report.replay import drive as page
 from feedsim.report.replay.drive import DriveReport
-from feedsim.report.results import Content
+
+KIND = Kind("identify-drive", keeps=("*",))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class DriveResult(Result):
-    """Drives of axes, identified.
-
-    drives: what was found of every axis, its files, and the record beside a run of it. inputs_read: the files.
-    """
-
-    drives: DriveReport
-    inputs_read: Sequence[Path]
-
-    kind = "identify-drive"
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Record and files of the machine."""
-        return self.inputs_read
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """How near a run of what was found comes to the record: "X.position_rms", ..."""
-        return Named(self.drives.figures)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the result is believed."""
-        return self.drives.warnings
-
-    @property
-    def exit_code(self) -> int:
-        """0, or 1 where an axis that was asked for has no drive."""
-        return int(bool(self.drives.found.refused))
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """How near what was found comes to the record, how far it is to be trusted, and what to do next."""
-        return page.answers(self.drives)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """Parameters with intervals, and how far a run of them is from the record, by axis."""
-        return page.summary_lines(self.drives)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.drives)
-
-    def files(self) -> Mapping[str, Content]:
-        """A machine folder, or, where the machine was given, drive and friction of its axes."""
-        return self.drives.found.files
-
-    @property
-    def keeps(self) -> Sequence[str]:
-        """All files of the machine."""
-        return tuple(self.files())
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.drives, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(tuple(self.drives.found.drives), folder, inputs)
+def result_of(drives: DriveReport, inputs: Sequence[Path]) -> Result[DriveReport]:
+    """Drives of axes: what was found of every axis, its files, and the record beside a run of it."""
+    return Result(
+        KIND,
+        drives,
+        partial(page.report_of, drives),
+        figures=Named(drives.figures),
+        details=partial(page.details, drives),
+        files=lambda: drives.found.files,
+        inputs=inputs,
+        lines=partial(page.summary_lines, drives),
+    )
 
 
 @job("drive, inertia and friction from a record of a control")
@@ -141,7 +91,7 @@ def identify_drive(
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> DriveResult:
+) -> Result[DriveReport]:
     """Identify the drive of axes: delay of the setpoint, position loop, speed controller, inertia and friction.
 
     Every value has an interval. Leaves a machine folder (or, with --machine, the drive's parameters), and a report.
@@ -169,7 +119,9 @@ def identify_drive(
     cycle = quantity("position_cycle", position_cycle, "s", "1 ms") if position_cycle else None
     count = count_of_modes(modes, asked.machine is not None)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, partial(page.check_writable, asked.axes), watch, asked.inputs, asked.asked_for, force=force):
+    with kept(
+        out, replace(KIND, may_write=page.files_of(asked.axes)), watch, asked.inputs, asked.asked_for, force=force
+    ):
         watch.progress("reading", 0, 1)
         read, records, refused = asked.each_axis()
         if asked.machine is not None:
@@ -192,7 +144,7 @@ def identify_drive(
         sources = [recorded.provenance for recorded in read.values()]
         unread = asked.unread(read)
         done = DriveReport(drives_found, sources, asked.subject, title, asked.settings, asked.marks, unread)
-        result = DriveResult(done, asked.inputs)
+        result = result_of(done, asked.inputs)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result

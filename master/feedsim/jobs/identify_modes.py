@@ -2,83 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Named
 from feedsim.estimation.modal.measured import Channel, from_responses, from_signals
-from feedsim.estimation.modal.rational import MOST_MODES, AxisModes
+from feedsim.estimation.modal.rational import MOST_MODES
 from feedsim.estimation.modal.rational import identify_modes as identified
 from feedsim.files.fields import no_axis
 from feedsim.files.trace.response_files import read_response
 from feedsim.foundation.arguments import Band, Value, between, quantity, settings, spelt
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import NO_WATCH, Argument, FigureKinds, File, Force, Option, Settings, Watch, job, out
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report import modal as page
-from feedsim.report.content import Report
-from feedsim.report.results import Content
 from feedsim.scenario import Machine, load_subject
 from feedsim.structure import checked_modes
 
+KIND = Kind("identify-modes", page.FILES, keeps=(page.MODES_FILE,))
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ModesResult(Result):
+
+def result_of(identified: page.ModesReport) -> Result[page.ModesReport]:
     """Modes of an axis: what was found, and what it rests on."""
-
-    identified: page.ModesReport
-
-    kind = page.KIND
-    may_write = page.FILES
-
-    @property
-    def axis(self) -> AxisModes:
-        """Rigid motion, delays and modes of the axis; ``table`` is the machine's table with them."""
-        return self.identified.found
-
-    @property
-    def keeps(self) -> Sequence[str]:
-        """The table of modes: machine files name it."""
-        return (page.MODES_FILE,)
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """The response, and the files of the machine."""
-        return [self.identified.file, *(file for _, file in self.identified.subject.files)]
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "X.resonance_1", "X.antiresonance_1", "X.ratio", "X.motor_delay", ..."""
-        return Named(self.identified.figures)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the modes are believed."""
-        return self.identified.warnings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """The modes, and how near the fit is to the measured lines."""
-        return page.answers(self.identified)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers, and all figures."""
-        return page.summary_lines(self.identified)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.identified)
-
-    def files(self) -> Mapping[str, Content]:
-        """The machine's table of modes, and the curves."""
-        return page.files_of(self.identified)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.identified, names)
+    return Result(
+        KIND,
+        identified,
+        partial(page.report_of, identified),
+        figures=Named(identified.figures),
+        details=partial(page.details, identified),
+        files=partial(page.files_of, identified),
+        inputs=[identified.file, *(file for _, file in identified.subject.files)],
+        lines=partial(page.summary_lines, identified),
+    )
 
 
 @job("elastic modes of an axis from measured responses")
@@ -115,7 +72,7 @@ def identify_modes(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> ModesResult:
+) -> Result[page.ModesReport]:
     r"""Elastic modes of an axis from a measured response: time signals, or a file of frequency responses.
 
     Rigid motion, delays and modes, whose number cross-validation decides; written as the machine's table of modes,
@@ -154,7 +111,7 @@ def identify_modes(
     given = {name: str(value) for name, value in asked.items() if value is not None}
     inputs = [path, *(file for _, file in subject.files)]
     named = [f"{name}={text}" for name, text in given.items()]
-    with kept(out, ModesResult.check_place, watch, inputs, [*texts, *named], force=force):
+    with kept(out, KIND, watch, inputs, [*texts, *named], force=force):
         watch.progress("reading", 0, 2)
         if input is not None:
             step = quantity("interval", interval, "s", "0.4 ms") if interval else None
@@ -168,7 +125,7 @@ def identify_modes(
             measured = measured.between(*_band(band))
         watch.progress("fit", 1, 2)
         axis_modes = identified(measured, checked_modes(subject.machine), chosen, count)
-        result = ModesResult(page.ModesReport(axis_modes, path, subject, given))
+        result = result_of(page.ModesReport(axis_modes, path, subject, given))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

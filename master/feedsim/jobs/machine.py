@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from feedsim.analysis import Figure, Named
 from feedsim.foundation.arguments import Value, lengths, pairs, quantity, spelt
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.outputs import begins_with, forced, replacing
+from feedsim.foundation.outputs import begins_with
 from feedsim.jobs.parameters import (
     NO_WATCH,
     AxisPositions,
@@ -30,11 +30,10 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report.content import PICTURE_FORMATS, Report
 from feedsim.report.machine import record as shown
 from feedsim.report.provenance import to_json
-from feedsim.report.results import Content, check_place, write_results, write_text
 from feedsim.scenario.load import Described, load_described
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.parts import GeometryStructure
@@ -43,6 +42,9 @@ from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
 from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
 from feedsim.structure.mounts import MOUNTS_FILE, MountTable, table_of, write_mounts
 from feedsim.structure.pose_change import stale
+
+if TYPE_CHECKING:
+    from feedsim.report.machine.report import Drawings
 
 # Exchange step where no machine file says what the control cycle is [s].
 USUAL_STEP = 125e-6
@@ -53,60 +55,23 @@ MODE_DISTANCE = 0.1
 POSITION_NEEDED = "AXIS=POSITION is needed, e.g. X=800mm"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class MachineResult(Result):
-    """A machine at a pose.
+def _of_build(folder: Path) -> Sequence[str]:
+    """Files of an earlier build, which has no summary that lists them."""
+    return (TABLE_FILE, MOUNTS_FILE, BUILD_FILE) if begins_with(b'"format"')(folder / BUILD_FILE) else ()
 
-    info: masses, inertias, coupling limits, modes. described: what its files say of it. modes: numbers of the modes
-    that are drawn; none: the first ones, on a sheet. listed: modes that ``lines`` list; None: all.
-    """
+
+KIND = Kind("machine", drawn=PICTURE_FORMATS)
+BUILT = Kind(
+    "machine build", (TABLE_FILE, MOUNTS_FILE, BUILD_FILE), own=_of_build, main_file=TABLE_FILE, reported=False
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PosedMachine:
+    """A machine at a pose. info: masses, inertias, coupling limits, modes. described: what its files say of it."""
 
     info: MachineInfo
     described: Described
-    modes: Sequence[int] = ()
-    scale: float = 1.0
-    animate: bool = False
-    listed: int | None = USUAL_MODES
-
-    kind = "machine"
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the machine."""
-        return [file for _, file in self.described.files]
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "total_mass", "lowest_mode", "X.J_tot", "X.coupling_limit", ...; what is not known is not there."""
-        result = {"total_mass": Figure(self.info.total_mass, "kg", "mass of everything")}
-        elastic = self.info.modes.frequency[self.info.modes.frequency > 0].tolist()
-        if elastic:
-            result["lowest_mode"] = Figure(elastic[0], "Hz", "frequency of the first mode that is not rigid")
-        for axis in self.info.axes:
-            for key, (unit, meaning) in shown.MEANINGS.items():
-                result[f"{axis.name}.{key}"] = Figure(getattr(axis, key), unit, meaning)
-        return Named((name, figure) for name, figure in result.items() if math.isfinite(figure.value))
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the modes are believed."""
-        return self.info.warnings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """The lowest mode and what moves in it, and whether the exchange with friction is stable."""
-        from feedsim.report.machine.report import answers
-
-        return answers(self.info)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """All figures, as a table."""
-        lines = shown.text(self.info, self.listed).split("\n")
-        if gaps := self.described.gaps:
-            more = f" (and {len(gaps) - 1} more)" if len(gaps) > 1 else ""
-            lines.append(f"The machine file is not complete: {gaps[0]}{more}")
-        return lines
 
     @property
     def structure(self) -> Structure:
@@ -118,22 +83,11 @@ class MachineResult(Result):
             )
         return self.described.structure
 
-    @cached_property
-    def _drawn(self) -> Any:
-        from feedsim.report.machine.report import drawn
-
-        return drawn(self.structure, self.info, modes=self.modes, scale=self.scale, animate=self.animate)
-
-    def report(self) -> Report:
-        """Content of report.html: the structure, and modes."""
-        from feedsim.report.machine.report import report_of
-
-        return report_of(self.info, self.described.files, self._drawn.parts)
-
-    def files(self) -> Mapping[str, Content]:
-        """Modes in motion, where they are asked for."""
-        animated: Mapping[str, Content] = self._drawn.files
-        return animated
+    @property
+    def mounts(self) -> MountTable | None:
+        """The mounts that are not linear; None where all are."""
+        built = self.info.built
+        return table_of(built.assembly, built.solution.shapes) if built is not None else None
 
     def record(self) -> dict[str, Any]:
         """All figures in full precision, for a JSON file."""
@@ -145,79 +99,97 @@ class MachineResult(Result):
         modes = [("modes", self.described.modes)] if self.described.modes else []
         return to_json(shown.record(self.info, [*self.described.files, *modes]))
 
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return self.record() | {"files": list(names)}
 
-    def save(
-        self, folder: str | Path, *, figures: Sequence[str] = PICTURE_FORMATS, force: bool = False, control: str = ""
-    ) -> tuple[Path, ...]:
-        """As :meth:`Result.save`; the pictures are drawn as files unless `figures` says otherwise."""
-        return super().save(folder, figures=figures, force=force, control=control)
+def figures_of(info: MachineInfo) -> Named:
+    """ "total_mass", "lowest_mode", "X.J_tot", "X.coupling_limit", ...; what is not known is not there."""
+    result = {"total_mass": Figure(info.total_mass, "kg", "mass of everything")}
+    elastic = info.modes.frequency[info.modes.frequency > 0].tolist()
+    if elastic:
+        result["lowest_mode"] = Figure(elastic[0], "Hz", "frequency of the first mode that is not rigid")
+    for axis in info.axes:
+        for key, (unit, meaning) in shown.MEANINGS.items():
+            result[f"{axis.name}.{key}"] = Figure(getattr(axis, key), unit, meaning)
+    return Named((name, figure) for name, figure in result.items() if math.isfinite(figure.value))
 
 
-class BuildResult(MachineResult):
+def result_of(
+    machine: PosedMachine,
+    modes: Sequence[int] = (),
+    scale: float = 1.0,
+    animate: bool = False,
+    listed: int | None = USUAL_MODES,
+) -> Result[PosedMachine]:
+    """A machine at a pose: its figures, the lowest mode and what moves in it, and pictures.
+
+    modes: numbers of the modes that are drawn; none: the first ones, on a sheet. listed: modes that are printed; None:
+    all.
+    """
+    info, described = machine.info, machine.described
+
+    @cache
+    def drawn() -> Drawings:
+        from feedsim.report.machine.report import drawn
+
+        return drawn(machine.structure, info, modes=modes, scale=scale, animate=animate)
+
+    def report() -> Report:
+        from feedsim.report.machine.report import report_of
+
+        return report_of(info, described.files, drawn().parts)
+
+    def answers() -> list[str]:
+        from feedsim.report.machine.report import answers
+
+        return answers(info)
+
+    def lines() -> list[str]:
+        gaps = described.gaps
+        more = f" (and {len(gaps) - 1} more)" if len(gaps) > 1 else ""
+        missing = [f"The machine file is not complete: {gaps[0]}{more}"] if gaps else []
+        return [*shown.text(info, listed).split("\n"), *missing]
+
+    return Result(
+        KIND,
+        machine,
+        report,
+        figures=partial(figures_of, info),
+        details=machine.record,
+        files=lambda: drawn().files,
+        inputs=[file for _, file in described.files],
+        answers=answers,
+        findings=info.warnings,
+        lines=lines,
+    )
+
+
+def result_of_build(machine: PosedMachine) -> Result[PosedMachine]:
     """Modes that were computed from a structure: the table that runs read, and how it came about."""
-
-    kind = "machine build"
-    main_file = TABLE_FILE
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """What was computed, in one line."""
-        solution = self.info.solution
-        assert solution is not None
-        frequency = self.info.modes.frequency
-        elastic = frequency[frequency > 0]
-        count = len(elastic) - solution.corrections
-        lowest = ", ".join(f"{f:.4g}" for f in elastic[: min(5, count)])
-        extra = f" and {solution.corrections} pseudo-modes" if solution.corrections else ""
-        return [
-            f"{self.info.title}: {solution.shapes.shape[0]} degrees of freedom, {len(frequency) - len(elastic)} rigid "
-            f"and {count} elastic modes{extra}{f', lowest {lowest} Hz' if lowest else ''}"
-        ]
-
-    def files(self) -> Mapping[str, Content]:
-        """The table of modes, that of mounts that are not linear, and the record of their origin."""
-        modes: Content = lambda path: write_modes(path, self.info.modes)  # noqa: E731
-        mounts: dict[str, Content] = {}
-        if (table := self.mounts) is not None:
-            mounts[MOUNTS_FILE] = lambda path: write_mounts(path, table)
-        return {TABLE_FILE: modes, **mounts, BUILD_FILE: to_json(self.record())}
-
-    @property
-    def mounts(self) -> MountTable | None:
-        """The mounts that are not linear; None where all are."""
-        built = self.info.built
-        return table_of(built.assembly, built.solution.shapes) if built is not None else None
-
-    @classmethod
-    def check_place(cls, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """As :meth:`Result.check_place`."""
-        check_place(folder, (TABLE_FILE, MOUNTS_FILE, BUILD_FILE), inputs, kind=cls.kind, own=_of_build(folder))
-
-    def save(
-        self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
-    ) -> tuple[Path, ...]:
-        """Write modes.csv, mounts.csv where there are mounts that are not linear, and build.json, without report and
-        pictures. Whole or not at all. Raises OutputError."""
-        place, mounts = Path(folder), self.mounts
-
-        def fill(fresh: Path, names: Sequence[str]) -> None:
-            write_modes(fresh / TABLE_FILE, self.info.modes)
-            if mounts is not None:
-                write_mounts(fresh / MOUNTS_FILE, mounts)
-            write_text(fresh / BUILD_FILE, to_json(self.record()))
-
-        names = (TABLE_FILE, *((MOUNTS_FILE,) if mounts is not None else ()), BUILD_FILE)
-        with replacing(force or forced()):
-            self.check_writable(place, self.inputs)
-            return write_results(place, names, (), fill, kind=self.kind, own=_of_build(place))
-
-
-def _of_build(folder: Path) -> Sequence[str]:
-    """Files of an earlier build, which has no summary that lists them."""
-    return (TABLE_FILE, MOUNTS_FILE, BUILD_FILE) if begins_with(b'"format"')(folder / BUILD_FILE) else ()
+    info, solution, mounts = machine.info, machine.info.solution, machine.mounts
+    assert solution is not None
+    shown_too = result_of(machine)
+    elastic = info.modes.frequency[info.modes.frequency > 0]
+    count = len(elastic) - solution.corrections
+    lowest = ", ".join(f"{f:.4g}" for f in elastic[: min(5, count)])
+    extra = f" and {solution.corrections} pseudo-modes" if solution.corrections else ""
+    return Result(
+        BUILT,
+        machine,
+        shown_too.report,
+        figures=lambda: shown_too.figures,
+        files=lambda: {
+            TABLE_FILE: partial(write_modes, modes=info.modes),
+            **({} if mounts is None else {MOUNTS_FILE: partial(write_mounts, table=mounts)}),
+            BUILD_FILE: to_json(machine.record()),
+        },
+        inputs=shown_too.inputs,
+        answers=lambda: shown_too.answers,
+        findings=info.warnings,
+        lines=[
+            f"{info.title}: {solution.shapes.shape[0]} degrees of freedom, "
+            f"{len(info.modes.frequency) - len(elastic)} rigid and {count} elastic modes{extra}"
+            f"{f', lowest {lowest} Hz' if lowest else ''}"
+        ],
+    )
 
 
 @job("masses, inertias, leads, coupling limits and modes")
@@ -230,7 +202,7 @@ def machine_info(
     step: CouplingStep = None,
     modes: Annotated[int | str | None, Option("N", "modes to list: number or all (default: 20)")] = USUAL_MODES,
     watch: Watch = NO_WATCH,
-) -> MachineResult:
+) -> Result[PosedMachine]:
     """Masses, inertias, leads, coupling limits and modes of a machine.
 
     They are computed from its structure where it has one, else from its table of modes. MACHINE may be a scenario too.
@@ -244,7 +216,7 @@ def machine_info(
     most = _listed(modes)
     described = load_described(machine)
     info = _info(machine, described, at, cutoff, static_correction, step, watch)
-    return MachineResult(info, described, listed=most)
+    return result_of(PosedMachine(info, described), listed=most)
 
 
 @job("compute a machine's modes from its structure")
@@ -257,7 +229,7 @@ def machine_build(
     static_correction: StaticCorrection = False,
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> BuildResult:
+) -> Result[PosedMachine]:
     """Compute the modes of a machine from its structure.
 
     The structure is geometry, or matrices of a finite-element program (docs/structure.md).
@@ -276,9 +248,9 @@ def machine_build(
             f"{machine}: has no key structure; modes are computed from a structure file (docs/structure.md)"
         )
 
-    with kept(out, BuildResult.check_place, watch, [file for _, file in described.files], force=force):
+    with kept(out, BUILT, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at, cutoff, static_correction, None, watch, fresh=True)
-        result = BuildResult(info, described)
+        result = result_of_build(PosedMachine(info, described))
         if out is not None:
             result.save(out, force=force)
     return result
@@ -311,7 +283,7 @@ def machine_view(
     ] = "auto",
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> MachineResult:
+) -> Result[PosedMachine]:
     """Draw the structure of a machine and its modes.
 
     Writes pictures as PNG and SVG and a report. MACHINE may be a scenario too.
@@ -334,10 +306,10 @@ def machine_view(
             "file (key structure, docs/structure.md)"
         )
 
-    with kept(out, MachineResult.check_place, watch, [file for _, file in described.files], force=force):
+    with kept(out, KIND, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at, cutoff, static_correction, step, watch)
         chosen = list(dict.fromkeys(_mode(entry, info.modes) for entry in mode))
-        result = MachineResult(info, described, chosen, factor, animate)
+        result = result_of(PosedMachine(info, described), chosen, factor, animate)
         if out is not None:
             result.save(out, force=force)
     return result

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
 from typing import Annotated, Any
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Named
 from feedsim.files.control import names_of
 from feedsim.files.control.archive import Archive
 from feedsim.files.control.reading import Value
@@ -30,70 +30,41 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
-from feedsim.report.content import Report
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report.control_files import exported as page
-from feedsim.report.results import Content
 from feedsim.scenario import load_machine
 from feedsim.scenario.machine import Machine
 
+KIND = Kind("machine export", (page.SHEET,))
 
-@dataclass(frozen=True, eq=False, repr=False)
-class MachineExportResult(Result):
+
+@dataclass(frozen=True, eq=False)
+class Exported:
     """Files of a control with values of a machine file.
 
     archives: the files as they were. written: files with changed values, and every difference. machine: whose values
-    they are. inputs_read: the files.
+    they are. axes: of the machine -> those of the control.
     """
 
     archives: Sequence[Archive]
     written: Written
     machine: Machine
     axes: Mapping[str, str]
-    inputs_read: Sequence[Path]
 
-    kind = page.KIND
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the control and of the machine."""
-        return self.inputs_read
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "values.changed", "values.to_type", "values.same"."""
-        return Named(page.figures_of(self.written))
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """Values that are to be typed, and what was not touched although it may matter."""
-        return page.findings(self.written)
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """How many values of each axis differ."""
-        return page.answers(self.written, self.axes)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers, and every changed value."""
-        return [f"  {line}" for line in (*self.answers, *page.change_lines(self.written))]
-
-    def files(self) -> Mapping[str, Content]:
-        """Files with changed values, and the sheet to type."""
-        return {**page.named(self.written.contents), page.SHEET: page.sheet(self.written)}
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.archives, self.written, self.machine, self.axes, self.inputs_read)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.written, self.machine, self.axes, self.inputs_read, names)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable([*page.named(self.written.contents)], folder, inputs)
+def result_of(value: Exported, inputs: Sequence[Path]) -> Result[Exported]:
+    """Files of a control with values of a machine file, and what is to be typed. inputs: files of both."""
+    written, machine, axes = value.written, value.machine, value.axes
+    return Result(
+        KIND,
+        value,
+        lambda: page.report_of(value.archives, written, machine, axes, inputs),
+        figures=Named(page.figures_of(written)),
+        details=lambda: page.details(written, machine, axes, inputs),
+        files=lambda: {**page.named(written.contents), page.SHEET: page.sheet(written)},
+        inputs=inputs,
+        lines=lambda: [f"  {line}" for line in (*page.answers(written, axes), *page.change_lines(written))],
+    )
 
 
 @job("write values of a machine into files of a control")
@@ -108,7 +79,7 @@ def machine_export(
     out: Annotated[File | None, out("export_{machine}")] = None,
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> MachineExportResult:
+) -> Result[Exported]:
     r"""Write the values of a machine file into copies of a control's files, and a sheet of old and new values.
 
     The bytes of changed values differ, and no others. What cannot be written stands on the sheet, to be typed.
@@ -152,10 +123,10 @@ def machine_export(
         checked=listed(checked),
     )
     inputs = inputs_of(archives, base)
-    result = MachineExportResult(archives, written, own, chosen, inputs)
+    result = result_of(Exported(archives, written, own, chosen), inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
-    with kept(out, lambda folder, inputs: page.check_writable(page.kept_apart(names), folder, inputs), watch,
-              inputs, (), force=force):  # fmt: skip
+    kind = replace(KIND, may_write=(*KIND.may_write, *page.kept_apart(names)))
+    with kept(out, kind, watch, inputs, force=force):
         if out is not None:
             result.save(out, force=force)
     return result

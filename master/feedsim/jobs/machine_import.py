@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Named
 from feedsim.files.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
 from feedsim.files.control.formats import opened
 from feedsim.files.control.reading import Reading, read
@@ -31,72 +31,39 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, kept
-from feedsim.report.content import Report
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report.control_files import imported as page
-from feedsim.report.results import Content
 from feedsim.scenario.imported import Imported, imported
 from feedsim.scenario.machine import Machine
 
+KIND = Kind("machine import", page.FILES, keeps=("*.yaml", "modes.csv"), main_file=Machine.IN_FOLDER)
 
-@dataclass(frozen=True, eq=False, repr=False)
-class MachineImportResult(Result):
+
+@dataclass(frozen=True, eq=False)
+class Taken:
     """A machine file with values of a control.
 
     archives: the files as they are. reading: values that were taken and refused. made: the machine file.
-    inputs_read: the files.
     """
 
     archives: Sequence[Archive]
     reading: Reading
     made: Imported
-    inputs_read: Sequence[Path]
 
-    kind = page.KIND
-    main_file = "machine.yaml"
-    may_write = page.FILES
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the control and of the machine."""
-        return self.inputs_read
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "values.taken", "values.not_taken", "lines.not_understood", ..."""
-        return Named(page.figures_of(self.archives, self.reading, self.made))
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """Values that were not taken, keys that are missing, lines that were not understood."""
-        return page.findings(self.archives, self.reading, self.made)
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """How many values each axis has."""
-        return page.answers(self.reading, self.made)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers."""
-        return [f"  {line}" for line in self.answers]
-
-    def files(self) -> Mapping[str, Content]:
-        """The machine's folder, and every value as a table."""
-        return {**self.made.files(), page.SHEET: page.sheet(self.reading, self.made)}
-
-    @property
-    def keeps(self) -> Sequence[str]:
-        """The files of the machine."""
-        return tuple(self.made.files())
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.archives, self.reading, self.made, self.inputs_read)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.archives, self.reading, self.made, self.inputs_read, names)
+def result_of(value: Taken, inputs: Sequence[Path]) -> Result[Taken]:
+    """A machine file with values of a control, and what of these was not taken. inputs: files of both."""
+    archives, reading, made = value.archives, value.reading, value.made
+    return Result(
+        KIND,
+        value,
+        lambda: page.report_of(archives, reading, made, inputs),
+        figures=Named(page.figures_of(archives, reading, made)),
+        details=lambda: page.details(archives, reading, made, inputs),
+        files=lambda: {**made.files(), page.SHEET: page.sheet(reading, made)},
+        inputs=inputs,
+        lines=lambda: [f"  {line}" for line in page.answers(reading, made)],
+    )
 
 
 @job("fill a machine file from the files of a control")
@@ -121,7 +88,7 @@ def machine_import(
     out: Annotated[File | None, out("machine_{files}")] = None,
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> MachineImportResult:
+) -> Result[Taken]:
     r"""Fill drive, limits, filters and compensations of a machine file from the files of a control.
 
     A value is taken where the file has it once, where it acts, and where a public source states its unit. All others
@@ -159,9 +126,9 @@ def machine_import(
     )
     made = imported(reading, base, name or paths[0].stem)
     inputs = inputs_of(archives, base)
-    result = MachineImportResult(archives, reading, made, inputs)
+    result = result_of(Taken(archives, reading, made), inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
-    with kept(out, MachineImportResult.check_place, watch, inputs, (), force=force):
+    with kept(out, KIND, watch, inputs, (), force=force):
         if out is not None:
             result.save(out, force=force)
     return result

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Named
 from feedsim.design.tune import Proposal
 from feedsim.design.tune.proposals import of_drives
 from feedsim.estimation.replay.compare import replayed
 from feedsim.estimation.replay.open_loop import driven
-from feedsim.files.trace import Trace, write_csv
+from feedsim.files.trace import write_csv
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -32,69 +31,27 @@ from feedsim.jobs.parameters import (
     out,
 )
 from feedsim.jobs.records import Asked
-from feedsim.jobs.result import Result, announce, kept
-from feedsim.report.content import Report
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report.replay import report as page
 from feedsim.report.replay.report import Replayed
-from feedsim.report.results import Content
 from feedsim.scenario import Drive, Machine
 from feedsim.structure import checked_modes
 
+KIND = Kind("replay", page.FILES)
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ReplayResult(Result):
-    """A record beside the simulated machine that follows its setpoints.
 
-    replayed: every axis with its channels, recorded and simulated. inputs_read: the files.
-    """
-
-    replayed: Replayed
-    inputs_read: Sequence[Path]
-
-    kind = "replay"
-    may_write = page.FILES
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Record, mapping and files of the machine."""
-        return self.inputs_read
-
-    @property
-    def trace(self) -> Trace:
-        """Record and simulation side by side, "Z.x_a_recorded" and "Z.x_a_simulated", in SI units."""
-        return page.trace_of(self.replayed.comparisons)
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "Z.position_rms", "Z.torque_rms", ..."""
-        return Named(self.replayed.figures)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the result is believed."""
-        return self.replayed.warnings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """How far the simulation is from the record, a line per axis."""
-        return page.answers(self.replayed)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers, and what to change."""
-        return page.lines(self.replayed)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.replayed)
-
-    def files(self) -> Mapping[str, Content]:
-        """Record and simulation as CSV."""
-        return {page.REPLAY: partial(write_csv, trace=self.trace)}
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.replayed, names)
+def result_of(done: Replayed, inputs: Sequence[Path]) -> Result[Replayed]:
+    """A record beside the simulated machine that follows its setpoints. inputs: files that it rests on."""
+    return Result(
+        KIND,
+        done,
+        partial(page.report_of, done),
+        figures=Named(done.figures),
+        details=partial(page.details, done),
+        files=lambda: {page.REPLAY: partial(write_csv, trace=done.trace)},
+        inputs=inputs,
+        lines=partial(page.lines, done),
+    )
 
 
 @job("run a record's setpoints on simulated axes, and compare")
@@ -118,7 +75,7 @@ def replay(
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> ReplayResult:
+) -> Result[Replayed]:
     """Run the position setpoints of a record through the simulated axes, in closed loop, and compare.
 
     Shows what is left of position, torque and speed setpoint: over time, as figures, as a spectrum and over the
@@ -149,7 +106,7 @@ def replay(
     archives = None if fmus is None else Path(fmus)
     inputs = [*asked.inputs, own.modes]
     asked_for = [*asked.asked_for, *(["open_loop=yes"] if open_loop else [])]
-    with kept(out, ReplayResult.check_place, watch, inputs, asked_for, force=force):
+    with kept(out, KIND, watch, inputs, asked_for, force=force):
         watch.progress("reading", 0, 3)
         records = asked.records
         announce(watch, own, archives)
@@ -165,7 +122,7 @@ def replay(
         done = Replayed(
             comparisons, asked.subject, sources, asked.marks, settings, [*findings], _proposals(own, asked.axes)
         )
-        result = ReplayResult(done, inputs)
+        result = result_of(done, inputs)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from fnmatch import fnmatch
+from functools import cache
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.arguments import Call, call, calling
@@ -19,11 +19,15 @@ from feedsim.foundation.owned import claimed
 from feedsim.jobs.parameters import File, Watch
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
+from feedsim.report.provenance import figures_part
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, replaced, write_report
 
 if TYPE_CHECKING:
-    from feedsim.analysis import Figure
+    from feedsim.analysis import Figure, Figures
     from feedsim.scenario import Coupling, Machine
+
+T = TypeVar("T")
+V = TypeVar("V")
 
 
 # --- What is said to who watches a job (jobs/parameters.py) before it begins ------------------------------------------
@@ -48,112 +52,174 @@ def announce_archive(watch: Watch, path: Path | None, who: str) -> None:
         watch.announce(sentence)
 
 
-# --- What every job returns: figures, findings, answers, a report and its files ---------------------------------------
+# --- A kind of result, and what every job returns ---------------------------------------------------------------------
 
 
 NOTEBOOK_HEIGHT = 900  # [px] of a report in a notebook; it scrolls
 
 
-class Result(ABC):
-    """What a job has found. It reads its files no more: all is in memory, and :meth:`save` writes it.
+@dataclass(frozen=True)
+class Kind:
+    """A kind of result: its name, and what has to be known of its files before there is a result.
+
+    Attributes:
+        name: as summary.json has it.
+        may_write: names of files that one may have besides report.html and summary.json.
+        keeps: patterns of names of files that scenarios and machine files may name: the next result in the folder
+            leaves them.
+        own: of a folder, names of files in it that only results of this kind have, listed by a summary or not.
+        main_file: of its files, the one that the command names.
+        drawn: kinds of files that its pictures are drawn as where nothing else is asked for.
+        reported: whether report.html and summary.json go along.
+    """
+
+    name: str
+    may_write: Sequence[str] = ()
+    keeps: Sequence[str] = ()
+    own: Callable[[Path], Sequence[str]] = lambda folder: ()
+    main_file: str = REPORT
+    drawn: Sequence[str] = ()
+    reported: bool = True
+
+    def check_place(self, folder: Path, inputs: Sequence[Path] = (), files: Iterable[str] = ()) -> None:
+        """Raise OutputError unless a result of this kind can be written to `folder`. Leaves nothing behind.
+
+        inputs: files that are read; none of them is lost. files: names of further files that it has.
+        """
+        names = dict.fromkeys((*self.may_write, *files, *((REPORT, SUMMARY) if self.reported else ())))
+        check_place(folder, list(names), inputs, kind=self.name, own=self.own(folder))
+
+
+class Late(Generic[T]):
+    """A field of a data class that is given as a value, or as a function that is called when it is first asked for.
+
+    default: the function of the object where neither is given.
+    """
+
+    def __init__(self, default: Callable[[Any], T]) -> None:
+        self._default = default
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __set__(self, owner: object, value: T | Callable[[], T]) -> None:
+        vars(owner)[self._name] = value
+
+    def __get__(self, owner: object | None, kind: type) -> T:
+        if owner is None:  # the data class asks for the default
+            return cast("T", self._default)
+        value = vars(owner)[self._name]
+        if callable(value):
+            value = vars(owner)[self._name] = value(owner) if value is self._default else value()
+        return cast("T", value)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Generic[V]):
+    """What a job has found: a value to compute with, and what is to be said of it. :meth:`save` writes both.
+
+    What the value has, the result has: ``result.trace`` is ``result.value.trace``, ``result["Z.x_a"]`` is
+    ``result.value["Z.x_a"]``. It reads its files no more: all is in memory.
+
+    A kind of result is a function that makes this of a value. What takes longer it gives as functions without
+    arguments, which are called when somebody asks. Terminal, page, summary.json and notebooks read the same fields, and
+    what is said in the report: answers, warnings, what to type, what to do next.
+
+    Attributes:
+        value: what was found.
+        report: a function: content of report.html.
+        figures: name -> derived number with unit and meaning, and its interval where that is known.
+        details: what summary.json has besides, as JSON has it.
+        files: a function: name -> content of every file besides report.html, summary.json and figures.
+        inputs: files that the result rests on; saving never replaces one of them.
+        answers: what the job was asked, answered in sentences.
+        findings: what is to be known before the result is believed: ``Wrong``, plain text (a doubt) or ``Note``.
+        rows: what the command prints behind the answers.
+        lines: what it prints: answers, what to type, rows, where nothing else is given. all_lines: with --verbose.
+        in_lines: findings that these lines have already; the command prints them where it prints no lines.
+        place: the folder that it was written to, where that is not the one that the job was given.
 
     >>> import feedsim as fs
     >>> result = fs.run("z_positioning.yaml")
     >>> isinstance(result, fs.Result), result.kind
     (True, 'run')
+    >>> float(result["Z.x_a"][-1].round(6)), result.trace.unit("Z.x_a")
+    (0.2, 'm')
     """
 
-    kind: ClassVar[str]  # of the result, as summary.json has it
-    main_file: ClassVar[str] = REPORT  # of its files, the one that the command names
-    own: ClassVar[Sequence[str]] = ()  # names of files that only results of this kind have
-    may_write: ClassVar[Sequence[str]] = ()  # names of files that one may have besides report.html and summary.json
+    _kind: Kind
+    value: V
+    report: Callable[[], Report]
+    figures: Late[Figures] = Late(lambda _: {})
+    details: Late[Mapping[str, Any]] = Late(lambda _: {})
+    files: Callable[[], Mapping[str, Content]] = dict
+    inputs: Late[Sequence[Path]] = Late(lambda _: ())
+    answers: Late[Sequence[str]] = Late(lambda self: self.report().answer)
+    findings: Late[Sequence[str]] = Late(lambda self: self.report().warnings)
+    rows: Late[Sequence[str]] = Late(lambda _: ())
+    lines: Late[Sequence[str]] = Late(lambda self: self._answers_and_rows())
+    all_lines: Late[Sequence[str]] = Late(lambda self: self._lines_and_figures())
+    in_lines: Late[Sequence[str]] = Late(lambda _: ())
+    place: Path | None = None
+    _call: Call | None = field(default_factory=call)
 
-    call: Call | None  # of the job that has made it; None of one made otherwise
+    def __post_init__(self) -> None:
+        made = self.report
 
-    def __new__(cls, *_: object, **__: object) -> Self:
-        made = super().__new__(cls)
-        object.__setattr__(made, "call", call())
-        return made
+        def report() -> Report:
+            with calling(self._call):
+                return made()
 
-    @property
-    def keeps(self) -> Sequence[str]:
-        """Those of its files that scenarios and machine files may name: the next result in the folder leaves them."""
-        return ()
-
-    @property
-    @abstractmethod
-    def figures(self) -> Mapping[str, Figure]:
-        """Name -> derived number with unit and meaning."""
-
-    @property
-    @abstractmethod
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the result is believed: ``Wrong``, plain text (a doubt) or ``Note``."""
-
-    @property
-    @abstractmethod
-    def answers(self) -> Sequence[str]:
-        """What the job was asked, answered in sentences."""
+        object.__setattr__(self, "_made", report)
+        object.__setattr__(self, "report", cache(report))
 
     @property
-    @abstractmethod
-    def lines(self) -> Sequence[str]:
-        """What the command of this job prints."""
+    def kind(self) -> str:
+        """Of the result, such as "run"."""
+        return self._kind.name
 
-    def lines_shown(self, verbose: bool) -> Sequence[str]:
-        """What the command prints; verbose: all figures, too."""
-        figures = self.figures.items() if verbose else ()
-        return [*self.lines, *(f"  {name} = {figure}: {figure.meaning}" for name, figure in figures)]
+    def _answers_and_rows(self) -> list[str]:
+        first, *others = [*self.answers] or [""]
+        return [*filter(None, (first, self.report().action)), *others, *self.rows]
 
-    def findings_shown(self, quiet: bool) -> Sequence[str]:
-        """Findings that the command prints; quiet: where it prints nothing else."""
-        return self.findings
-
-    @abstractmethod
-    def report(self) -> Report:
-        """Content of report.html."""
-
-    @abstractmethod
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json, where all files have the given names."""
-
-    @classmethod
-    def check_place(cls, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless a result of this kind can be written to `folder`. Leaves nothing behind.
-
-        inputs: files that are read; none of them is lost.
-        """
-        check_place(folder, (*cls.may_write, REPORT, SUMMARY), inputs, kind=cls.kind, own=cls.own)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder` and none of `inputs` is lost."""
-        self.check_place(folder, inputs)
+    def _lines_and_figures(self) -> list[str]:
+        return [*self.lines, *(f"  {name} = {figure}: {figure.meaning}" for name, figure in self.figures.items())]
 
     @property
-    def inputs(self) -> Sequence[Path]:
-        """Files that the result rests on; saving never replaces one of them."""
-        return ()
+    def next_command(self) -> str:
+        """What to do next, as it is typed; "" where there is nothing, or the command needs the folder of the result."""
+        step = self.report().next_step
+        with calling(self._call):
+            return "" if step is None else step.line(self.place)
 
-    def files(self) -> Mapping[str, Content]:
-        """Name -> content of every file besides report.html, summary.json and figures."""
-        return {}
-
-    @cached_property
-    def pictures(self) -> tuple[Picture, ...]:
+    @property
+    def pictures(self) -> Sequence[Picture]:
         """All pictures of the report."""
-        return tuple(self.report().pictures)
+        return self.report().pictures
 
-    def plot(self, *, ax: Any = None) -> Any:
+    def plot(self, *signals: str, ax: Any = None) -> Any:
         """The main picture of the report. A notebook shows it; ``.save("circle.png")`` writes it. Raises InputError.
 
-        ax: axes of matplotlib, one or several, that it is drawn on, a panel on each; then they are returned.
+        signals: of its trace, over time, in place of that: ``result.plot("Z.x_a", "Z.M_fr")``, also "Z.*". ax: axes of
+        matplotlib, one or several, that it is drawn on, a panel on each; then they are returned.
         """
-        if not self.pictures:
-            raise InputError(f"a result of kind {self.kind} has no picture")
-        return self.pictures[0] if ax is None else self.pictures[0].on(ax)
+        if self.pictures and not signals:
+            picture = self.pictures[0]
+        elif hasattr(self.value, "trace"):
+            from feedsim.report.run.axis_plots import signals_picture
+
+            picture = signals_picture(self.value.trace.select(signals or ("*.x_a",)), self.report().title)
+        else:
+            raise InputError(f"a result of kind {self.kind} has no {'signals' if signals else 'picture'}")
+        return picture if ax is None else picture.on(ax)
 
     def save(
-        self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
+        self,
+        folder: str | Path,
+        *,
+        figures: Sequence[str] | None = None,
+        force: bool = False,
+        control: str = "",
     ) -> tuple[Path, ...]:
         """Write report.html, summary.json and all files; returns the paths.
 
@@ -161,18 +227,40 @@ class Result(ABC):
         did not write may be replaced. control: parameters in the names and units of a control, "sinumerik", too. All is
         written or nothing. Raises OutputError.
         """
-        with replacing(force or forced()), in_words_of(control), calling(self.call):
-            self.check_writable(Path(folder), self.inputs)
+        kind = self._kind
+        with replacing(force or forced()), in_words_of(control), calling(self._call):
+            files = self.files()
+            kind.check_place(Path(folder), self.inputs, files)
             return write_report(
                 folder,
-                self.report(),
-                self.summary,
-                self.files(),
-                figures,
-                kind=self.kind,
-                own=self.own,
-                keeps=self.keeps,
+                (self._made() if control else self.report()) if kind.reported else None,
+                {"figures": figures_part(self.figures), **self.details},
+                files,
+                kind.drawn if figures is None else figures,
+                kind=kind.name,
+                own=kind.own(Path(folder)),
+                keeps=[name for name in files if any(fnmatch(name, pattern) for pattern in kind.keeps)],
             )
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or "value" not in vars(self):
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        return getattr(self.value, name)
+
+    def __getitem__(self, name: Any) -> Any:
+        return self.value[name]  # type: ignore[index]
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.value)  # type: ignore[call-overload, no-any-return]
+
+    def __len__(self) -> int:
+        return len(self.value)  # type: ignore[arg-type]
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __dir__(self) -> list[str]:
+        return sorted({name for name in (*super().__dir__(), *dir(self.value)) if not name.startswith("_")})
 
     def __repr__(self) -> str:
         wrong = [text for text in self.findings if severity(text) != "note"]
@@ -180,7 +268,7 @@ class Result(ABC):
         return "; ".join([f"Result of {self.kind}: {', '.join(self.answers[:1]) or 'no answer'}", *said])
 
     def _repr_html_(self) -> str:
-        with calling(self.call):
+        with calling(self._call):
             page = escape(html(self.report(), self.kind), quote=True)
         return f"<iframe style='width:100%;height:{NOTEBOOK_HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
 
@@ -198,7 +286,7 @@ def in_words_of(control: str) -> AbstractContextManager[None]:
 
 
 @dataclass(frozen=True)
-class Kind:
+class MadeKind:
     """A kind of such files: what messages call it, and how one of feedsim's own is known, which may be replaced."""
 
     name: str
@@ -246,7 +334,7 @@ class Made:
     (True, True, ['machine.fmu'])
     """
 
-    of: Kind
+    of: MadeKind
     name: str
     content: bytes
     answers: Sequence[str]
@@ -292,7 +380,7 @@ class Made:
 @contextmanager
 def kept(
     out: File | None,
-    check: Callable[[Path, Sequence[Path]], None],
+    kind: Kind,
     watch: Watch,
     inputs: Sequence[Path],
     settings: Sequence[str] = (),
@@ -301,7 +389,7 @@ def kept(
 ) -> Iterator[None]:
     """A block in which the folder `out` belongs to this job alone. None: nothing is written.
 
-    check: of the report that will be written there. inputs, settings: files that are read, and what was asked for
+    kind: of the result that will be written there. inputs, settings: files that are read, and what was asked for
     besides; where a result of other ones is replaced, the watch hears of it. force: files that feedsim did not write
     may be replaced; inputs never are.
 
@@ -312,7 +400,7 @@ def kept(
         return
     folder = Path(out)
     with replacing(force or forced()), claimed(folder):
-        check(folder, inputs)
+        kind.check_place(folder, inputs)
         if sentence := replaced(folder, inputs, settings):
             watch.note(sentence)
         yield

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from html import escape
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from feedsim import analysis, scenario
-from feedsim.analysis import Figure
 from feedsim.design.tune import Proposal
 from feedsim.files.source import is_ssp, is_study
 from feedsim.files.trace import Array
-from feedsim.foundation.arguments import Changes, calling, settings, spelt
-from feedsim.foundation.errors import InputError, ranked, severity
-from feedsim.foundation.outputs import forced, replacing
+from feedsim.foundation.arguments import Changes, settings, spelt
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -35,16 +31,9 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, in_words_of, kept
+from feedsim.jobs.result import Kind, Result, kept
 from feedsim.report import run as report
-from feedsim.report.content import Report
-from feedsim.report.formatting import shown, typeset
 from feedsim.report.page import Partial
-from feedsim.report.results import Content
-from feedsim.report.run.axis_plots import signals_picture
-from feedsim.report.run.files import summary
-from feedsim.report.run.report import HEADER, is_leading, leading
-from feedsim.report.uncertainty import answers
 from feedsim.scenario import Scenario
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.judge import JudgedRun, judged
@@ -124,36 +113,31 @@ def opened(given: File | Scenario, changes: Changes = None, fmus: File | None = 
 # --- One scenario, run, with its figures, causes and pictures ---------------------------------------------------------
 
 
+KIND = Kind("run", report.FILES, own=lambda folder: (report.PARTIAL,))
+
+
 @dataclass(frozen=True, repr=False)
-class RunResult(JudgedRun, Result):
-    """What a run leaves behind, with its figures, pictures and files.
+class EvaluatedRun(JudgedRun):
+    """What a run leaves behind, with its figures and why they are so: computed when they are first asked for.
 
     page: the machine as a page that computes, where the job was asked for it. uncertainty: intervals of the figures by
     draws of identified values, where it was asked for them.
-
-    >>> import feedsim as fs
-    >>> result = fs.run("z_positioning.yaml")
-    >>> result  # doctest: +ELLIPSIS
-    Result of 'Z positioning': 2.448 s, 9793 rows, 66 columns; Z.duration 1.247 s, Z.overshoot 3.13... um, ...
-    >>> float(result["Z.x_a"][-1].round(6))
-    0.2
     """
 
     page: str = ""
     uncertainty: Uncertainty | None = None
 
-    kind = "run"
-
     @classmethod
-    def of(cls, run: JudgedRun, page: str = "", uncertainty: Uncertainty | None = None) -> RunResult:
+    def of(cls, run: JudgedRun, page: str = "", uncertainty: Uncertainty | None = None) -> EvaluatedRun:
         """A run, as it is."""
         judged_run = {field.name: getattr(run, field.name) for field in fields(JudgedRun)}
         return cls(**judged_run, page=page, uncertainty=uncertainty)
 
     @cached_property
-    def figures(self) -> Mapping[str, Figure]:
+    def figures(self) -> analysis.Named:
         """Name -> figure, such as "XZ.G", as the scenario's `evaluate` asks for them."""
-        return analysis.Named(analysis.evaluate(self, self._tasks))
+        figures = analysis.Named(analysis.evaluate(self, self._tasks))
+        return figures if self.uncertainty is None else figures.with_intervals(self.uncertainty.figures)
 
     @cached_property
     def causes(self) -> Mapping[str, analysis.Diagnosis]:
@@ -174,142 +158,32 @@ class RunResult(JudgedRun, Result):
         """Instants [s] of the recorded signals."""
         return self.trace.time
 
-    @property
-    def findings(self) -> Sequence[str]:
-        """The warnings of the run, and doubts about what the figures rest on."""
-        notes = analysis.program_notes(self.program)
-        return (*self.warnings, *analysis.doubts(self.figures, self.causes), *notes)
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """What circles, stops and positioning cycles are, why, and what to do."""
-        return report.answers(self, self.figures, self.causes, self.changes)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers, and the leading figures."""
-        said = answers(self.uncertainty, self.figures, leading(self.figures)) if self.uncertainty is not None else []
-        first, *others = [*self.answers, *said] or [""]
-        action = report.action(report.first_proposals(self.changes, self.causes), self.scenario.machine)
-        line = f"{self.scenario.name}: {report.summary_line(self, self.figures)}"
-        return [*filter(None, (first, action)), *others, line]
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the scenario."""
-        return report.input_paths(self.scenario)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return report.page_of(
-            self,
-            self.figures,
-            self.causes,
-            page=bool(self.page),
-            uncertainty=self.uncertainty,
-            proposals=self.changes,
-        )
-
-    def files(self) -> Mapping[str, Content]:
-        """result.csv, log.csv where there is a log, machine.html where the page was asked for."""
-        return report.files_of(self, self.page, uncertainty=self.uncertainty)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return summary(
-            self, self.figures, names, causes=self.causes, uncertainty=self.uncertainty, proposals=self.changes
-        )
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        report.check_writable(folder, inputs)
-
     def __getitem__(self, name: str) -> Array:
         """A recorded signal in SI units, such as ``result["Z.x_a"]``."""
         return self.trace[name]
-
-    def plot(self, *signals: str, ax: Any = None) -> Any:
-        """The main picture of the report, or signals over time: ``result.plot("Z.x_a", "Z.M_fr")``, also "Z.*".
-
-        A notebook shows it; ``.save("circle.png")`` or ``.save("circle.svg")`` writes it. ax: axes of matplotlib, one
-        or several, that it is drawn on, a panel on each; then they are returned.
-        """
-        asked = signals or (() if self.pictures else ("*.x_a",))
-        shown = signals_picture(self.trace.select(asked), self.scenario.name) if asked else self.pictures[0]
-        return shown if ax is None else shown.on(ax)
 
     def to_pandas(self) -> pandas.DataFrame:
         """All recorded signals over time [s]; their units are in ``.attrs["units"]``. Needs the package pandas."""
         return self.trace.to_pandas()
 
-    def save(
-        self,
-        folder: str | Path,
-        *,
-        figures: Sequence[str] = (),
-        force: bool = False,
-        control: str = "",
-        recorded: Partial | None = None,
-    ) -> tuple[Path, ...]:
-        """Write result.csv, summary.json, report.html, log.csv where there is a log, figures; returns the paths.
 
-        figures, force, control: as of :meth:`Result.save`. recorded: the rows, where they are in that folder already.
-        """
-        with replacing(force or forced()), in_words_of(control), calling(self.call):
-            report.check_writable(Path(folder), self.inputs)
-            return report.write(
-                self,
-                self.figures,
-                folder,
-                recorded,
-                self.causes,
-                drawn=figures,
-                page=self.page,
-                uncertainty=self.uncertainty,
-                proposals=self.changes,
-            )
+def result_of(run: EvaluatedRun, recorded: Partial | None = None) -> Result[EvaluatedRun]:
+    """A run: what circles, stops and positioning cycles are, why, and what to do.
 
-    def __repr__(self) -> str:
-        figures = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
-        wrong = [finding for finding in self.findings if severity(finding) != "note"]
-        warned = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
-        return "; ".join(
-            [
-                f"Result of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows, "
-                f"{len(self.trace.names)} columns",
-                *([", ".join(figures)] if figures else []),
-                *warned,
-            ]
-        )
-
-    def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(name)}</th>"
-            f"<td style='white-space:nowrap'>{escape(' '.join(shown(figure)))}</td>"
-            f"<td style='text-align:left'>{escape(typeset(figure.meaning))}</td></tr>"
-            for name, figure in self._leading().items()
-        )
-        said = "".join(f"<li>{escape(typeset(name))}</li>" for name in ranked(self.findings))
-        answer = "".join(f"<p>{escape(typeset(answer))}</p>" for answer in self.answers)
-        plot = self.plot()
-        alt = escape(f"{plot.title}. {plot.caption}", quote=True)
-        picture = f"<img alt='{alt}' style='max-width:100%' src='data:image/png;base64,{_text(plot.png)}'>"
-        machine = self.scenario.machine
-        note = f"<p><small>{escape(machine.note)}</small></p>" if machine.note else ""
-        return (
-            f"<b>{escape(self.scenario.name)}</b> · {escape(machine.name)}, {self.program.duration:.4g} s{answer}"
-            f"<table>{rows}</table>{f'<ul>{said}</ul>' if said else ''}{picture}{note}"
-        )
-
-    def _leading(self) -> dict[str, Figure]:
-        return {name: figure for name, figure in self.figures.items() if is_leading(name, HEADER)}
-
-    def __dir__(self) -> list[str]:
-        return [name for name in super().__dir__() if not name.startswith("_") or name.startswith("__")]
-
-
-def _text(content: bytes) -> str:
-    return b64encode(content).decode("ascii")
+    recorded: its rows, where they are in the folder already that it is written to.
+    """
+    return Result(
+        KIND,
+        run,
+        lambda: report.page_of(
+            run, run.figures, run.causes, page=bool(run.page), uncertainty=run.uncertainty, proposals=run.changes
+        ),
+        figures=lambda: run.figures,
+        details=lambda: report.details(run, run.figures, run.causes, run.uncertainty, run.changes),
+        files=partial(report.files_of, run, run.page, recorded, run.uncertainty),
+        inputs=report.input_paths(run.scenario),
+        rows=lambda: [f"{run.scenario.name}: {report.summary_line(run, run.figures)}"],
+    )
 
 
 @job("run a scenario or an SSP file; figures, causes, report")
@@ -338,7 +212,7 @@ def run(
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> RunResult:
+) -> Result[EvaluatedRun]:
     """Run a scenario.
 
     An FMU is a program, and so is an SSP, which holds some: to run it is to run its libraries with your rights.
@@ -371,20 +245,20 @@ def run(
 
             content(subject.plan, subject.program, fmus=subject.fmus)  # and so is a page
         inputs = report.input_paths(subject.plan)
-        with kept(out, report.check_writable, watch, inputs, subject.changes, force=force):
+        with kept(out, KIND, watch, inputs, subject.changes, force=force):
             for sentence in cosim.executed(subject.plan.machine, subject.fmus, subject.plan.coupling):
                 watch.announce(subject.named(sentence))
             if out is None:
                 done = _run(subject, None, page, friction_share, watch)
-                return _with_draws(done, subject, cloud, uncertain, watch)
+                return result_of(_with_draws(done, subject, cloud, uncertain, watch))
             with _rows_kept(report.growing(out), watch) as recorded:
                 done = _run(subject, recorded, page, friction_share, watch)
-                result = _with_draws(done, subject, cloud, uncertain, watch)
-                result.save(out, figures=figures, force=force, control=control, recorded=recorded)
+                result = result_of(_with_draws(done, subject, cloud, uncertain, watch), recorded)
+                result.save(out, figures=figures, force=force, control=control)
     return result
 
 
-def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: bool, watch: Watch) -> RunResult:
+def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: bool, watch: Watch) -> EvaluatedRun:
     raw = cosim.run(
         subject.plan,
         program=subject.program,
@@ -398,13 +272,13 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: 
     done = judged(raw)
     done = replace(done, warnings=subject.warnings(done.warnings))
     if not page:
-        return RunResult.of(done)
+        return EvaluatedRun.of(done)
     from feedsim.report.live_page.html import html
 
-    return RunResult.of(done, html(done, fmus=subject.fmus))
+    return EvaluatedRun.of(done, html(done, fmus=subject.fmus))
 
 
-def _with_draws(result: RunResult, subject: Opened, cloud: Cloud | None, count: int, watch: Watch) -> RunResult:
+def _with_draws(result: EvaluatedRun, subject: Opened, cloud: Cloud | None, count: int, watch: Watch) -> EvaluatedRun:
     """The run with what identification leaves open, where that is asked for."""
     if cloud is None:
         return result

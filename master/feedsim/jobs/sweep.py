@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,19 +32,21 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, announce, kept
-from feedsim.report.content import Report
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report.results import Content, discard
 from feedsim.report.sweep import report as page
-from feedsim.report.sweep.account import Account, summary
+from feedsim.report.sweep.account import Account, details
 from feedsim.scenario.study import Study, load_study
 
 if TYPE_CHECKING:
     import pandas
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SweepResult(Result):
+KIND = Kind("sweep")
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
     """A study with its runs: ``result["Z.overshoot"]`` is a column of its table.
 
     account: table, study, design and what they come to. folder: where table, journal and record of the study are.
@@ -54,9 +56,7 @@ class SweepResult(Result):
     account: Account
     folder: Path
     resumed: int = 0
-    _kept: TemporaryFolder | None = field(default=None)  # which lives as long as this
-
-    kind = "sweep"
+    _kept: TemporaryFolder | None = None  # which lives as long as this
 
     @property
     def study(self) -> Study:
@@ -74,7 +74,6 @@ class SweepResult(Result):
         return self.table.ok
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A column of the table."""
         return self.table[name]
 
     def __len__(self) -> int:
@@ -84,54 +83,35 @@ class SweepResult(Result):
         """The table. Needs the package pandas."""
         return self.table.to_pandas()
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the study."""
-        return inputs_of(self.study)
 
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """Median of every figure over the runs that have it; nan where no run has. Units are those of runs."""
-        return Named(
-            (name, Figure(_median(self.table[name]), self.table.unit(name), f"median of {len(self)} runs"))
-            for name in self.table.figures
-        )
+def result_of(swept: Swept) -> Result[Swept]:
+    """A study with its runs: how far figures scatter, what moves them; each figure is a median. nan: no run has it."""
+    table, failed = swept.table, int((~swept.ok).sum())
+    wrong = [str(text).removeprefix(WRONG) for text in table["warnings"] if str(text).startswith(WRONG)]
+    first = wrong[0].split(" | ")[0] if wrong else ""
+    words = f", {swept.resumed} of them before" if swept.resumed else ""
+    words += f", {failed} of them failed (their messages are in the table)" if failed else ""
 
-    @property
-    def findings(self) -> Sequence[str]:
-        """Runs whose results are wrong."""
-        wrong = [str(text) for text in self.table["warnings"] if str(text).startswith(WRONG)]
-        first = wrong[0].removeprefix(WRONG).split(" | ")[0] if wrong else ""
-        return [Wrong(f"{len(wrong)} of {len(self.table)} runs, the first: {first}")] if wrong else []
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """How far the leading figures scatter, and what moves them most."""
-        return page.answers(self.account)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answer to the goal of the study, and how many runs there are and have failed."""
-        failed = int((~self.ok).sum())
-        words = f", {self.resumed} of them before" if self.resumed else ""
-        words += f", {failed} of them failed (their messages are in the table)" if failed else ""
-        return [*page.goal_words(self.account), f"{self.study.name}: {len(self)} runs{words}"]
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.drawn_report(self.account)
-
-    def files(self) -> Mapping[str, Content]:
+    def files() -> Mapping[str, Content]:
         """Table and record of the study; in its own folder they stay as they are."""
-        names = [RECORD, *(path.name for path in self.folder.glob("table.*"))]
-        return {name: (self.folder / name).read_bytes() for name in names if (self.folder / name).is_file()}
+        paths = [swept.folder / RECORD, *swept.folder.glob("table.*")]
+        return {path.name: path.read_bytes() for path in paths if path.is_file()}
 
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return summary(self.account, names, answer=page.answers(self.account))
-
-    def __repr__(self) -> str:
-        return repr(self.table)
+    return Result(
+        KIND,
+        swept,
+        partial(page.drawn_report, swept.account),
+        figures=lambda: Named(
+            (name, Figure(_median(table[name]), table.unit(name), f"median of {len(table)} runs"))
+            for name in table.figures
+        ),
+        details=partial(details, swept.account),
+        files=files,
+        inputs=inputs_of(swept.study),
+        answers=partial(page.answers, swept.account),
+        findings=[Wrong(f"{len(wrong)} of {len(table)} runs, the first: {first}")] if wrong else [],
+        lines=lambda: [*page.goal_words(swept.account), f"{swept.study.name}: {len(table)} runs{words}"],
+    )
 
 
 @job("make the runs of a study; table, sensitivities, report", needs=("sweep",))
@@ -151,7 +131,7 @@ def sweep(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> SweepResult:
+) -> Result[Swept]:
     """Make the runs of a study; those that `out` has are not made again.
 
     A study varies parameters of a scenario over a grid, a Latin hypercube or a Sobol sequence (docs/sweeps.md). Leaves
@@ -195,7 +175,7 @@ def sweep(
         resumed = now.resumed
         watch.progress(loaded.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
 
-    with kept(folder, SweepResult.check_place, watch, inputs_of(loaded), texts, force=force):
+    with kept(folder, KIND, watch, inputs_of(loaded), texts, force=force):
         try:
             table = run_study(
                 loaded,
@@ -219,7 +199,7 @@ def sweep(
             raise
         if out is not None:
             page.write(table, loaded, planned, folder, drawn=figures)
-        return SweepResult(page.account_of(table, loaded, planned, folder), folder, resumed, temporary)
+        return result_of(Swept(page.account_of(table, loaded, planned, folder), folder, resumed, temporary))
 
 
 def inputs_of(study: Study) -> list[Path]:

@@ -13,7 +13,7 @@ from feedsim.foundation.outputs import check_file, unchanged
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.examples import Example, copy, examples
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out_file
-from feedsim.jobs.result import Kind, Made
+from feedsim.jobs.result import Made, MadeKind
 from feedsim.scenario.schema import Kind as FileKind
 from feedsim.scenario.schema import json_schema
 
@@ -87,7 +87,7 @@ def convert(
         recording = trace.read_recording(path)
         written = trace.convert(recording, columns, folder / "converted.csv")
         content = (folder / "converted.csv").read_bytes()
-    kind = Kind("convert", "table", unchanged(content))
+    kind = MadeKind("convert", "table", unchanged(content))
     answer = f"{len(written.columns) + 1} columns from {path}"
     made = Made(kind, f"{path.stem}.csv", content, [answer], recording.notes, inputs=[path])
     if out is not None:

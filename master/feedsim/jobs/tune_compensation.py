@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from feedsim import scenario as scenarios
-from feedsim.analysis import Figure
+from feedsim.analysis import Named
 from feedsim.design.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, Judged, tune
 from feedsim.design.tune.proposals import check_controlled
 from feedsim.design.uncertainty import check_count, cloud_of
@@ -30,60 +29,27 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report import tune as page
-from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
-from feedsim.report.results import Content
 from feedsim.report.tune.drive import lines_of
 from feedsim.report.tune.report import SETTINGS, SHEET
 
+KIND = Kind("tune", page.FILES)
 
-@dataclass(frozen=True, eq=False, repr=False)
-class TuneCompensationResult(Result):
-    """A friction compensation. judged: its values, and errors of circles without and with it."""
 
-    judged: Judged
-
-    kind = "tune"
-    may_write = page.FILES
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the scenario."""
-        return input_paths(self.judged.scenario)
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "held_out.median", "held_out.worst", "friction+.median", ..., "X.largest_after"."""
-        return page.figures_of(self.judged)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """Circles that get worse, and what of a real control is not known."""
-        return page.findings(self.judged)
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """What it takes off on circles that were not used for tuning."""
-        return page.answers(self.judged)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answer, and the values to type."""
-        return [*self.answers, *lines_of(line.split(",") for line in page.sheet(self.judged).splitlines()[1:])]
-
-    def files(self) -> Mapping[str, Content]:
-        """Values to load and values to type."""
-        return {SETTINGS: page.settings(self.judged), SHEET: page.sheet(self.judged)}
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.judged)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.judged, names)
+def result_of(judged: Judged) -> Result[Judged]:
+    """A friction compensation: its values, and errors of circles without and with it."""
+    return Result(
+        KIND,
+        judged,
+        partial(page.report_of, judged),
+        figures=Named(page.figures_of(judged)),
+        details=partial(page.details, judged),
+        files=lambda: {SETTINGS: page.settings(judged), SHEET: page.sheet(judged)},
+        inputs=input_paths(judged.scenario),
+        rows=lambda: lines_of(row.split(",") for row in page.sheet(judged).splitlines()[1:]),
+    )
 
 
 @job("values of a friction compensation, judged on other circles")
@@ -104,7 +70,7 @@ def tune_compensation(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> TuneCompensationResult:
+) -> Result[Judged]:
     """Find the values of a friction compensation on short circles, and judge them on other radii and feeds.
 
     A pulse on the speed setpoint, constant or with a characteristic over the acceleration (SINUMERIK), a torque over
@@ -149,7 +115,7 @@ def tune_compensation(
         check_count(uncertain)
         cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, TuneCompensationResult.check_place, watch, input_paths(plan), changes, force=force):
+    with kept(out, KIND, watch, input_paths(plan), changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
         judged = tune(
             plan,
@@ -162,7 +128,7 @@ def tune_compensation(
             cloud=cloud,
             count=uncertain,
         )
-        result = TuneCompensationResult(judged)
+        result = result_of(judged)
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from feedsim import scenario as scenarios
-from feedsim.analysis import Figure
+from feedsim.analysis import Named
 from feedsim.design.tune import Proposal, of_run
-from feedsim.design.tune.drive import EVALUATIONS, Changed, Limits, Tuned
+from feedsim.design.tune.drive import EVALUATIONS, Limits, Tuned
 from feedsim.design.tune.drive import tune_drive as tune
 from feedsim.design.tune.drive_program import check_axis
 from feedsim.design.uncertainty import check_count, cloud_of
+from feedsim.estimation.replay.machine_files import drive_file
 from feedsim.files.source import is_ssp
 from feedsim.foundation.arguments import Value, amount, given, quantity, settings, spelt
 from feedsim.foundation.errors import InputError
+from feedsim.jobs.diff import KIND as KIND_OF_OVERLAYS
 from feedsim.jobs.diff import Overlay, diff
+from feedsim.jobs.diff import result_of as result_of_overlay
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -34,14 +37,12 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, announce, in_words_of, kept
-from feedsim.jobs.run import RunResult, run
-from feedsim.report import run as report
+from feedsim.jobs.result import Kind, Result, announce, in_words_of, kept
+from feedsim.jobs.run import KIND as KIND_OF_RUNS
+from feedsim.jobs.run import EvaluatedRun, run
+from feedsim.jobs.run import result_of as result_of_run
 from feedsim.report.changes import change_lines
-from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
-from feedsim.report.results import Content
-from feedsim.report.tune import drive as drive_files
 from feedsim.report.tune import drive as page
 from feedsim.scenario import Machine, load
 from feedsim.scenario.structure.checks import load_structure
@@ -53,70 +54,29 @@ from feedsim.structure.build import build
 LEAST_EVALUATIONS = 10
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class TuneDriveResult(Result):
-    """A tuned drive.
+KIND = Kind("tune-drive", (page.SETTINGS, page.SHEET))
 
-    tuned: its values, margins and motions. control: in whose names values are shown, too. asked: name -> text of what
-    was asked for. folder: that it was written to first, as the caller spelt it; "": none.
+
+def result_of(tuned: Tuned, control: str, asked: Mapping[str, str], folder: str) -> Result[Tuned]:
+    """A tuned drive: values to load and to type, margins and motions before and after.
+
+    control: in whose names values are shown, too. asked: name -> text of what was asked for. folder: that it is written
+    to first, as the caller spelt it; "": none.
     """
-
-    tuned: Tuned
-    control: str = ""
-    asked: Mapping[str, str] = field(default_factory=dict)
-    folder: str = ""
-
-    kind = page.KIND
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the scenario."""
-        return input_paths(self.tuned.scenario)
-
-    @property
-    def changes(self) -> Sequence[Changed]:
-        """Every value to type: axis, parameter, old and new."""
-        return self.tuned.changes
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "Z.peak_reduction", "Z.overshoot_before", "Z.gain_margin_after" ..."""
-        return page.figures_of(self.tuned)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """Motions that get worse, and what the values rest on."""
-        return page.findings(self.tuned)
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """What the tuned drive does, or why there is none."""
-        return page.answers(self.tuned)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answer, and the values to type."""
-        return [*self.answers, *drive_files.lines_of(drive_files.rows(self.tuned, self.control))]
-
-    def files(self) -> Mapping[str, Content]:
-        """Values to load, values to type, and a drive file for the tuned axis and for every other that changes."""
-        result = {
-            drive_files.SETTINGS: drive_files.settings(self.tuned),
-            drive_files.SHEET: drive_files.sheet(self.tuned, self.control),
-        }
-        return {**result, **drive_files.drives(self.tuned)}
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.tuned, self.control, self.folder)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.tuned, names, self.asked)
-
-    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        """Raise OutputError unless the result can be written to `folder`."""
-        page.check_writable(folder, list(self.tuned.scenario.machine.axes), inputs)
+    return Result(
+        KIND,
+        tuned,
+        lambda: page.report_of(tuned, control, folder),
+        figures=Named(page.figures_of(tuned)),
+        details=lambda: page.details(tuned, asked),
+        files=lambda: {
+            page.SETTINGS: page.settings(tuned),
+            page.SHEET: page.sheet(tuned, control),
+            **page.drives(tuned),
+        },
+        inputs=input_paths(tuned.scenario),
+        rows=lambda: page.lines_of(page.rows(tuned, control)),
+    )
 
 
 @job("values of a drive within stability margins")
@@ -150,7 +110,7 @@ def tune_drive(
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> TuneDriveResult:
+) -> Result[Tuned]:
     """Tune the drive of an axis within margins: K_p, T_n, K_v, T_sym, T_dyn, reference model, current filters.
 
     Margins hold at the pose of the machine file and at further ones, for elastic modes 10 % lower and higher. Moves and
@@ -191,15 +151,12 @@ def tune_drive(
         check_count(uncertain)
         cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
-    machine_axes = list(plan.machine.axes)
     places = _places(plan.machine, at)
     asked = _asked(axes, limits, at, evaluations, uncertain)
-
-    def check(folder: Path, inputs: Sequence[Path]) -> None:
-        page.check_writable(folder, machine_axes, inputs)
+    kind = replace(KIND, may_write=(*KIND.may_write, *map(drive_file, plan.machine.axes)))
 
     with in_words_of(control), kept(
-        out, check, watch, input_paths(plan), [*changes, *(f"{name}={text}" for name, text in asked.items())],
+        out, kind, watch, input_paths(plan), [*changes, *(f"{name}={text}" for name, text in asked.items())],
         force=force,
     ):  # fmt: skip
         announce(watch, plan.machine, archives, plan.coupling)
@@ -208,7 +165,7 @@ def tune_drive(
             plan, axes, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations, cloud=cloud,
             count=uncertain,
         )  # fmt: skip
-        result = TuneDriveResult(tuned, control, asked, "" if out is None else str(out))
+        result = result_of(tuned, control, asked, "" if out is None else str(out))
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result
@@ -294,7 +251,7 @@ TRIED_FIGURES = ("G", "overshoot", "settling_time")
 SHOWN_OF_AXES = ("peak_", "servo_mismatch")
 
 
-class ProposalsResult(Overlay):
+class Tried(Overlay):
     """A run as it is, and with all proposals that have a value; one run alone where none has.
 
     Attributes:
@@ -302,28 +259,23 @@ class ProposalsResult(Overlay):
         proposals: all of them. settings: those with a value, as behind ``--set``.
     """
 
-    def __init__(self, runs: Sequence[RunResult], proposals: Sequence[Proposal]) -> None:
+    def __init__(self, runs: Sequence[Result[EvaluatedRun]], proposals: Sequence[Proposal]) -> None:
         super().__init__(dict(zip(("as it is", "with the proposals"), runs, strict=False)))
         self.runs, self.proposals = tuple(runs), tuple(proposals)
         self.settings = settings_of(proposals)
 
-    @property
-    def findings(self) -> Sequence[str]:
-        """Those of the run as it is."""
-        return self.runs[0].findings
 
-    @property
-    def lines(self) -> list[str]:
-        """What the run is, what was changed, and the leading figures before and after."""
-        first, *second = self.runs
-        if not second:
-            return [*first.lines, "nothing to try: no proposal has a value"]
-        changed = [
-            f"tried: {name} {first.figures[name]} -> {figure}"
-            for name, figure in second[0].figures.items()
-            if name in first.figures and _leading(name)
-        ]
-        return [*first.lines, *change_lines(self.proposals), *changed]
+def _lines_of(tried: Tried) -> list[str]:
+    """What the run is, what was changed, and the leading figures before and after."""
+    first, *second = tried.runs
+    if not second:
+        return [*first.lines, "nothing to try: no proposal has a value"]
+    changed = [
+        f"tried: {name} {first.figures[name]} -> {figure}"
+        for name, figure in second[0].figures.items()
+        if name in first.figures and _leading(name)
+    ]
+    return [*first.lines, *change_lines(tried.proposals), *changed]
 
 
 def settings_of(proposals: Sequence[Proposal]) -> tuple[str, ...]:
@@ -342,7 +294,7 @@ def tune_proposals(
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> ProposalsResult:
+) -> Result[Tried]:
     """Run a scenario, and again with all values that the report of that run proposes.
 
     Writes the run as it is to the folder, the second one beside it to NAME_tried, and both over each other to
@@ -366,23 +318,23 @@ def tune_proposals(
         raise InputError(f"{scenario}: is an SSP file; values are changed in scenario files")
     folders = _folders(out)
     if folders is not None:
-        report.check_writable(folders["tried"])
-        Overlay.check_place(folders["overlay"])
+        KIND_OF_RUNS.check_place(folders["tried"])
+        KIND_OF_OVERLAYS.check_place(folders["overlay"])
     first = run(scenario, set=set, fmus=fmus, out=out, figures=figures, force=force, control=control, watch=watch)
-    proposals = of_run(first, first.causes, first.figures, searched=True)
+    proposals = of_run(first.value, first.causes, first.figures, searched=True)
     runs = [first]
     if settings := settings_of(proposals):
         plan = first.scenario
         changed = load(plan.file, [*plan.overrides, *settings])
         progress = watch.of(f"{plan.name}, tried")
         archives = None if fmus is None else Path(fmus)
-        runs.append(RunResult.of(judged(cosim.run(changed, fmus=archives, progress=progress))))
-    result = ProposalsResult(runs, proposals)
+        runs.append(result_of_run(EvaluatedRun.of(judged(cosim.run(changed, fmus=archives, progress=progress)))))
+    place = folders["overlay"] if folders is not None and settings else None
     if folders is not None and settings:
         runs[1].save(folders["tried"], figures=figures, force=force, control=control)
         diff(str(out), folders["tried"]).save(folders["overlay"], figures=figures, force=force, control=control)
-        result.place = folders["overlay"]
-    return result
+    tried = Tried(runs, proposals)
+    return result_of_overlay(tried, first.findings, partial(_lines_of, tried), place)
 
 
 def _folders(out: File | None) -> Mapping[str, Path] | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from feedsim import analysis
 from feedsim import scenario as scenarios
@@ -39,7 +39,7 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report import compensate as page
 from feedsim.report import uncertainty as intervals
 from feedsim.report.content import Report
@@ -48,9 +48,11 @@ from feedsim.report.results import Content
 from feedsim.scenario.load import read_friction
 from feedsim.simulation import nc
 
+KIND = Kind("compensate", page.FILES)
 
-@dataclass(frozen=True, eq=False, repr=False)
-class CompensateResult(Result):
+
+@dataclass(frozen=True, eq=False)
+class Compensated:
     """A circle without and with compensation.
 
     compensation: both runs, the feedforward, what errors cost. frictions: axis -> file that the friction of its
@@ -61,71 +63,38 @@ class CompensateResult(Result):
     frictions: Mapping[str, Path]
     uncertainty: Uncertainty | None = None
 
-    kind = "compensate"
-    may_write = page.FILES
 
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """Files of the scenario, and those of the frictions."""
-        return [*input_paths(self.compensation.scenario), *self.frictions.values()]
+def result_of(value: Compensated) -> Result[Compensated]:
+    """A circle without and with compensation: G and glitches before and after, and what errors cost."""
+    done, uncertainty = value.compensation, value.uncertainty
+    figures = analysis.Named(done.figures).with_intervals({} if uncertainty is None else uncertainty.figures)
+    keys = ["G", *(f"glitch_{axis}" for axis in done.turn.axes)]
+    leading = [f"{which}.{key}" for which in ("before", "after") for key in keys]
 
-    @property
-    def figures(self) -> Mapping[str, analysis.Figure]:
-        """ "before.G", "after.glitch_X", ..., "X.delay"."""
-        return analysis.Named(self.compensation.figures)
+    def report() -> Report:
+        content = page.report_of(done, value.frictions)
+        return content if uncertainty is None else intervals.with_intervals(content, uncertainty, figures, leading)
 
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the result is believed."""
-        return self.compensation.warnings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """What the compensation takes away, and what its errors would leave of that."""
-        return page.answers(self.compensation)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """G and glitches before and after."""
-        return [f"  {page.summary_line(self.compensation)}", *(f"  {line}" for line in self._open)]
-
-    @property
-    def _open(self) -> list[str]:
-        """What identification leaves open, in a sentence."""
-        return [] if self.uncertainty is None else intervals.answers(self.uncertainty, self.figures, self._leading)
-
-    @property
-    def _leading(self) -> list[str]:
-        keys = ["G", *(f"glitch_{axis}" for axis in self.compensation.turn.axes)]
-        return [f"{which}.{key}" for which in ("before", "after") for key in keys]
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        report = page.report_of(self.compensation, self.frictions)
-        return (
-            report
-            if self.uncertainty is None
-            else intervals.with_intervals(report, self.uncertainty, self.figures, self._leading)
-        )
-
-    def files(self) -> Mapping[str, Content]:
-        """The runs with (result.csv) and without compensation, the feedforward, the table where there is one."""
-        done = self.compensation
-        curves: dict[str, Content] = {
+    def files() -> Mapping[str, Content]:
+        return {
             page.RESULT: partial(write_csv, trace=done.after.trace),
             page.UNCOMPENSATED: partial(write_csv, trace=done.before.trace),
             page.FEEDFORWARD: partial(write_csv, trace=done.feedforward),
+            **({intervals.BANDS: intervals.bands_csv(uncertainty)} if uncertainty is not None else {}),
+            **({page.TABLE: page.table_csv(done)} if done.table else {}),
         }
-        if self.uncertainty is not None:
-            curves[intervals.BANDS] = intervals.bands_csv(self.uncertainty)
-        return curves | ({page.TABLE: page.table_csv(done)} if done.table else {})
 
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        content = page.summary(self.compensation, self.frictions, names)
-        return content if self.uncertainty is None else content | {
-            "uncertain": intervals.summary_part(self.uncertainty, self.figures)
-        }  # fmt: skip
+    said = [] if uncertainty is None else intervals.answers(uncertainty, figures, leading)
+    return Result(
+        KIND,
+        value,
+        report,
+        figures=figures,
+        details=lambda: page.details(done, value.frictions, uncertainty),
+        files=files,
+        inputs=[*input_paths(done.scenario), *value.frictions.values()],
+        lines=[f"  {line}" for line in (page.summary_line(done), *said)],
+    )
 
 
 @job("a circle without and with torque feedforward of friction")
@@ -160,7 +129,7 @@ def tune_feedforward(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> CompensateResult:
+) -> Result[Compensated]:
     """Run a circle without and with friction compensation of every axis that moves.
 
     A friction model, driven by the speed setpoint with the lag of the axis, gives a torque that is added to the torque
@@ -195,7 +164,7 @@ def tune_feedforward(
     _check_lags(plan, [axis for axis in moving_axes(program) if axis not in delays])
     known, cloud = _open_of(plan, sets, uncertain)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, CompensateResult.check_place, watch, [*input_paths(plan), *files.values()], changes, force=force):
+    with kept(out, KIND, watch, [*input_paths(plan), *files.values()], changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
         done = compensation.compensate(
             plan, program, frictions=sets, delays=delays, table=table,
@@ -204,7 +173,7 @@ def tune_feedforward(
         uncertainty = None
         if uncertain:
             uncertainty = of_compensation(done, known, cloud, uncertain, fmus=archives, progress=watch.progress)
-        result = CompensateResult(done, files, uncertainty)
+        result = result_of(Compensated(done, files, uncertainty))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

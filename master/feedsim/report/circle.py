@@ -24,7 +24,7 @@ from feedsim.report.chart import Curve, Dash
 from feedsim.report.content import TILES as TILES_SHOWN
 from feedsim.report.content import Bullets, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
 from feedsim.report.formatting import AFTER, BEFORE, CLOCKWISE, RECORDED, SIMULATED, Array, counted, minus, two, typeset
-from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, quantity, software
+from feedsim.report.provenance import finite, hashed, inputs_part, quantity
 from feedsim.report.run import axis_plots, sheet
 from feedsim.report.run.pose import cause_tile, diagnosis_part, diagnosis_section
 
@@ -208,12 +208,6 @@ def answers_of_both(before: Taken, after: Taken) -> list[str]:
     return [f"{prefix}: {G}; {said}.", f"After: {answer(other)}"]
 
 
-def lines_of_both(before: Taken, after: Taken) -> list[str]:
-    """The answers, and what to type next."""
-    first, second = answers_of_both(before, after)
-    return [first, second, *filter(None, [first_action(after.diagnosis)])]
-
-
 def report_of_both(before: Taken, after: Taken) -> Report:
     """Content of the report of records before and after a change."""
     prefix = axis_letters(before.recorded.circle.axes)
@@ -350,20 +344,16 @@ def changes_part(before: Taken, after: Taken) -> list[dict[str, Any]]:
     ]
 
 
-def summary(
+def details(
     recorded: RecordedCircle,
     diagnosis: Diagnosis,
-    figures: Mapping[str, Figure],
     files: Sequence[Path],
-    names: Sequence[str],
 ) -> dict[str, Any]:
-    """Content of summary.json."""
+    """What summary.json has besides the figures."""
     circle = recorded.circle
     prefix = axis_letters(circle.axes)
     return {
         "format": FORMAT,
-        "answer": answers(diagnosis),
-        "figures": figures_part(figures),
         "diagnosis": {prefix: diagnosis_part(diagnosis)},
         "circle": {
             "axes": list(circle.axes),
@@ -374,6 +364,4 @@ def summary(
             "turns": [turn.name for turn in recorded.turns],
         },
         "inputs": inputs_part(hashed([("record", file) for file in files])),
-        "software": software(),
-        "files": list(names),
     }

@@ -226,7 +226,7 @@ def report_of(comparisons: Sequence[Comparison]) -> Report:
         if one
         else ", ".join(f"{number} {kind}" for kind, number in counts.items() if number),
         answer=_answer(comparisons),
-        warnings=[*([one.problem] if one and one.problem else []), *_not_seen(comparisons)],
+        warnings=[*([one.problem] if one and one.problem else []), *not_seen(comparisons)],
         tiles=_tiles(comparisons, counts),
         main=list(_alone(one)) if one else [_pairs(comparisons), *_sections(comparisons)],
         footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
@@ -253,7 +253,7 @@ def _answer(comparisons: Sequence[Comparison]) -> list[str]:
     ]
 
 
-def _not_seen(comparisons: Sequence[Comparison]) -> list[str]:
+def not_seen(comparisons: Sequence[Comparison]) -> list[str]:
     """That rows of results were not compared, of which nobody knows whether they are the same."""
     partly = [
         comparison

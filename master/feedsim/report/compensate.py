@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,9 +41,12 @@ from feedsim.report.formatting import (
 )
 from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hashed, inputs_part, quantity
 from feedsim.report.run.axis_plots import TIME, circle, circle_chart, reversed_note, torque_axis, turned
-from feedsim.report.run.files import summary as summary_of_run
+from feedsim.report.run.files import details as details_of_run
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.uncertainty import BANDS
+
+if TYPE_CHECKING:
+    from feedsim.design.uncertainty import Uncertainty
 
 # --- The pictures of a report on friction compensation ----------------------------------------------------------------
 
@@ -348,11 +351,12 @@ def friction_files(files: Mapping[str, Path]) -> list[InputFile]:
     return hashed([(f"friction of the compensation of {axis}", path) for axis, path in files.items()])
 
 
-def summary(compensation: Compensation, files: Mapping[str, Path], written: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json: that of the compensated run, with the compensation and both runs' figures."""
-    content = summary_of_run(compensation.after, compensation.figures, written)
+def details(
+    compensation: Compensation, files: Mapping[str, Path], uncertainty: Uncertainty | None = None
+) -> dict[str, Any]:
+    """What summary.json has besides the figures: that of the compensated run, and the compensation."""
+    content = details_of_run(compensation.after, compensation.figures, uncertainty=uncertainty)
     machine = compensation.scenario.machine
-    content["warnings"] = list(compensation.warnings)
     content["inputs"] += inputs_part(friction_files(files))
     content["compensation"] = {
         "turn": {

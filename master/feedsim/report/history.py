@@ -32,7 +32,7 @@ from feedsim.report.formatting import (
     plain_unit,
     typeset,
 )
-from feedsim.report.provenance import finite, hashed, inputs_part, quantity, software
+from feedsim.report.provenance import finite, hashed, inputs_part
 
 VALUES, CHANGES, FLEET = "history.csv", "changes.csv", "fleet.yaml"
 FILES = (VALUES, CHANGES, FLEET)  # besides report.html and summary.json
@@ -726,9 +726,9 @@ def _machines_picture(history: History) -> Picture:
     return Picture("machines", "Values of the machines", caption, Chart(panels, (1.0, 1.0)))
 
 
-def summary(history: History, figures: Mapping[str, Figure], names: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json."""
-    content: dict[str, Any] = {"format": FORMAT, "answer": answers(history)}
+def details(history: History) -> dict[str, Any]:
+    """What summary.json has besides the figures."""
+    content: dict[str, Any] = {"format": FORMAT}
     if history.scatters:
         content["machines"] = list(history.machines)
         content["scatter"] = {one.name: _scatter_part(one) for one in history.scatters}
@@ -739,9 +739,6 @@ def summary(history: History, figures: Mapping[str, Figure], names: Sequence[str
             "quantities": {one.series.name: _change_part(one, history) for one in history.changes},
         }
     return content | {
-        "figures": {
-            name: quantity(figure.value, figure.unit, meaning=figure.meaning) for name, figure in figures.items()
-        },
         "results": [
             {
                 "name": entry.name,
@@ -755,8 +752,6 @@ def summary(history: History, figures: Mapping[str, Figure], names: Sequence[str
         "scenario": history.scenario or None,
         "settings": dict(history.settings),
         "inputs": inputs_part(hashed([("result", file) for file in history.files])),
-        "software": software(),
-        "files": list(names),
     }
 
 

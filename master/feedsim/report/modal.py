@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -33,14 +33,13 @@ from feedsim.report.content import (
     tile_value,
 )
 from feedsim.report.formatting import OTHERWISE, RECORDED, SIMULATED, Array, minus, remarked, typeset
-from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
+from feedsim.report.provenance import finite, hashed, inputs_part
 from feedsim.report.results import Content
 from feedsim.scenario import Subject
 from feedsim.structure.modes import write_modes
 
 MODES_FILE, RESPONSE_FILE = "modes.csv", "response.csv"
 FILES = (MODES_FILE, RESPONSE_FILE)  # besides report.html and summary.json
-KIND = "identify-modes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +50,11 @@ class ModesReport:
     file: Path
     subject: Subject
     settings: Mapping[str, str]
+
+    @property
+    def axis(self) -> AxisModes:
+        """Rigid motion, delays and modes of the axis; ``table`` is the machine's table with them."""
+        return self.found
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -204,12 +208,10 @@ def _files(report: ModesReport) -> list[tuple[str, Path]]:
     return [("response", report.file), *report.subject.files]
 
 
-def summary(report: ModesReport, files: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json."""
+def details(report: ModesReport) -> dict[str, Any]:
+    """What summary.json has besides the figures."""
     axis_modes = report.found
     return {
-        "kind": "modes",
-        "answer": answers(report),
         "settings": dict(report.settings),
         "axis": axis_modes.axis,
         "modes": [
@@ -221,10 +223,7 @@ def summary(report: ModesReport, files: Sequence[str]) -> dict[str, Any]:
             for mode in axis_modes.fit.modes
         ],
         "predicted": {str(count): value for count, value in axis_modes.fit.predicted.items()},
-        "figures": figures_part(report.figures),
-        "software": software(),
         "inputs": inputs_part(hashed(_files(report))),
-        "files": list(files),
     }
 
 

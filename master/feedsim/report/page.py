@@ -194,6 +194,7 @@ class Partial:
                 self._file.close()
             if kind is None and self.rows:
                 self.path.unlink(missing_ok=True)
+                self.rows = 0  # who writes the result once more writes its rows, too
 
     def _unusable(self, error: OSError) -> OutputError:
         return OutputError(f"{self.path} cannot be written: {error.strerror or error}")

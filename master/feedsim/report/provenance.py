@@ -160,8 +160,12 @@ def quantity(value: Any, unit: str, **more: str) -> dict[str, Any]:
 
 
 def figures_part(figures: Mapping[str, Figure]) -> dict[str, Any]:
-    """Figures by name; one that could not be determined has the value null."""
-    return {name: quantity(figure.value, figure.unit, meaning=figure.meaning) for name, figure in figures.items()}
+    """Figures by name, with an interval where it is known; one that could not be determined has the value null."""
+    return {
+        name: quantity(figure.value, figure.unit, meaning=figure.meaning)
+        | ({} if figure.interval is None else {"interval": [*map(finite, figure.interval)]})
+        for name, figure in figures.items()
+    }
 
 
 def machine_part(machine: Machine) -> dict[str, Any]:

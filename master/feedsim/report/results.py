@@ -16,7 +16,7 @@ from feedsim.foundation.outputs import forced, same
 from feedsim.foundation.owned import TemporaryFolder, claimed, held
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
-from feedsim.report.provenance import sha256, to_json
+from feedsim.report.provenance import sha256, software, to_json
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 SCRATCH = ".feedsim-"  # how the folder begins in which files are made
@@ -137,8 +137,8 @@ Content = str | bytes | Callable[[Path], Path | None]
 
 def write_report(
     directory: Path | str,
-    report: Report,
-    summary: Callable[[Sequence[str]], Mapping[str, Any]],
+    report: Report | None,
+    details: Mapping[str, Any],
     files: Mapping[str, Content],
     drawn: Sequence[str] = (),
     *,
@@ -148,14 +148,13 @@ def write_report(
 ) -> tuple[Path, ...]:
     """Write a report of any kind: report.html, summary.json, ``files``, and its pictures as figures/*.
 
-    kind, own: as for :func:`check_place`. summary: what summary.json has of this kind, a function of the names of all
-    files; around it stands what all have: kind, version, answer, next, figures, warnings, findings, files.
-    keeps: those of ``files`` that scenarios and machine files may name; they stay when the next result takes the
-    folder. drawn: kinds of files that the pictures are drawn as; the page holds what they show in any case. Whole or
-    not at all, as :func:`write_results` does it. Returns the paths. Raises OutputError.
+    report: None: ``files`` alone. kind, own: as for :func:`check_place`. details: what summary.json has of this kind;
+    around it stands what all have: kind, version, answer, next, figures, warnings, findings, software, files. keeps:
+    those of ``files`` that scenarios and machine files may name; they stay when the next result takes the folder.
+    drawn: kinds of files that the pictures are drawn as; the page holds what they show in any case. Whole or not at
+    all, as :func:`write_results` does it. Returns the paths. Raises OutputError.
     """
     grown: dict[str, Path] = {}
-    step = report.next_step.line(Path(directory)) if report.next_step is not None else ""
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
         for name, content in files.items():
@@ -165,14 +164,17 @@ def write_report(
                 (fresh / name).write_bytes(content)
             elif (already := content(fresh / name)) is not None:
                 grown[name] = already
+        if report is None:
+            return
         write_text(fresh / REPORT, html(report, kind, Path(directory)))
-        head = {"kind": kind, "version": ENVELOPE, "answer": list(report.answer), "figures": {}}
-        if report.next_step is not None and step:
+        head: dict[str, Any] = {"kind": kind, "version": ENVELOPE, "answer": list(report.answer), "figures": {}}
+        if report.next_step is not None and (step := report.next_step.line(Path(directory))):
             head["next"] = {"words": report.next_step.words, "command": step}
-        rest = {**_finding_entries(report), "files": list(names), "keeps": [name for name in keeps if name in files]}
-        write_text(fresh / SUMMARY, to_json({**head, **summary(names), "kind": kind, **rest}))
+        rest = {**_finding_entries(report), "software": software(), "files": list(names), "keeps": list(keeps)}
+        write_text(fresh / SUMMARY, to_json({**head, **details, "kind": kind, **rest}))
 
-    return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown, drawn, kind=kind, own=own)
+    names, pictures = ((*files,), ()) if report is None else ((*files, REPORT, SUMMARY), report.pictures)
+    return write_results(directory, names, pictures, fill, grown, drawn, kind=kind, own=own)
 
 
 def _finding_entries(report: Report) -> dict[str, Any]:

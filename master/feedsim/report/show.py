@@ -41,7 +41,7 @@ from feedsim.report.formatting import (
     shown,
     three,
 )
-from feedsim.report.provenance import hashed, inputs_part, quantity, software
+from feedsim.report.provenance import hashed, inputs_part, quantity
 from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE, circle, circle_chart, turned
 
 # --- Pictures of several results over each other: contours of circles, stops, signals over time and by frequency ------
@@ -565,8 +565,8 @@ def _parameters(sources: Sequence[Source]) -> Section | None:
     return Section("Parameters that differ", [Table("l" + "p" * len(sources), heads, rows)])
 
 
-def summary(sources: Sequence[Source], names: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json."""
+def details(sources: Sequence[Source]) -> dict[str, Any]:
+    """What summary.json has besides the figures."""
     return {
         "format": FORMAT,
         "sources": [
@@ -584,6 +584,4 @@ def summary(sources: Sequence[Source], names: Sequence[str]) -> dict[str, Any]:
             for name, values in differing(sources)
         },
         "inputs": inputs_part(hashed([("source", file) for file in files_of(sources)])),
-        "software": software(),
-        "files": list(names),
     }

@@ -336,7 +336,7 @@ class JudgedRun(Run):
         warnings: a sentence each.
 
     >>> import feedsim as fs
-    >>> run: fs.Run = fs.run("z_positioning.yaml")  # what that returns is one, with figures
+    >>> run: fs.Run = fs.run("z_positioning.yaml").value
     >>> run.trace.unit("Z.M_fr"), run.log
     ('N.m', None)
     """

@@ -63,6 +63,11 @@ class Identified:
     date: str = ""
 
     @property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """Every friction parameter, M_0, J and delay, by name: value, interval, status."""
+        return self.found.estimates
+
+    @property
     def traces(self) -> tuple[str, ...]:
         """Names of the traces, in the order of the sources."""
         return distinct([source.file for source in self.sources])

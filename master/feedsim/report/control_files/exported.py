@@ -14,8 +14,8 @@ from feedsim.foundation import outputs
 from feedsim.foundation.errors import Note
 from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import counted, minus, plain_unit
-from feedsim.report.provenance import figures_part, hashed, inputs_part, software
-from feedsim.report.results import REPORT, SUMMARY, check_place
+from feedsim.report.provenance import hashed, inputs_part
+from feedsim.report.results import REPORT, SUMMARY
 from feedsim.scenario.machine import Machine
 
 # --- Which public source says what a number of a control means, and in which unit -------------------------------------
@@ -47,7 +47,6 @@ def sources_section(names: Iterable[Name]) -> Section | None:
 # --- The report of an export to a control's files: what was changed, what is to be typed, old and new values ----------
 
 
-KIND = "machine export"
 SHEET = "sheet.csv"
 MOST_NAMED = 3
 TOUCHED = "No byte of the files differs but those of the values that are listed as written."
@@ -62,11 +61,6 @@ def kept_apart(names: Iterable[str]) -> list[str]:
 def named(contents: Mapping[str, bytes]) -> dict[str, bytes]:
     """Name of the written file -> content."""
     return dict(zip(kept_apart(contents), contents.values(), strict=True))
-
-
-def check_writable(files: Sequence[str], directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (*files, REPORT, SUMMARY, SHEET), inputs, kind=KIND)
 
 
 def figures_of(written: Written) -> dict[str, Figure]:
@@ -178,23 +172,16 @@ def _changes(written: Written, done: bool, title: str, note: str) -> Section | N
     return Section(title, [Table("lllrrlllp", heads, rows, note)]) if rows else None
 
 
-def summary(
-    written: Written, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path], names: Sequence[str]
-) -> Mapping[str, Any]:
-    """Content of summary.json."""
+def details(written: Written, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path]) -> Mapping[str, Any]:
+    """What summary.json has besides the figures."""
     return {
-        "kind": KIND,
-        "answer": answers(written, axes),
         "machine": machine.name,
         "axes": dict(axes),
-        "figures": figures_part(figures_of(written)),
         "changes": [
             {"axis": change.axis, "parameter": change.name.parameter, "number": change.name.number, "old": change.old,
              "new": change.new, "unit": change.name.unit, "written": change.written, "reason": change.reason,
              "where": change.where}
             for change in written.changes
         ],
-        "software": software(),
         "inputs": inputs_part(hashed([("file", path) for path in inputs])),
-        "files": list(names),
     }  # fmt: skip

@@ -16,11 +16,10 @@ from feedsim.foundation.errors import Note
 from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.control_files.exported import sources_section
 from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
-from feedsim.report.provenance import figures_part, hashed, inputs_part, software
+from feedsim.report.provenance import hashed, inputs_part
 from feedsim.scenario.imported import Imported, place_of, written
 from feedsim.scenario.machine import Machine
 
-KIND = "machine import"
 SHEET = "sheet.csv"
 FILES = (SHEET, Machine.IN_FOLDER, "modes.csv")  # besides report.html and summary.json
 MOST_ODD = 20  # lines that were not understood are shown as examples
@@ -223,16 +222,11 @@ def _examples(archives: Sequence[Archive]) -> Iterator[tuple[Archive, Any]]:
             yield archive, entry
 
 
-def summary(
-    archives: Sequence[Archive], reading: Reading, made: Imported, inputs: Sequence[Path], names: Sequence[str]
-) -> Mapping[str, Any]:
-    """Content of summary.json."""
+def details(archives: Sequence[Archive], reading: Reading, made: Imported, inputs: Sequence[Path]) -> Mapping[str, Any]:
+    """What summary.json has besides the figures."""
     return {
-        "kind": KIND,
-        "answer": answers(reading, made),
         "control": reading.control,
         "axes": dict(reading.axes),
-        "figures": figures_part(figures_of(archives, reading, made)),
         "taken": [
             {"axis": taken.axis, "parameter": taken.parameter, "number": taken.number, "value": taken.value,
              "unit": taken.name.si, "text": taken.entry.text if taken.entry else None, "where": taken.where,
@@ -249,7 +243,5 @@ def summary(
             {"file": archive.name, "line": value.line, "text": value.text, "reason": value.reason}
             for archive, value in _examples(archives)
         ],
-        "software": software(),
         "inputs": inputs_part(hashed([("file", path) for path in inputs])),
-        "files": list(names),
     }  # fmt: skip

@@ -5,6 +5,6 @@ Start with report.py.
 """
 
 from feedsim.report.frf.bode import answers
-from feedsim.report.frf.report import FILES, draw, files_of, report_of, summary
+from feedsim.report.frf.report import FILES, details, draw, files_of, report_of
 
-__all__ = ["FILES", "answers", "draw", "files_of", "report_of", "summary"]
+__all__ = ["FILES", "answers", "details", "draw", "files_of", "report_of"]

@@ -37,7 +37,7 @@ from feedsim.report.formatting import (
 )
 from feedsim.report.frf.bode import Ordinate, answers
 from feedsim.report.frf.bode_plots import nearest_to_its_limit, pictures_of
-from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
+from feedsim.report.provenance import InputFile, hashed, inputs_part, machine_part, quantity
 from feedsim.report.results import Content
 from feedsim.scenario import Drive, Subject
 from feedsim.structure import Modes
@@ -316,13 +316,10 @@ def input_files(subject: Subject, responses: Responses) -> list[InputFile]:
     return hashed([*subject.files, *(("overlay", overlay.file) for overlay in responses.overlays)])
 
 
-def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json; a figure that could not be determined has the value null."""
+def details(subject: Subject, responses: Responses) -> dict[str, Any]:
+    """What summary.json has besides the figures; a figure that could not be determined has the value null."""
     return {
         "format": FRF_FORMAT,
-        "warnings": list(responses.warnings),
-        "answer": answers(responses),
-        "figures": figures_part(responses.figures),
         "subject": {
             "kind": subject.kind,
             "name": subject.name,
@@ -344,8 +341,6 @@ def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dic
         "machine": machine_part(responses.machine),
         "inputs": inputs_part(input_files(subject, responses)),
         "units": {name: dict(unit) for name, unit in responses.campaign.units.items()} if responses.campaign else {},
-        "software": software(),
-        "files": list(files),
     }
 
 

@@ -6,15 +6,15 @@ Start with report.py.
 
 from feedsim.report.identify.report import FILES, draw, files_of, report_of
 from feedsim.report.identify.summary import (
+    details,
     headline,
     rigid_line,
-    summary,
     table_lines,
     terminal_lines,
     terminal_warnings,
 )
 
 __all__ = [
-    "FILES", "draw", "files_of", "headline", "report_of", "rigid_line", "summary", "table_lines",
+    "FILES", "details", "draw", "files_of", "headline", "report_of", "rigid_line", "table_lines",
     "terminal_lines", "terminal_warnings",
 ]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +19,17 @@ from feedsim.files.trace.files import quoted, shortest
 from feedsim.report.formatting import Array, counted
 from feedsim.report.identify import stribeck_plots as quantities
 from feedsim.report.identify.stribeck_plots import MM_PER_MIN
-from feedsim.report.provenance import finite, inputs_part, machine_part, quantity, software
+from feedsim.report.provenance import finite, inputs_part, machine_part, quantity
 
 FORMAT = 1
 TABLE_COLUMNS = 118  # columns of the terminal's table
 
 
-def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json; what could not be determined is null."""
+def details(identified: Identified) -> dict[str, Any]:
+    """What summary.json has besides the figures; what could not be determined is null."""
     identification = identified.found
     return {
         "format": FORMAT,
-        "warnings": identified.warnings,
         "advice": list(identification.advice),
         "axis": identification.axis,
         "date": identified.date,
@@ -66,9 +65,7 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
             {"name": r.name, "rows": len(r), "interval": quantity(r.interval, "s")} for r in identified.records
         ],
         "inputs": inputs_part(quantities.input_files(identified)),
-        "software": software(),
         "performance": {step: quantity(taken, "s") for step, taken in identification.seconds.items()},
-        "files": list(files),
     }
 
 

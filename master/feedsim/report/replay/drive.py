@@ -41,9 +41,8 @@ from feedsim.report.content import (
     tile_value,
 )
 from feedsim.report.formatting import display_unit, minus, powers, remarked, three, typeset
-from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
+from feedsim.report.provenance import finite, hashed, inputs_part
 from feedsim.report.replay.report import pictures_of
-from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.scenario import Drive, Friction, Machine, Subject
 from feedsim.scenario.axis_units import ParameterGroup
 
@@ -184,6 +183,11 @@ class DriveReport:
     unread: Sequence[str] = ()  # notes on columns
 
     @property
+    def exit_code(self) -> int:
+        """0, or 1 where an axis that was asked for has no drive."""
+        return int(bool(self.found.refused))
+
+    @property
     def comparisons(self) -> Sequence[Comparison]:
         """Each axis with what was found, beside its record."""
         return self.found.comparisons
@@ -242,10 +246,9 @@ def _position_cycle(axis: str, one: DriveFound, other: OtherCycle, undecided: bo
     )
 
 
-def check_writable(axes: Sequence[str], directory: Path, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless results of the axes can be written to a directory without an input being lost."""
-    own = [file for axis in axes for file in (drive_file(axis), friction_file(axis))]
-    check_place(directory, (MACHINE, MODES_FILE, *own, REPORT, SUMMARY), inputs, kind="identify-drive")
+def files_of(axes: Sequence[str]) -> list[str]:
+    """Names of files that results of the axes may have besides report.html and summary.json."""
+    return [MACHINE, MODES_FILE, *(file for axis in axes for file in (drive_file(axis), friction_file(axis)))]
 
 
 def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str]:
@@ -429,11 +432,9 @@ def _files(report: DriveReport) -> list[tuple[str, Path]]:
     return [*result, *(report.subject.files if report.subject is not None else ())]
 
 
-def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json."""
+def details(report: DriveReport) -> dict[str, Any]:
+    """What summary.json has besides the figures."""
     return {
-        "kind": "drive",
-        "answer": answers(report),
         "recorded": recording_day(report.sources),
         "settings": dict(report.settings),
         "axes": {
@@ -470,10 +471,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
         },
         **({"refused": dict(report.found.refused)} if report.found.refused else {}),
         **({"beside_the_machine_file": beside_part(_beside(report))} if report.subject is not None else {}),
-        "figures": figures_part(report.figures),
-        "software": software(),
         "inputs": inputs_part(hashed(_files(report))),
-        "files": list(files),
     }  # fmt: skip
 
 

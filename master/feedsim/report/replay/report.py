@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from feedsim.report.content import (
     tile_value,
 )
 from feedsim.report.formatting import RECORDED, RESIDUAL_COLOUR, SIMULATED, Array, remarked, typeset
-from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
+from feedsim.report.provenance import hashed, inputs_part, machine_part, quantity
 from feedsim.scenario import Subject
 
 # --- The pictures of a replay: an axis beside its record, and what is left --------------------------------------------
@@ -180,6 +181,11 @@ class Replayed:
         """Of all axes."""
         return {name: figure for comparison in self.comparisons for name, figure in comparison.figures.items()}
 
+    @cached_property
+    def trace(self) -> Trace:
+        """Record and simulation side by side, "Z.x_a_recorded" and "Z.x_a_simulated", in SI units."""
+        return trace_of(self.comparisons)
+
 
 def trace_of(comparisons: Sequence[Comparison]) -> Trace:
     """Record and simulation side by side, within the window."""
@@ -249,22 +255,17 @@ def _files(replayed: Replayed) -> list[tuple[str, Path]]:
     return [*result, *replayed.subject.files, ("modes", replayed.subject.machine.modes)]
 
 
-def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json."""
+def details(replayed: Replayed) -> dict[str, Any]:
+    """What summary.json has besides the figures."""
     axis_record = replayed.comparisons[0].each
     time = axis_record.record.time[axis_record.rows]
     return {
-        "kind": "replay",
-        "answer": answers(replayed),
         "recorded": recording_day(replayed.sources),
         "machine": machine_part(replayed.subject.machine),
         "settings": dict(replayed.settings),
         "window": [quantity(float(time[0]), "s"), quantity(float(time[-1]), "s")],
         **({"changes": changes_part(replayed.proposals)} if replayed.proposals else {}),
-        "figures": figures_part(replayed.figures),
-        "software": software(),
         "inputs": inputs_part(hashed(_files(replayed))),
-        "files": list(files),
     }
 
 

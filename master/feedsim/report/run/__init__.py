@@ -5,17 +5,20 @@ Start with files.py, then report.py, the page; pose.py has the plant's pose.
 """
 
 from feedsim.report.changes import action
+from feedsim.report.page import PARTIAL
 from feedsim.report.provenance import input_paths
-from feedsim.report.run.files import check_writable, files_of, growing, page_of, write
+from feedsim.report.run.files import FILES, details, files_of, growing, page_of
 from feedsim.report.run.files import needed as workbook_needed
 from feedsim.report.run.report import answers, changes, first_proposals, summary_line
 from feedsim.report.run.sheet import in_workbook
 
 __all__ = [
+    "FILES",
+    "PARTIAL",
     "action",
     "answers",
     "changes",
-    "check_writable",
+    "details",
     "files_of",
     "first_proposals",
     "growing",
@@ -24,5 +27,4 @@ __all__ = [
     "page_of",
     "summary_line",
     "workbook_needed",
-    "write",
 ]

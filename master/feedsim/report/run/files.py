@@ -19,9 +19,6 @@ from feedsim.analysis import (
     Diagnosis,
     Figure,
     contours,
-    diagnoses,
-    doubts,
-    program_notes,
     tasks,
 )
 from feedsim.design.tune import Proposal
@@ -32,14 +29,12 @@ from feedsim.report.changes import action, changes_part
 from feedsim.report.content import Report
 from feedsim.report.page import PARTIAL, Partial, sheet_html
 from feedsim.report.provenance import (
-    figures_part,
     input_files,
     inputs_part,
     machine_part,
     quantity,
-    software,
 )
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.results import Content
 from feedsim.report.run import sheet
 from feedsim.report.run.contour import BLOCKS_FILE, blocks_csv, contour_part
 from feedsim.report.run.pose import diagnosis_part, pose_part
@@ -48,7 +43,6 @@ from feedsim.report.run.report import (
     LOG,
     PAGE,
     RESULT,
-    answers,
     changes,
     draw,
     first_proposals,
@@ -169,51 +163,12 @@ def _fill(book: Any, page: Any, sheet: Filled, rule: str) -> None:
 FORMAT = 1
 
 
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless a run's results can be written to ``directory`` without one of ``inputs`` being lost.
-
-    inputs: files that are read. Leaves nothing behind.
-    """
-    check_place(
-        directory,
-        (RESULT, REPORT, SUMMARY, LOG, PAGE, BANDS, BLOCKS_FILE, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL),
-        inputs,
-        kind="run",
-        own=(PARTIAL,),
-    )
+FILES = (RESULT, LOG, PAGE, BANDS, BLOCKS_FILE, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL)  # besides the report
 
 
 def growing(directory: Path | str) -> Partial:
-    """What takes a run's rows while it goes on, for :func:`write`."""
+    """What takes a run's rows while it goes on, for :func:`files_of`."""
     return Partial(directory, RESULT)
-
-
-def write(
-    run: JudgedRun,
-    figures: Mapping[str, Figure],
-    directory: Path | str,
-    recorded: Partial | None = None,
-    causes: Mapping[str, Diagnosis] | None = None,
-    *,
-    drawn: Sequence[str] = (),
-    page: str = "",
-    uncertainty: Uncertainty | None = None,
-    proposals: Sequence[Proposal] | None = None,
-) -> tuple[Path, ...]:
-    """Write result.csv, summary.json, report.html, log.csv, if there is one, and figures; returns their paths.
-
-    figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
-    directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
-    run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. drawn: kinds of
-    files that figures/* are drawn as. page: the machine as a page that computes, which the report links. uncertainty:
-    what identification leaves open. proposals: what to change, where that is known. Raises OutputError.
-    """
-    files = files_of(run, page, recorded, uncertainty)
-    causes = diagnoses(run) if causes is None else causes
-    proposals = changes(run, figures, causes) if proposals is None else proposals
-    report = page_of(run, figures, causes, page=bool(page), uncertainty=uncertainty, proposals=proposals)
-    content = partial(summary, run, figures, causes=causes, uncertainty=uncertainty, proposals=proposals)
-    return write_report(directory, report, content, files, drawn, kind="run", own=(PARTIAL,))
 
 
 def page_of(
@@ -233,7 +188,11 @@ def page_of(
 def files_of(
     run: JudgedRun, page: str = "", recorded: Partial | None = None, uncertainty: Uncertainty | None = None
 ) -> dict[str, Content]:
-    """Name -> content of all files besides the report; arguments as of :func:`write`."""
+    """Name -> content of all files besides the report.
+
+    page: the machine as a page that computes. recorded: the run's rows where they have been written already, in the
+    folder that the result goes to; the file becomes result.csv, or stays as it is where the result cannot be written.
+    """
 
     def result(path: Path) -> Path | None:
         if recorded is None or not recorded.has_rows:
@@ -259,24 +218,20 @@ def files_of(
     return files
 
 
-def summary(
+def details(
     run: JudgedRun,
     figures: Mapping[str, Figure],
-    files: Sequence[str],
     causes: Mapping[str, Diagnosis] | None = None,
     uncertainty: Uncertainty | None = None,
     proposals: Sequence[Proposal] | None = None,
 ) -> dict[str, Any]:
-    """Content of summary.json; a figure that could not be determined has the value null."""
+    """What summary.json has besides the figures; a figure that could not be determined has the value null."""
     causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
     proposals = changes(run, figures, causes) if proposals is None else proposals
     return {
         "format": FORMAT,
-        "answer": answers(run, figures, causes, proposals),
         "action": action(first_proposals(proposals, causes), machine),
-        "warnings": [*run.warnings, *doubts(figures, causes), *program_notes(run.program)],
-        "figures": figures_part(figures),
         **({"uncertain": summary_part(uncertainty, figures)} if uncertainty is not None else {}),
         "changes": changes_part(proposals),
         "circles": _circles(run, causes),
@@ -325,13 +280,11 @@ def summary(
             name: {"value": value, "unit": "J", "meaning": COUPLING[name.partition(".")[2]]}
             for name, value in run.coupling.items()
         },
-        "software": software(),
         "performance": {
             "wall_time": quantity(run.wall_time, "s"),
             "real_time_factor": quantity(real_time_factor(run), "1"),
             "cycle_loop": "native" if run.native else "Python",
         },
-        "files": list(files),
     }
 
 

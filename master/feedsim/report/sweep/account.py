@@ -19,7 +19,7 @@ from feedsim.design.sweep.sensitivity import CONFIDENCE, Indices, Sensitivities,
 from feedsim.design.sweep.table import Failure, Where, failures, kinds, levels
 from feedsim.foundation.errors import WRONG, Wrong
 from feedsim.report.formatting import Array, Scale, number, scale
-from feedsim.report.provenance import InputFile, finite, hashed, inputs_part, software
+from feedsim.report.provenance import InputFile, finite, hashed, inputs_part
 
 if TYPE_CHECKING:
     from feedsim.design.sweep.design import Design
@@ -360,16 +360,11 @@ def study_files(account: Account) -> list[InputFile]:
     return hashed(named)
 
 
-def summary(account: Account, files: Sequence[str], answer: Sequence[str] = ()) -> dict[str, Any]:
-    """Content of summary.json; what could not be determined is null. Values are SI, as in the table.
-
-    answer: the lines that the report begins with.
-    """
+def details(account: Account) -> dict[str, Any]:
+    """What summary.json has besides the figures; null: not determined. Values are SI, as in the table."""
     study, scenario, result = account.study, account.study.base.scenario, account.sensitivities
     return {
         "format": FORMAT,
-        "answer": list(answer),
-        "warnings": list(account.warnings),
         "study": {
             "name": study.name,
             "file": study.file.name,
@@ -411,14 +406,12 @@ def summary(account: Account, files: Sequence[str], answer: Sequence[str] = ()) 
             for failure in account.failures
         ],
         "inputs": inputs_part(study_files(account)),
-        "software": software(),
         "performance": {
             "busy": {"value": account.busy, "unit": "s"},
             "wall_time": {"value": account.wall_time, "unit": "s"},
             "processes": account.processes,
             "efficiency": account.efficiency,
         },
-        "files": list(files),
     }
 
 

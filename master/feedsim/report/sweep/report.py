@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,9 +42,9 @@ from feedsim.report.sweep.account import (
     Input,
     Measure,
     Output,
+    details,
     measures,
     study_files,
-    summary,
 )
 from feedsim.report.sweep.figure_plots import grid_picture, of_account
 
@@ -164,8 +163,7 @@ def write(
     The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.
     """
     account = account_of(table, study, design, Path(directory))
-    content = partial(summary, account, answer=answers(account))
-    return write_report(directory, drawn_report(account), content, {}, drawn, kind="sweep")
+    return write_report(directory, drawn_report(account), details(account), {}, drawn, kind="sweep")
 
 
 def account_of(table: Runs, study: Study, design: Design, directory: Path) -> Account:

@@ -7,12 +7,12 @@ Start with report.py.
 from feedsim.report.tune.report import (
     FILES,
     answers,
+    details,
     figures_of,
     findings,
     report_of,
     settings,
     sheet,
-    summary,
 )
 
-__all__ = ["FILES", "answers", "figures_of", "findings", "report_of", "settings", "sheet", "summary"]
+__all__ = ["FILES", "answers", "details", "figures_of", "findings", "report_of", "settings", "sheet"]

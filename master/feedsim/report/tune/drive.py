@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,8 +37,7 @@ from feedsim.report.content import (
     tile_value,
 )
 from feedsim.report.formatting import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, minus, remarked, typeset
-from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
-from feedsim.report.results import REPORT, SUMMARY, check_place
+from feedsim.report.provenance import input_files, inputs_part, machine_part
 from feedsim.report.uncertainty import drawn_values
 from feedsim.scenario import Scenario
 
@@ -208,7 +206,6 @@ def lines_of(rows: Iterable[Sequence[str]]) -> list[str]:
     return result
 
 
-KIND = "tune-drive"
 BINDS = 0.06  # of a limit: a margin that is as near to it binds
 RIGID_WARNING = (
     "the machine has no elastic modes, and a real axis resonates. So K_p and the filters stay at most as they are, and "
@@ -220,12 +217,6 @@ CHECK = (
     "The values are as good as the machine file. At the machine: type them, measure the frequency response of the "
     "speed loop, then run one circle"
 )
-
-
-def check_writable(directory: Path | str, axes: Sequence[str], inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
-    files = (REPORT, SUMMARY, SETTINGS, SHEET, *map(drive_file, axes))
-    check_place(directory, files, inputs, kind=KIND)
 
 
 def figures_of(tuned: Tuned) -> dict[str, Figure]:
@@ -550,11 +541,10 @@ def _largest(tuned: Tuned, when: str) -> float:
     return 1e6 * float(np.max(getattr(tuned.searched, when).peak))
 
 
-def summary(tuned: Tuned, names: Sequence[str], asked: Mapping[str, str]) -> Mapping[str, Any]:
-    """Content of summary.json. asked: name -> text of what was asked for besides changes of the scenario."""
+def details(tuned: Tuned, asked: Mapping[str, str]) -> Mapping[str, Any]:
+    """What summary.json has besides the figures. asked: name -> text of what was asked for besides changes."""
     limits = tuned.limits
     return {
-        "answer": answers(tuned),
         "axis": tuned.axis,
         "changes": [
             {"axis": each.axis, "parameter": each.parameter, "old": each.old, "new": each.new, "unit": each.unit}
@@ -571,7 +561,6 @@ def summary(tuned: Tuned, names: Sequence[str], asked: Mapping[str, str]) -> Map
         },
         "why": why(tuned),
         "evaluations": {"closed_form": tuned.evaluations[0], "runs": tuned.evaluations[1]},
-        "figures": figures_part(figures_of(tuned)),
         **({"uncertain": {"draws": tuned.drawn.count}} if tuned.drawn is not None else {}),
         "motions": [
             {"case": case.name, "motion": motion, "figure": figure, "before": before, "after": after}
@@ -580,6 +569,4 @@ def summary(tuned: Tuned, names: Sequence[str], asked: Mapping[str, str]) -> Map
         ],
         "machine": machine_part(tuned.scenario.machine),
         "inputs": inputs_part(input_files(tuned.scenario)),
-        "software": software(),
-        "files": list(names),
     }  # fmt: skip

@@ -21,7 +21,7 @@ from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
 from feedsim.report.content import Paragraph, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import AFTER, BEFORE, NARROW, minus, remarked, typeset
-from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
+from feedsim.report.provenance import input_files, inputs_part, machine_part
 from feedsim.report.tune.drive import new_values
 from feedsim.report.uncertainty import drawn_values
 
@@ -343,15 +343,13 @@ def pictures_of(judged: Judged) -> list[Picture]:
     return pictures
 
 
-def summary(judged: Judged, names: Sequence[str]) -> Mapping[str, Any]:
-    """Content of summary.json."""
+def details(judged: Judged) -> Mapping[str, Any]:
+    """What summary.json has besides the figures."""
     return {
-        "answer": answers(judged),
         "kind_of_compensation": judged.found.kind,
         "objective": judged.objective,
         "values": {axis: dict(values) for axis, values in judged.found.values.items()},
         "runs": judged.found.runs,
-        "figures": figures_part(figures_of(judged)),
         **({"uncertain": {"draws": len(judged.drawn)}} if judged.drawn is not None else {}),
         "circles": {
             name: [
@@ -366,6 +364,4 @@ def summary(judged: Judged, names: Sequence[str]) -> Mapping[str, Any]:
         "axes": list(judged.plane),
         "machine": machine_part(judged.scenario.machine),
         "inputs": inputs_part(input_files(judged.scenario)),
-        "software": software(),
-        "files": list(names),
     }

@@ -49,7 +49,7 @@ def pack_one(scenario: Scenario, program: Program, fmus: Path, out: Path) -> Non
     )  # fmt: skip
 
 
-def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> Roles | None:
+def roles_of_one(structure: Structure, archives: Mapping[str, Archive], where: str) -> Roles | None:
     """Parts of the unit in their roles, as if they were components; None where no component is such a unit.
 
     Raises:
@@ -78,7 +78,7 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
     )
 
 
-def coupling(result: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> dict[str, Any] | None:
+def coupling_of_one(result: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> dict[str, Any] | None:
     """How the unit's parts are exchanged, as a scenario has it; None where the parts are components of their own.
 
     Raises:
@@ -95,7 +95,7 @@ def coupling(result: Roles, values: Mapping[str, Mapping[str, Value]], where: st
     return {"scheme": list(SCHEMES)[scheme], "substeps": int(given["coupling.substeps"]), "units": "one"}
 
 
-def split(
+def split_one(
     result: Roles, archives: Mapping[str, Archive], values: Mapping[str, Mapping[str, Value]]
 ) -> tuple[dict[str, Archive], dict[str, dict[str, Value]]]:
     """Archives and values by part, with the names that units of their own have."""

@@ -23,7 +23,8 @@ from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.unpacked import readable
 from feedsim.simulation.nc import Program, Segment, plan
 from feedsim.simulation.nc.program import MAX_POSITION_CYCLES
-from feedsim.simulation.ssp import archive, export, rebuilt, setpoints, system_structure
+from feedsim.simulation.ssp import archive, rebuilt, setpoints, system_structure
+from feedsim.simulation.ssp.export import coupling_of_one, roles_of_one, split_one
 from feedsim.simulation.ssp.rebuilt import STRUCTURE, Parts, values
 from feedsim.simulation.ssp.roles import roles
 from feedsim.simulation.ssp.setpoints import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
@@ -93,12 +94,12 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         with refusals_of(path):
             structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
             archives = _archives(structure, files, folder, path, stack)
-            result = export.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
+            result = roles_of_one(structure, archives, str(path)) or roles(structure, archives, str(path))
             table = _table(archives[result.setpoint], f"{path}: {result.setpoint}")
             given = values(structure, files, archives, result.foreign, str(path))
-            coupling = export.coupling(result, given, str(path))
+            coupling = coupling_of_one(result, given, str(path))
             if coupling is not None:
-                archives, given = export.split(result, archives, given)
+                archives, given = split_one(result, archives, given)
             if problems := rebuilt.lacking(result, given, str(path)):
                 raise InputError.of(str(path), problems)
             own = rebuilt.annotation(structure.scenario, files, str(path))

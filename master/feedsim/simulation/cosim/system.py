@@ -238,7 +238,7 @@ class System(Closing):
         InputError: a unit refuses a value.
         """
         self.machine = machine
-        if self.plant_modes_file is not None:
+        if machine.plant is machine.mounts_table is None:  # packed for its axes, the archive's own modes are others
             self.plant_modes_file = machine.modes
         self.roles = {name: filled(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
         for unit in self.instances.values():

@@ -18,6 +18,7 @@ from feedsim.jobs.history import history as history
 from feedsim.jobs.identify import identify_friction as identify_friction
 from feedsim.jobs.identify_drive import identify_drive as identify_drive
 from feedsim.jobs.identify_modes import identify_modes as identify_modes
+from feedsim.jobs.identify_mounts import identify_mounts as identify_mounts
 from feedsim.jobs.machine import machine_build as machine_build
 from feedsim.jobs.machine import machine_info as machine_info
 from feedsim.jobs.machine import machine_view as machine_view

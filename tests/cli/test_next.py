@@ -108,6 +108,11 @@ MADE = {
         ("machine import r/nc.tea", "--axes X=AX1"),
     ),
     "modes": (f"identify modes response.csv --machine {ONE_AXIS} --motor n/M --modes 1 --out r", ("r/modes.csv",)),
+    "mounts": (
+        f"identify mounts {SCENARIOS}/records/elastomer_mounts/stop_500.csv --machine "
+        f"{SCENARIOS}/z_elastomer_mounts.yaml --set machine.mounts.c=90% --out r",
+        ("run ", "c=90%", "machine.mounts=r/mounts.yaml"),
+    ),
     "a machine": (f"machine view {ONE_AXIS} --at X=100mm --out r", ("--at X=100mm", "--animate")),
 }
 # Taking a minute each, these are parsed alone; they are executed by tests of their own.

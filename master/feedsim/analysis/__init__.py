@@ -21,14 +21,15 @@ from feedsim.analysis.evaluate import (
     doubts,
     evaluate,
     program_notes,
+    stops_asked,
     tasks,
 )
 from feedsim.analysis.figures import Figure, Figures, Named
-from feedsim.analysis.positioning import Accuracy, Approach, deviation, positioning
+from feedsim.analysis.positioning import Accuracy, Approach, deviation, positioning, with_clamped
 
 __all__ = [
     "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "ContourError", "ContourTask", "Diagnosis",
     "Figure", "Figures", "Glitch", "Named", "PositioningTask", "Result", "Task", "Turn", "answer", "check",
     "circularity", "contour", "contours", "contours_asked", "deviation", "diagnoses", "doubts", "evaluate",
-    "positioning", "program_notes", "tasks", "with_frictionless",
+    "positioning", "program_notes", "stops_asked", "tasks", "with_clamped", "with_frictionless",
 ]  # fmt: skip

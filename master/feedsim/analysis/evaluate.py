@@ -24,7 +24,7 @@ from feedsim.analysis.circularity import (
 )
 from feedsim.analysis.contour_error import ContourError, contour_error
 from feedsim.analysis.figures import Array, Figure
-from feedsim.analysis.positioning import MIN_REST_TIME, Accuracy, Approach, positioning, readings
+from feedsim.analysis.positioning import MIN_REST_TIME, Accuracy, Approach, mounts_share, positioning, readings
 from feedsim.files.trace import Trace, matches
 from feedsim.foundation.errors import InputError, Note
 from feedsim.linear.loops import measuring_error, position_reference
@@ -238,9 +238,13 @@ class PositioningTask:
         """Columns without which there is nothing to evaluate."""
         return (f"{self.approach.axis}.x_a",)
 
-    def figures(self, trace: Trace) -> dict[str, Figure]:
-        """Figures of the task, without prefix."""
-        return positioning(trace, self.approach, band=self.band)
+    def figures(self, trace: Trace, clamped: Trace | None = None) -> dict[str, Figure]:
+        """Figures of the task, without prefix. clamped: the same setpoints on mounts that hold still."""
+        figures = positioning(trace, self.approach, band=self.band)
+        if clamped is not None:
+            settling = figures["settling_time"]
+            figures["settling_of_mounts"] = mounts_share(clamped, self.approach, settling, self.band)
+        return figures
 
 
 @dataclass(frozen=True)
@@ -494,6 +498,11 @@ def contours_asked(scenario: Scenario, program: Program) -> bool:
     return any(isinstance(task, ContourTask) for task in tasks(scenario, program))
 
 
+def stops_asked(scenario: Scenario, program: Program) -> bool:
+    """Whether a stop is evaluated."""
+    return any(isinstance(task, PositioningTask) for task in tasks(scenario, program))
+
+
 def contours(result: Result) -> Mapping[str, ContourError]:
     """Distances from the paths of its NC programs: prefix of a contour's figures -> what came out.
 
@@ -535,12 +544,17 @@ def evaluate(result: Result, asked: Sequence[Task] | None = None) -> dict[str, F
     >>> print(figures["Z.duration"])
     1.247 s
     """
+    clamped = getattr(result, "clamped", None)
+
+    def figures(task: Task) -> Mapping[str, Figure]:
+        if isinstance(task, ContourTask):
+            return contours(result)[task.prefix].figures()
+        return task.figures(result.trace, clamped) if isinstance(task, PositioningTask) else task.figures(result.trace)
+
     return {
         f"{task.prefix}.{name}": figure
         for task in (tasks(result.scenario, result.program) if asked is None else asked)
-        for name, figure in (
-            contours(result)[task.prefix].figures() if isinstance(task, ContourTask) else task.figures(result.trace)
-        ).items()
+        for name, figure in figures(task).items()
     }
 
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,11 @@ from feedsim.analysis.figures import Array, Figure, column, last_outside, up_cro
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
 from feedsim.motions.positioning_cycle import Visits
+from feedsim.simulation import cosim
+from feedsim.simulation.cosim import Run
+from feedsim.simulation.cosim.schedule import Progress
+from feedsim.structure.modes import checked_modes, with_mounts, write_modes
+from feedsim.structure.mounts import read_mounts
 
 RINGING_WINDOW = (0.030, 0.400)  # s after the end of the NC motion: the first swing is left out, it is a forced one
 REST_DELAY = 1.0  # s after the end of the NC motion
@@ -78,6 +85,42 @@ def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict
         by_tool = _stop(trace, approach, f"tcp.x_{axis}", band, f"axis {axis} by the tool point")
         figures |= {f"tool.{name}": figure for name, figure in by_tool.items()}
     return figures
+
+
+CLAMPED = 1000.0  # times as stiff as they are in the modes: mounts that hold still
+
+
+def with_clamped(run: Run, fmus: Path | None = None, progress: Progress | None = None) -> Run:
+    """A run with the positions of a second one on mounts that hold still, linear springs CLAMPED times as stiff.
+
+    The run itself where all mounts are springs, or one of another maker's units has a part in it.
+
+    Raises SimulationError: a unit failed.
+    """
+    scenario, machine = run.scenario, run.scenario.machine
+    if machine.mounts is None or machine.plant is not None or machine.foreign_units:
+        return run
+    bare = checked_modes(machine.model_copy(update={"mounts": None}))
+    table = read_mounts(machine.mounts.table, len(bare.frequency))
+    K_lin, x_2 = table.element[:, 0], table.element[:, 3]
+    none = np.zeros(len(K_lin))
+    stiff = with_mounts(bare, table, np.column_stack([K_lin, CLAMPED * K_lin, none, x_2, none, none]))
+    columns = tuple(f"{axis}.x_a" for axis in machine.axes)
+    recording = scenario.recording.model_copy(update={"variables": columns})
+    with TemporaryDirectory() as folder:
+        write_modes(Path(folder) / "modes.csv", stiff)
+        changes = {"mounts": None, "structure": None, "modes": Path(folder) / "modes.csv"}
+        second = scenario.model_copy(
+            update={"machine": machine.model_copy(update=changes), "recording": recording, "logging": None}
+        )
+        return replace(run, clamped=cosim.run(second, program=run.program, fmus=fmus, progress=progress).trace)
+
+
+def mounts_share(clamped: Trace, approach: Approach, settling: Figure, band: float) -> Figure:
+    """The part of a settling time [ms] that the mounts make: less that of the run `clamped`; NaN where either is."""
+    without = _stop(clamped, approach, f"{approach.axis}.x_a", band, "")["settling_time"].value
+    meaning = f"part of the settling time that the mounts make: on mounts that hold still it is {without:.3g} ms"
+    return Figure(settling.value - without, "ms", meaning)
 
 
 def deviation(trace: Trace, approach: Approach, name: str) -> tuple[Array, Array]:

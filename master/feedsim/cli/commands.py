@@ -27,7 +27,7 @@ from feedsim.foundation.errors import WRONG, InputError, Note, nearest, no_such_
 from feedsim.jobs.parameters import COMMANDS, Argument, Declaration, Option, Parameter, Watch, declared
 
 GROUPS = {
-    "identify": "friction, drives or modes from records",
+    "identify": "friction, drives, modes or mounts from records",
     "tune": "values of a drive, or of a friction compensation",
     "machine": "build and view a machine; import it from a control, export it",
     "tools": "schemas of files, conversion of records, completion in shells",

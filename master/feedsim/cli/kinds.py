@@ -21,6 +21,7 @@ COMMAND_NAMES = {
     "identify": "identify friction",
     "identify-drive": "identify drive",
     "identify-modes": "identify modes",
+    "identify-mounts": "identify mounts",
     "machine": "machine view",
     "show": "diff",
     "tune": "tune compensation",
@@ -104,7 +105,7 @@ _RUN = ("run", "check", "frf", "tune feedforward", "export", "machine info", "ma
 _MACHINES = ("machine info", "machine view", "machine build", "frf", "export", "machine export",
              "machine import --machine")  # fmt: skip
 _RECORDS = ("identify friction", "circle", "diff", "compare", "tools convert", "identify drive", "replay",
-            "identify modes")  # fmt: skip
+            "identify modes", "identify mounts")  # fmt: skip
 INPUT_KINDS = (
     Kind("a study", ("sweep", "check"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
     Kind("a scenario", _RUN, _keyed({"motions"}, none={"sampling", "parameters"})),

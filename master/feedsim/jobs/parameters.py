@@ -105,6 +105,7 @@ COMMANDS = {
     "identify friction": "jobs.identify:identify_friction",
     "identify drive": "jobs.identify_drive:identify_drive",
     "identify modes": "jobs.identify_modes:identify_modes",
+    "identify mounts": "jobs.identify_mounts:identify_mounts",
     "replay": "jobs.replay:replay",
     "frf": "jobs.frf:frf",
     "tune drive": "jobs.tune_drive:tune_drive",

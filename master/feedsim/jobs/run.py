@@ -269,6 +269,8 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: 
     )
     if friction_share and analysis.contours_asked(subject.plan, subject.program):
         raw = analysis.with_frictionless(raw, subject.fmus, watch.of(f"{subject.plan.name} nearly without friction"))
+    if analysis.stops_asked(subject.plan, subject.program):
+        raw = analysis.with_clamped(raw, subject.fmus, watch.of(f"{subject.plan.name} on mounts that hold still"))
     done = judged(raw)
     done = replace(done, warnings=subject.warnings(done.warnings))
     if not page:

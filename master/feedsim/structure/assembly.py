@@ -75,6 +75,7 @@ class Assembly:
         pose: axis -> position [m]; empty where it is not known.
         units: that the file gives its numbers in; None of a structure without such a choice.
         mounts: directions of mounts that are not linear.
+        tool: (3, N) absolute motion of the tool in X, Y and Z; None where only matrices are known.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Assembly:
     pose: Mapping[str, float]
     units: UnitSystem | None = SI
     mounts: tuple[MountPort, ...] = ()
+    tool: Floats | None = None
 
 
 def translating_mass(assembly: Assembly) -> Floats:

@@ -22,6 +22,7 @@ from feedsim.files.trace.cells import TIME_NAMES, Table, read_table, titles, usu
 from feedsim.files.trace.files import write_csv
 from feedsim.files.trace.mat import MAT, read_columns
 from feedsim.files.trace.mat import named as named_so
+from feedsim.files.trace.response_files import UNIVERSAL, read_signals_uff
 from feedsim.files.trace.scopes import read_scope
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
 from feedsim.foundation import units
@@ -177,7 +178,8 @@ class Recording:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Look into a CSV file, a MAT file (shown by its ending .mat) or a control's capture (.json).
+    """Look into a CSV file, a MAT file (shown by its ending .mat), a universal file of time responses (.uff, .unv, .uf,
+    .bunv) or a control's capture (.json).
 
     Raises InputError: what read_csv() and read_capture() refuse; a MAT file that is not there or is none, or one
     without a vector of real numbers.
@@ -185,6 +187,9 @@ def read_recording(path: str | Path) -> Recording:
     path = Path(path)
     if path.suffix.lower() == MAT:
         return _read_mat(path)
+    if path.suffix.lower() in UNIVERSAL:
+        columns, unit_texts, notes = read_signals_uff(path)
+        return Recording(path, tuple(columns), unit_texts, notes=notes, _columns=columns)
     if (recording := of_control(path)) is not None:
         return recording
     table = read_table(path)

@@ -38,7 +38,7 @@ from feedsim.foundation.installation import need
 Floats = NDArray[np.float64]
 
 DATASET = 58
-RESPONSE, COHERENCE = 4, 6  # function types
+TIME_RESPONSE, RESPONSE, COHERENCE = 1, 4, 6  # function types
 ACCELERATION = 12  # specific data type
 FUNCTIONS = {
     0: "general function", 1: "time response", 2: "auto spectrum", 3: "cross spectrum", 5: "transmissibility",
@@ -104,6 +104,33 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
         return FrequencyResponse(frequency[kept], columns, unit_texts, coherence, tuple(notes))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def read_signals_uff(path: Path) -> tuple[dict[str, Floats], dict[str, str], tuple[str, ...]]:
+    """Time responses of a universal file: name -> (N,), with the time as "time"; name -> unit; notes.
+
+    Functions are called by node and direction, "12:+Z". Units are those of frequency responses.
+
+    Raises InputError: no universal file, no time response in it, several over different times, a value that is not
+    finite.
+    """
+    responses = [entry for entry in _sets(path) if int(entry["func_type"]) == TIME_RESPONSE]
+    if not responses:
+        raise InputError(f"{path}: no time response (dataset 58, function type 1)")
+    time = np.asarray(responses[0]["x"], dtype=np.float64)
+    columns, unit_texts, notes = {"time": time}, {"time": "s"}, list[str]()
+    for entry in responses:
+        name, axis, x = _point(entry, "rsp"), _Axis.of(entry, "ordinate", "rsp"), np.asarray(entry["x"])
+        if x.shape != time.shape or not np.allclose(x, time, rtol=FREQUENCY_TOLERANCE, atol=0):
+            raise InputError(f"{path}: {name!r} is over another time than the first one; a file each is needed")
+        if name in columns:
+            raise InputError(f"{path}: two time responses are called {name!r}")
+        columns[name] = np.real(np.asarray(entry["data"])).astype(np.float64) * axis.factor
+        unit_texts[name] = axis.unit
+        notes += [Note(f"{path}: function {name!r}: {words}") for words in axis.notes]
+    if not all(np.all(np.isfinite(values)) for values in columns.values()):
+        raise InputError(f"{path}: a value is not finite")
+    return columns, unit_texts, tuple(notes)
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,9 @@ def stop_words(figures: Figures, band: float, remedy: str = "") -> str:
         else f"is settled within {within} at the end of the motion"
     )
     said = f"overshoots by {two(overshoot.value)} um and {settles}."
+    if (mounts := figures.get("settling_of_mounts")) is not None and math.isfinite(mounts.value):
+        said += f" On mounts that hold still it settles in {two(settled.value - mounts.value)} ms"
+        said += f": the mounts make {100 * mounts.value / settled.value:.0f} % of it." if mounts.value > 0 else "."
     if rings(settled.value * 1e-3, frequency):
         said += f" It rings at {frequency:.3g} Hz{'.' if remedy else '; lower the jerk.'}"
     return f"{said}{advice}"

@@ -290,6 +290,7 @@ class Run:
             be made of it: :func:`feedsim.simulation.cosim.logged`.
         log: the log as the scenario asks for it; None without one.
         frictionless: the positions "X.x_a" of the same setpoints nearly without friction, where they were asked for.
+        clamped: the same on mounts that hold still, where the machine's are not linear.
     """
 
     scenario: Scenario
@@ -310,6 +311,7 @@ class Run:
     log: Trace | None = None
     native: bool = False
     frictionless: Trace | None = None
+    clamped: Trace | None = None
 
     def __repr__(self) -> str:
         return f"Run of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.checks import contradictions, held, load_structure, node, nodes, pose_faults, rail
-from feedsim.scenario.structure.parts import Drive, GeometryStructure, Mount
+from feedsim.scenario.structure.parts import Drive, GeometryStructure, Hold, Mount
 from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort, State
 from feedsim.structure.geometry.mesh import FRAME, Mesh, Row, rigid, symmetric, weighted
 
@@ -115,12 +115,17 @@ def ports(mesh: Mesh, origins: Mapping[str, Floats], positions: Floats) -> dict[
             mesh.grip(point, held(structure, texts), positions) for texts in (axis.scale.moving, axis.scale.against)
         )
         result[f"x_{name}"] = (moving.displacement(along) - against.displacement(along)).dense(size)
-    tool = structure.tool
-    point = origins[tool.body] + tool.at
-    mine, other = (mesh.grip(point, held(structure, texts), positions) for texts in (tool.held_by, tool.against))
-    for letter, direction in zip("XYZ", FRAME, strict=True):
-        result[f"tcp_{letter}"] = (mine.displacement(direction) - other.displacement(direction)).dense(size)
+    mine, other = (_tool(mesh, texts, origins, positions) for texts in (structure.tool.held_by, structure.tool.against))
+    for letter, own, against in zip("XYZ", mine, other, strict=True):
+        result[f"tcp_{letter}"] = own - against
     return result
+
+
+def _tool(mesh: Mesh, texts: Hold, origins: Mapping[str, Floats], positions: Floats) -> Floats:
+    """(3, N) displacement in X, Y and Z of what is held at the tool centre point."""
+    tool = mesh.structure.tool
+    grip = mesh.grip(origins[tool.body] + tool.at, held(mesh.structure, texts), positions)
+    return np.array([grip.displacement(direction).dense(mesh.size) for direction in FRAME])
 
 
 class Assembler:
@@ -168,6 +173,7 @@ class Assembler:
                 for name, mount, d, row in mount_rows(mesh, body)
                 if not mount.linear
             ),
+            tool=_tool(mesh, structure.tool.held_by, origins, positions),
         )
 
 

@@ -1,0 +1,238 @@
+"""Levelling mounts of a machine from ring-downs behind stops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
+
+from feedsim.analysis import Figure, Named
+from feedsim.estimation.identify import Estimate
+from feedsim.estimation.modal.measured import Channel
+from feedsim.estimation.replay.mounts import Accelerometer, FoundMounts, read_stops, start_factors, with_accelerometer
+from feedsim.estimation.replay.mounts import identify_mounts as identified
+from feedsim.files.columns import load_columns
+from feedsim.files.fields import no_axis
+from feedsim.files.trace import read_recording
+from feedsim.foundation.arguments import Value, amount, given, settings, spelt
+from feedsim.foundation.errors import InputError
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Archives,
+    Argument,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    RecordColumns,
+    Settings,
+    Watch,
+    job,
+    out,
+)
+from feedsim.jobs.result import Result, announce, kept
+from feedsim.report import mounts as page
+from feedsim.report.content import Report
+from feedsim.report.results import Content
+from feedsim.scenario import load_subject
+from feedsim.simulation.judge import mounts as damped_twice
+
+SIGNALS = ("position", "speed")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MountsResult(Result):
+    """Levelling mounts, identified.
+
+    identified: what was found, and what it rests on.
+    """
+
+    identified: page.MountsReport
+
+    kind = page.KIND
+    may_write = page.FILES
+
+    @property
+    def mounts(self) -> FoundMounts:
+        """Verdict, factors with intervals, and every ring-down."""
+        return self.identified.mounts
+
+    @property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """K_e, F_max, x_2, K_v and c as factors on the table of mounts: value, interval, status."""
+        return self.mounts.estimates
+
+    @property
+    def keeps(self) -> Sequence[str]:
+        """The group `mounts` and the table that it names: machine files name it."""
+        return page.KEPT_FILES
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """The logs, and the files of the machine."""
+        return [*self.identified.files, *(file for _, file in self.identified.subject.files)]
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "K_e", "F_max", "x_2", "K_v", "c"; "stop_1.frequency_first", "stop_1.damping_last", ..."""
+        return Named(self.identified.figures)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the values are believed."""
+        return self.identified.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """Whether the mounts are linear, and what they are."""
+        return page.answers(self.identified)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers, and the table of all values with their intervals."""
+        return page.summary_lines(self.identified)
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.identified)
+
+    def files(self) -> Mapping[str, Content]:
+        """mounts.yaml and its table, and what the figures show as CSV."""
+        return page.files_of(self.identified)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.identified, names)
+
+
+@job("levelling mounts from the ring-downs of stops")
+def identify_mounts(
+    logs: Annotated[
+        File | Sequence[File],
+        Argument(
+            "LOG", "stops: position setpoint, and position or speed; or an accelerometer (CSV, MAT, UFF)", many=True
+        ),
+    ],
+    machine: Annotated[
+        File, Option("MACHINE-or-SCENARIO", "with a table of mounts (key mounts), whose elements are the start")
+    ],
+    axes: Annotated[str | None, Option("NAME", "the axis that stops (default: the only one of the logs)")] = None,
+    *,
+    columns: RecordColumns = None,
+    signal: Annotated[
+        str | None,
+        Option(
+            "", "which one of the axis counts (default: position where it is recorded)", choices=("position", "speed")
+        ),
+    ] = None,
+    accelerometer: Annotated[
+        str | None,
+        Option(
+            "DIRECTION=NAME[:UNIT]",
+            "acceleration of the tool in place of the axis: direction X, Y or Z, its column, and its unit where the "
+            "file has none, e.g. Z=1:+Z or Z=a:g; setpoints are those of the scenario, or of the log of a machine",
+        ),
+    ] = None,
+    jerks: Annotated[
+        str | Sequence[Value],
+        Option(
+            "VALUES",
+            "jerk of the scenario's path, one a log of an accelerometer, e.g. '150 m/s^3,500 m/s^3' (default: its own)",
+        ),
+    ] = (),
+    set: Settings = None,
+    fmus: Archives = None,
+    out: Annotated[File | None, out("mounts_{logs}")] = None,
+    figures: FigureKinds = (),
+    force: Force = False,
+    watch: Watch = NO_WATCH,
+) -> MountsResult:
+    """Identify levelling mounts whose stiffness and damping depend on the amplitude, from the ring-downs of stops.
+
+    Needs stops at two or more jerks, or one long decay. Leaves mounts.yaml, which machine files and scenarios take as
+    they do the group `mounts`, and a report: frequency and damping over the amplitude, recorded and simulated.
+
+    Command line:
+        feedsim example elastomer_mounts z_elastomer_mounts
+        feedsim identify mounts records/elastomer_mounts/stop_150.csv records/elastomer_mounts/stop_500.csv \
+          --machine z_elastomer_mounts.yaml --axes Z
+        feedsim identify mounts slow.uff fast.uff --machine stop.yaml --accelerometer Z=1:+Z \
+          --jerks "150 m/s^3,500 m/s^3"
+
+    Raises:
+        InputError: a faulty file, no stop in a log, a machine without a table of mounts, wrong arguments.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.identify_mounts("log.csv", "machines/test_centre", "Z")
+    Traceback (most recent call last):
+    feedsim.foundation.errors.InputError: Test centre: its mounts are springs; mounts are identified by a table of \
+them (key mounts of the machine file, written by machine build), whose friction and viscous part are the start
+    """
+    files = [Path(file) for file in ([logs] if isinstance(logs, str | Path) else logs)]
+    texts = settings(set)
+    subject = load_subject(machine, texts)
+    own = subject.machine
+    if axes is not None and axes not in own.axes:
+        raise InputError(f"{spelt('axes')} {axes}: {no_axis(axes, own.axes)}")
+    if signal is not None and signal not in SIGNALS:
+        raise InputError(f"{spelt('signal')} {signal}: {' or '.join(SIGNALS)}")
+    sensor = _accelerometer(accelerometer) if accelerometer is not None else None
+    each_jerk = _jerks(jerks, len(files), sensor is not None and subject.scenario is not None)
+    mapping = load_columns(columns) if columns is not None else None
+    start_factors(own)
+    asked = {"axes": axes, "signal": signal, "accelerometer": accelerometer, "jerks": _text(jerks) or None}
+    chosen = {name: str(value) for name, value in asked.items() if value is not None}
+    inputs = [*files, *([Path(columns)] if columns is not None else []), *(file for _, file in subject.files)]
+    asked_for = [*texts, *(f"{name}={text}" for name, text in chosen.items())]
+    with kept(out, MountsResult.check_place, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
+        watch.progress("reading", 0, 1)
+        stops, notes = [], list[str]()
+        for file, jerk in zip(files, each_jerk, strict=True):
+            log, said = read_stops(
+                read_recording(file), subject, axes, mapping, prefer=signal or "", accelerometer=sensor, jerk=jerk
+            )
+            stops.append(log)
+            notes += said
+        announce(watch, own, None if fmus is None else Path(fmus))
+        seen = own if sensor is None else with_accelerometer(own, Path(folder))
+        mounts = identified(seen, stops, None if fmus is None else Path(fmus), watch.progress)
+        findings = [*dict.fromkeys(notes), *damped_twice(own)]
+        result = MountsResult(page.MountsReport(mounts, files, subject, chosen, findings))
+        if out is not None:
+            result.save(out, figures=figures, force=force)
+    return result
+
+
+def _accelerometer(text: str) -> Accelerometer:
+    direction, equals, column = text.partition("=")
+    if not equals or direction.strip() not in ("X", "Y", "Z") or not column.strip():
+        raise InputError(
+            f"{spelt('accelerometer')} {text}: DIRECTION=NAME or DIRECTION=NAME:UNIT is needed, such as Z=a:m/s^2"
+        )
+    name, colon, unit = column.strip().rpartition(":")
+    if colon and not unit.startswith(("+", "-")):  # the direction of a name in a universal file, 1:+Z
+        return Accelerometer(direction.strip(), Channel.of(name, spelt("accelerometer")).names[0], unit.strip())
+    return Accelerometer(direction.strip(), column.strip())
+
+
+def _text(jerks: str | Sequence[Value]) -> str:
+    return jerks if isinstance(jerks, str) else ",".join(map(str, jerks))
+
+
+def _jerks(jerks: str | Sequence[Value], logs: int, used: bool) -> list[float | None]:
+    values = [part.strip() for part in jerks.split(",") if part.strip()] if isinstance(jerks, str) else list(jerks)
+    if not values:
+        return [None] * logs
+    if not used:
+        raise InputError(
+            f"{spelt('jerks')} {_text(jerks)}: are those of a scenario, for logs of an accelerometer; here the logs "
+            "have their setpoints"
+        )
+    if len(values) != logs:
+        raise InputError(f"{spelt('jerks')} {_text(jerks)}: {len(values)} values for {logs} logs; one a log is needed")
+    with given("jerks", _text(jerks)):
+        return [amount(value, "m/s^3", "150 m/s^3", positive=True) for value in values]

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from typing import Annotated
 
-from feedsim.analysis import Figure, Named
-from feedsim.estimation.identify import Estimate
+from feedsim.analysis import Named
 from feedsim.estimation.modal.measured import Channel
-from feedsim.estimation.replay.mounts import Accelerometer, FoundMounts, read_stops, start_factors, with_accelerometer
+from feedsim.estimation.replay.mounts import Accelerometer, read_stops, start_factors, with_accelerometer
 from feedsim.estimation.replay.mounts import identify_mounts as identified
 from feedsim.files.columns import load_columns
 from feedsim.files.fields import no_axis
@@ -32,79 +31,31 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.result import Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report import mounts as page
-from feedsim.report.content import Report
-from feedsim.report.results import Content
 from feedsim.scenario import load_subject
 from feedsim.simulation.judge import mounts as damped_twice
 
 SIGNALS = ("position", "speed")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class MountsResult(Result):
-    """Levelling mounts, identified.
+KIND = Kind("identify-mounts", page.FILES, keeps=page.KEPT_FILES)
 
-    identified: what was found, and what it rests on.
-    """
 
-    identified: page.MountsReport
-
-    kind = page.KIND
-    may_write = page.FILES
-
-    @property
-    def mounts(self) -> FoundMounts:
-        """Verdict, factors with intervals, and every ring-down."""
-        return self.identified.mounts
-
-    @property
-    def estimates(self) -> Mapping[str, Estimate]:
-        """K_e, F_max, x_2, K_v and c as factors on the table of mounts: value, interval, status."""
-        return self.mounts.estimates
-
-    @property
-    def keeps(self) -> Sequence[str]:
-        """The group `mounts` and the table that it names: machine files name it."""
-        return page.KEPT_FILES
-
-    @property
-    def inputs(self) -> Sequence[Path]:
-        """The logs, and the files of the machine."""
-        return [*self.identified.files, *(file for _, file in self.identified.subject.files)]
-
-    @property
-    def figures(self) -> Mapping[str, Figure]:
-        """ "K_e", "F_max", "x_2", "K_v", "c"; "stop_1.frequency_first", "stop_1.damping_last", ..."""
-        return Named(self.identified.figures)
-
-    @property
-    def findings(self) -> Sequence[str]:
-        """What is to be known before the values are believed."""
-        return self.identified.warnings
-
-    @property
-    def answers(self) -> Sequence[str]:
-        """Whether the mounts are linear, and what they are."""
-        return page.answers(self.identified)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The answers, and the table of all values with their intervals."""
-        return page.summary_lines(self.identified)
-
-    def report(self) -> Report:
-        """Content of report.html."""
-        return page.report_of(self.identified)
-
-    def files(self) -> Mapping[str, Content]:
-        """mounts.yaml and its table, and what the figures show as CSV."""
-        return page.files_of(self.identified)
-
-    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
-        """Content of summary.json."""
-        return page.summary(self.identified, names)
+def result_of(identified: page.MountsReport) -> Result[page.MountsReport]:
+    """Levelling mounts, identified: whether they are linear, and what they are."""
+    return Result(
+        KIND,
+        identified,
+        partial(page.report_of, identified),
+        figures=Named(identified.figures).with_intervals(
+            {name: (100 * one.interval[0], 100 * one.interval[1]) for name, one in identified.estimates.items()}
+        ),
+        details=partial(page.details, identified),
+        files=partial(page.files_of, identified),
+        inputs=[*identified.files, *(file for _, file in identified.subject.files)],
+        rows=partial(page.rows, identified),
+    )
 
 
 @job("levelling mounts from the ring-downs of stops")
@@ -148,7 +99,7 @@ def identify_mounts(
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> MountsResult:
+) -> Result[page.MountsReport]:
     """Identify levelling mounts whose stiffness and damping depend on the amplitude, from the ring-downs of stops.
 
     Needs stops at two or more jerks, or one long decay. Leaves mounts.yaml, which machine files and scenarios take as
@@ -188,7 +139,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
     chosen = {name: str(value) for name, value in asked.items() if value is not None}
     inputs = [*files, *([Path(columns)] if columns is not None else []), *(file for _, file in subject.files)]
     asked_for = [*texts, *(f"{name}={text}" for name, text in chosen.items())]
-    with kept(out, MountsResult.check_place, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
+    with kept(out, KIND, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
         watch.progress("reading", 0, 1)
         stops, notes = [], list[str]()
         for file, jerk in zip(files, each_jerk, strict=True):
@@ -201,7 +152,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
         seen = own if sensor is None else with_accelerometer(own, Path(folder))
         mounts = identified(seen, stops, None if fmus is None else Path(fmus), watch.progress)
         findings = [*dict.fromkeys(notes), *damped_twice(own)]
-        result = MountsResult(page.MountsReport(mounts, files, subject, chosen, findings))
+        result = result_of(page.MountsReport(mounts, files, subject, chosen, findings))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result

@@ -32,7 +32,7 @@ from feedsim.report.content import (
     tile_value,
 )
 from feedsim.report.formatting import OTHERWISE, RECORDED, SIMULATED, minus, remarked, scale, typeset
-from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, quantity, software
+from feedsim.report.provenance import finite, hashed, inputs_part, quantity
 from feedsim.report.results import Content
 from feedsim.scenario import Subject
 from feedsim.structure.modes import checked_modes
@@ -41,7 +41,6 @@ from feedsim.structure.mounts import MOUNTS_FILE, MountTable, read_mounts
 GROUP, SWINGS, RING_DOWNS = "mounts.yaml", "swings.csv", "ring_downs.csv"
 KEPT_FILES = (GROUP, MOUNTS_FILE)
 FILES = (*KEPT_FILES, SWINGS, RING_DOWNS)  # besides report.html and summary.json
-KIND = "identify-mounts"
 UNITS = {"K_e": ("N/um", 1e-6), "F_max": ("N", 1.0), "x_2": ("um", 1e6), "K_v": ("N/um", 1e-6), "c": ("N.s/mm", 1e-3)}
 PLACES = {"K_e": 1, "F_max": 2, "x_2": 3, "K_v": 4, "c": 5}  # in a row of the table
 MODEL_ERROR = 2.0  # times the noise: what a simulation leaves of a ring-down beyond that is its own error
@@ -62,6 +61,11 @@ class MountsReport:
     subject: Subject
     settings: Mapping[str, str]
     read: Sequence[str]
+
+    @property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """K_e, F_max, x_2, K_v and c as factors on the table of mounts: value, interval, status."""
+        return self.mounts.estimates
 
     @property
     def table(self) -> MountTable:
@@ -311,13 +315,10 @@ def _files(report: MountsReport) -> list[tuple[str, Path]]:
     return [*(("log", file) for file in report.files), *report.subject.files]
 
 
-def summary(report: MountsReport, names: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json."""
+def details(report: MountsReport) -> dict[str, Any]:
+    """What summary.json has besides the figures."""
     mounts = report.mounts
     return {
-        "kind": KIND,
-        "answer": answers(report),
-        "findings": [str(text) for text in report.warnings],
         "settings": dict(report.settings),
         "machine": report.subject.machine.name,
         "verdict": mounts.verdict,
@@ -331,10 +332,7 @@ def summary(report: MountsReport, names: Sequence[str]) -> dict[str, Any]:
              "left": stop.remaining, "noise": stop.noise}
             for stop in mounts.ring_downs
         ],
-        "figures": figures_part(report.figures),
-        "software": software(),
         "inputs": inputs_part(hashed(_files(report))),
-        "files": list(names),
     }  # fmt: skip
 
 
@@ -370,14 +368,12 @@ def answers(report: MountsReport) -> list[str]:
     return parts
 
 
-def summary_lines(report: MountsReport) -> list[str]:
-    """For the terminal."""
-    lines = list(answers(report))
+def rows(report: MountsReport) -> list[str]:
+    """For the terminal: every value with its interval, as a table."""
     rows = [("", "mounts", "machine file", "identified", "95 % interval", "unit"), *_rows(report)]
     widths = [max(len(row[k]) for row in rows) for k in range(6)]
-    lines += [
+    return [
         f"  {row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:>{widths[2]}}  {row[3]:>{widths[3]}}  "
         f"{row[4]:>{widths[4]}}  {row[5]}".rstrip()
         for row in rows
     ]
-    return lines

@@ -43,16 +43,18 @@ KIND = Kind("identify-mounts", page.FILES, keeps=page.KEPT_FILES)
 
 
 def result_of(identified: page.MountsReport) -> Result[page.MountsReport]:
-    """Levelling mounts: what was found, and what it rests on."""
+    """Levelling mounts, identified: whether they are linear, and what they are."""
     return Result(
         KIND,
         identified,
         partial(page.report_of, identified),
-        figures=Named(identified.figures),
+        figures=Named(identified.figures).with_intervals(
+            {name: (100 * one.interval[0], 100 * one.interval[1]) for name, one in identified.estimates.items()}
+        ),
         details=partial(page.details, identified),
         files=partial(page.files_of, identified),
         inputs=[*identified.files, *(file for _, file in identified.subject.files)],
-        lines=partial(page.summary_lines, identified),
+        rows=partial(page.rows, identified),
     )
 
 

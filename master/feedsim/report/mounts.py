@@ -368,14 +368,12 @@ def answers(report: MountsReport) -> list[str]:
     return parts
 
 
-def summary_lines(report: MountsReport) -> list[str]:
-    """For the terminal."""
-    lines = list(answers(report))
+def rows(report: MountsReport) -> list[str]:
+    """For the terminal: every value with its interval, as a table."""
     rows = [("", "mounts", "machine file", "identified", "95 % interval", "unit"), *_rows(report)]
     widths = [max(len(row[k]) for row in rows) for k in range(6)]
-    lines += [
+    return [
         f"  {row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:>{widths[2]}}  {row[3]:>{widths[3]}}  "
         f"{row[4]:>{widths[4]}}  {row[5]}".rstrip()
         for row in rows
     ]
-    return lines

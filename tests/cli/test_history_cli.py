@@ -154,6 +154,24 @@ def test_date_of_a_record_is_in_its_result(tmp_path: Path, fmus: Path) -> None:
     assert summary_of(tmp_path / "plain")["recorded"] is None
 
 
+def test_dated_circles_are_a_history(history: Command, tmp_path: Path) -> None:
+    """Recorded circles with time stamps: the squareness that grows from month to month, without a date being given."""
+    turn, random = np.linspace(0, 2 * np.pi, 1501), np.random.default_rng(2)
+    for month in range(1, 6):
+        x = 50 * np.cos(turn) + 4e-3 * month * np.sin(turn) + 1e-4 * random.normal(size=len(turn))
+        y = 50 * np.sin(turn) + 1e-4 * random.normal(size=len(turn))
+        rows = [
+            f"2026-0{month}-03 10:00:{0.02 * k:06.3f},{a:.6f},{b:.6f}"
+            for k, (a, b) in enumerate(zip(x, y, strict=True))
+        ]
+        (tmp_path / f"c{month}.csv").write_text("\n".join(["Zeit,X [mm],Y [mm]", *rows]), encoding="utf-8")
+        fs.circle(tmp_path / f"c{month}.csv", "X,Y", radius="50 mm", out=tmp_path / f"r{month}")
+        assert summary_of(tmp_path / f"r{month}")["recorded"] == f"2026-0{month}-03"
+    folders = [str(tmp_path / f"r{month}") for month in range(1, 6)]
+    result = fs.history(folders, quantities="XY.squareness_or_servo")
+    assert any("squareness_or_servo" in line and "a month" in line for line in result.answers), result.answers
+
+
 @pytest.mark.parametrize("dates", [2, 4])
 def test_figure_that_is_zero_at_all_dates(history: Command, tmp_path: Path, dates: int) -> None:
     """A peak that no circle has: it has not changed, and is written with the others."""

@@ -154,6 +154,29 @@ def test_date_of_a_record_is_in_its_result(tmp_path: Path, fmus: Path) -> None:
     assert summary_of(tmp_path / "plain")["recorded"] is None
 
 
+def test_temperature_of_a_record_is_no_wear(history: Command, tmp_path: Path, fmus: Path) -> None:
+    """Logs with a column of the temperature, warmer every month and warming up themselves: F_C falls with it."""
+    time, random = np.arange(0, 30, 0.01), np.random.default_rng(3)
+    speed = np.repeat(np.ravel([[n, -n] for n in np.geomspace(0.2, 60, 15)]), 100)
+    machine = ROOT / "scenarios/machines/test_centre"
+    for month in range(1, 8):
+        warm = 20 + 1.5 * month + random.normal() + 3 * time / time[-1]
+        friction = 1.6 * (1 - 0.01 * (warm - 22))
+        torque = np.sign(speed) * friction + 0.006 * speed + 0.01 * random.normal(size=len(time))
+        rows = np.column_stack([time, speed, torque, warm])
+        head = "time [s],Z.n_a [rad/s],Z.M_a [N.m],motor [degC]"
+        np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=head, comments="", fmt="%.6f")
+        place = tmp_path / f"2026-0{month}"
+        fs.identify_friction(tmp_path / "log.csv", "Z", machine, stages=1, fmus=fmus, out=place)
+        assert summary_of(place)["temperature"]["value"] == pytest.approx(np.mean(warm), abs=1e-3)
+    folders = [f"{tmp_path / f'2026-0{month}'}@2026-0{month}-10" for month in range(1, 8)]
+    result = fs.history(folders, quantities="Z.F_C")
+    (one,) = result.value.changes
+    assert not one.changed
+    slope, half = (part / np.std(one.series.covariates["temperature [degC]"]) for part in one.model.coefficient(1))
+    assert abs(slope + 0.016) < half < 0.008
+
+
 def test_dated_circles_are_a_history(history: Command, tmp_path: Path) -> None:
     """Recorded circles with time stamps: the squareness that grows from month to month, without a date being given."""
     turn, random = np.linspace(0, 2 * np.pi, 1501), np.random.default_rng(2)

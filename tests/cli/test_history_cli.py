@@ -154,6 +154,47 @@ def test_date_of_a_record_is_in_its_result(tmp_path: Path, fmus: Path) -> None:
     assert summary_of(tmp_path / "plain")["recorded"] is None
 
 
+def test_temperature_of_a_record_is_no_wear(history: Command, tmp_path: Path, fmus: Path) -> None:
+    """Logs with a column of the temperature, warmer every month and warming up themselves: F_C falls with it."""
+    time, random = np.arange(0, 30, 0.01), np.random.default_rng(3)
+    speed = np.repeat(np.ravel([[n, -n] for n in np.geomspace(0.2, 60, 15)]), 100)
+    machine = ROOT / "scenarios/machines/test_centre"
+    for month in range(1, 8):
+        warm = 20 + 1.5 * month + random.normal() + 3 * time / time[-1]
+        friction = 1.6 * (1 - 0.01 * (warm - 22))
+        torque = np.sign(speed) * friction + 0.006 * speed + 0.01 * random.normal(size=len(time))
+        rows = np.column_stack([time, speed, torque, warm])
+        head = "time [s],Z.n_a [rad/s],Z.M_a [N.m],motor [degC]"
+        np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=head, comments="", fmt="%.6f")
+        place = tmp_path / f"2026-0{month}"
+        fs.identify_friction(tmp_path / "log.csv", "Z", machine, stages=1, fmus=fmus, out=place)
+        assert summary_of(place)["temperature"]["value"] == pytest.approx(np.mean(warm), abs=1e-3)
+    folders = [f"{tmp_path / f'2026-0{month}'}@2026-0{month}-10" for month in range(1, 8)]
+    result = fs.history(folders, quantities="Z.F_C")
+    (one,) = result.value.changes
+    assert not one.changed
+    slope, half = (part / np.std(one.series.covariates["temperature [degC]"]) for part in one.model.coefficient(1))
+    assert abs(slope + 0.016) < half < 0.008
+
+
+def test_dated_circles_are_a_history(history: Command, tmp_path: Path) -> None:
+    """Recorded circles with time stamps: the squareness that grows from month to month, without a date being given."""
+    turn, random = np.linspace(0, 2 * np.pi, 1501), np.random.default_rng(2)
+    for month in range(1, 6):
+        x = 50 * np.cos(turn) + 4e-3 * month * np.sin(turn) + 1e-4 * random.normal(size=len(turn))
+        y = 50 * np.sin(turn) + 1e-4 * random.normal(size=len(turn))
+        rows = [
+            f"2026-0{month}-03 10:00:{0.02 * k:06.3f},{a:.6f},{b:.6f}"
+            for k, (a, b) in enumerate(zip(x, y, strict=True))
+        ]
+        (tmp_path / f"c{month}.csv").write_text("\n".join(["Zeit,X [mm],Y [mm]", *rows]), encoding="utf-8")
+        fs.circle(tmp_path / f"c{month}.csv", "X,Y", radius="50 mm", out=tmp_path / f"r{month}")
+        assert summary_of(tmp_path / f"r{month}")["recorded"] == f"2026-0{month}-03"
+    folders = [str(tmp_path / f"r{month}") for month in range(1, 6)]
+    result = fs.history(folders, quantities="XY.squareness_or_servo")
+    assert any("squareness_or_servo" in line and "a month" in line for line in result.answers), result.answers
+
+
 @pytest.mark.parametrize("dates", [2, 4])
 def test_figure_that_is_zero_at_all_dates(history: Command, tmp_path: Path, dates: int) -> None:
     """A peak that no circle has: it has not changed, and is written with the others."""

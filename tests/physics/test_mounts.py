@@ -41,13 +41,15 @@ STOP = "[{kind: move, by: {Z: 100 mm}, feed: 5000 mm/min}, {kind: dwell, duratio
 CIRCLE = "[{kind: circle, plane: [X, Z], radius: 15 mm, feed: 3000 mm/min, turns: 1}, {kind: dwell, duration: 0.1 s}]"
 
 
-def machine_with(folder: Path, mounts: str, *, damping: str = "ratio: 2 %", cutoff: str = "1000 Hz") -> Path:
+def machine_with(
+    folder: Path, mounts: str, *, damping: str = "ratio: 2 %", cutoff: str = "1000 Hz", springs: str = SPRINGS
+) -> Path:
     """The default machine with other mounts, built anew; its folder."""
     place = shutil.copytree(DEFAULT, folder / "machine")
     text = (place / "structure.yaml").read_text(encoding="utf-8").replace(LOW_DAMPING, "")
     text = text.replace("ratio: 2 %\n", f"{damping}\n").replace("cutoff: 1000 Hz", f"cutoff: {cutoff}")
     assert SPRINGS in text
-    (place / "structure.yaml").write_text(text.replace(SPRINGS, SPRINGS + mounts), encoding="utf-8")
+    (place / "structure.yaml").write_text(text.replace(SPRINGS, springs + mounts), encoding="utf-8")
     built = feedsim.machine_build(place / "structure.yaml", at={"X": "800 mm", "Y": "327 mm", "Z": "100 mm"})
     built.save(folder / "built")
     for name in ("modes.csv", "mounts.csv"):
@@ -104,6 +106,23 @@ def test_mounts_that_are_springs_leave_the_bits(tmp_path: Path, fmus: Path) -> N
     first, second = run(springs, fmus, STOP), run(off, fmus, STOP)
     for name in first.trace:
         assert np.array_equal(first.trace[name], second.trace[name]), name
+
+
+def test_a_stop_says_what_its_mounts_make(rubber: Path, fmus: Path, tmp_path: Path) -> None:
+    """Against the structure built anew on mounts a thousand times as stiff."""
+    file = rubber.parent / "stop.yaml"
+    file.write_text(
+        f"name: stop\nmachine: machine\nmotions: {STOP}\nevaluate: [{{kind: positioning, axis: Z, band: 1 um}}]\n",
+        encoding="utf-8",
+    )
+    figures = feedsim.run(file, fmus=fmus).figures
+    stiff = machine_with(tmp_path, "", springs=SPRINGS.replace("45", "45000").replace("65", "65000"))
+    clamped = feedsim.run(file, fmus=fmus, set={"machine.modes": stiff / "modes.csv", "machine.mounts": None,
+                                                "machine.structure": None}).figures  # fmt: skip
+    assert "Z.settling_of_mounts" not in clamped
+    held = figures["Z.settling_time"].value - figures["Z.settling_of_mounts"].value
+    assert held == pytest.approx(clamped["Z.settling_time"].value, abs=3)
+    assert figures["Z.settling_of_mounts"].value > 10
 
 
 def test_factors_reach_the_plant(rubber: Path, fmus: Path) -> None:

@@ -47,6 +47,7 @@ FORM = "YYYY-MM-DD or YYYY-MM-DDThh:mm"
 COMPENSATIONS = ("friction_pulse", "friction_table")  # groups of a drive that compensate friction
 LIST_COLUMNS = ("result", "date", "machine", "kind", "law", "quantity", "value", "unit", "sigma", "status")
 EXAMPLE = "results/z_march@2026-03-01"
+TEMPERATURE = "temperature [degC]"  # condition that results have by themselves
 
 
 KIND = Kind("history", page.FILES, keeps=(page.FLEET,))
@@ -211,6 +212,8 @@ def _of_result(
         kind = str(content["kind"])
         values = dict(_values_of(kind, content))
         recorded = content.get("recorded")
+        warm = (content.get("temperature") or {}).get("value")
+        known = {TEMPERATURE: float(warm)} if warm is not None else {}
         own = (content.get("machine") or {}).get("name", "") if isinstance(content.get("machine"), dict) else ""
         law = content.get("settings", {}).get("law", Friction.law) if kind == "identify" else ""
     except (KeyError, TypeError, AttributeError, ValueError, OverflowError):
@@ -222,7 +225,15 @@ def _of_result(
         moment = _moment(str(recorded), str(file))
     folder = file.absolute().parent
     return Entry(
-        name, file, kind, moment, machine or own, machine or folder.parent.name, law, values, dict(conditions or {})
+        name,
+        file,
+        kind,
+        moment,
+        machine or own,
+        machine or folder.parent.name,
+        law,
+        values,
+        known | dict(conditions or {}),
     )
 
 

@@ -354,6 +354,7 @@ def details(
     prefix = axis_letters(circle.axes)
     return {
         "format": FORMAT,
+        "recorded": recorded.day or None,
         "diagnosis": {prefix: diagnosis_part(diagnosis)},
         "circle": {
             "axes": list(circle.axes),

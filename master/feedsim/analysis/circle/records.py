@@ -179,13 +179,15 @@ class RecordedTurn:
 @dataclass(frozen=True, eq=False)
 class RecordedCircle:
     """Turns of one circle. centred: its centre was not known and is fitted. notes: how the files were read. doubts:
-    what is the matter with them."""
+    what is the matter with them. day: on which the first of the files was recorded, ISO 8601; "" where none has a date.
+    """
 
     circle: CircleUnderTest
     turns: tuple[RecordedTurn, ...]
     centred: bool
     notes: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    day: str = ""
 
 
 def read_circle(
@@ -209,9 +211,11 @@ def read_circle(
     turns: list[RecordedTurn] = []
     timed: list[tuple[Path, RecordedTurn, float]] = []
     radii: list[float] = []
+    days: list[str] = []
     headers = Told(radius, feed)
     for file in files:
         recording = mapped(read_recording(file), mappings)
+        days += filter(None, [recording.day])
         headers.add(file, recording.remarks)
         radius = headers.radius
         both = _beside_each_other(recording)
@@ -246,7 +250,7 @@ def read_circle(
         doubts += unusual_radius(nominal) or (unusual_feed(own) if own is not None and feed is None else [])
         notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
     circle = CircleUnderTest(axes, nominal, speed, pitch or {}, recorded=True)
-    return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes), tuple(doubts))
+    return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes), tuple(doubts), min(days, default=""))
 
 
 def _one_feed(timed: Sequence[tuple[Path, RecordedTurn, float]], radius: float) -> None:

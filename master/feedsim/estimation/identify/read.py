@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import pi
+from math import nan, pi
 from pathlib import Path
 
 import numpy as np
@@ -293,6 +293,7 @@ def _share(torque: Array, speed: Array) -> float:
     return float(np.dot(torque, speed)) / size if size > 0 else 0.0
 
 
+ZERO_CELSIUS = {"degC": 0.0, "°C": 0.0, "K": 273.15}  # by unit of a temperature
 # Values given twice are the same up to the rounding of what people write.
 TYPED_TOLERANCE = 1e-9
 # Share of the residual that may be left for a column to be advised as a load: less than that is chance.
@@ -320,6 +321,7 @@ class Provenance:
             taken out of the records.
         warnings: what a user should know.
         day: on which it was recorded, ISO 8601; "" where the file has no date.
+        temperature: mean of its one column in degC or K [degC]; nan where there is none, or several.
     """
 
     file: Path
@@ -335,6 +337,7 @@ class Provenance:
     torque_delay: float | None = None
     warnings: tuple[str, ...] = ()
     day: str = ""
+    temperature: float = nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,7 +414,8 @@ def read_records(
         signs = checked(path, records, chosen.axis)
         unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
     warnings = (*recording.notes, *chosen.notes, *unread, *drive.warnings, *gaps, *signs)
-    return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings, recording.day))
+    source = _provenance(path, mapping, chosen, columns, drive, warnings, recording.day)
+    return Recorded(records, replace(source, temperature=_temperature(recording)))
 
 
 def read_traces(
@@ -588,6 +592,22 @@ def _provenance(
         warnings=warnings,
         day=day,
     )
+
+
+def _temperature(recording: Recording) -> float:
+    names = [name for name in recording.names if recording.units[name] in ZERO_CELSIUS]
+    if len(names) != 1:
+        return nan
+    try:
+        values = recording.read(names)[names[0]]
+    except InputError:  # no reason to refuse the record
+        return nan
+    return float(np.mean(values)) - ZERO_CELSIUS[recording.units[names[0]]]
+
+
+def recording_temperature(sources: Sequence[Provenance]) -> float:
+    """Mean temperature [degC] of the files; nan where one of them has none."""
+    return float(np.mean([source.temperature for source in sources]))
 
 
 def recording_day(sources: Sequence[Provenance]) -> str | None:

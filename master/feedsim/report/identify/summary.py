@@ -13,7 +13,7 @@ import numpy as np
 
 from feedsim.estimation.identify import Identified, friction_file
 from feedsim.estimation.identify.friction_file import FRICTION_FILE
-from feedsim.estimation.identify.read import recording_day
+from feedsim.estimation.identify.read import recording_day, recording_temperature
 from feedsim.estimation.identify.result import Balance, Estimate, Identification
 from feedsim.files.trace.files import quoted, shortest
 from feedsim.report.formatting import Array, counted
@@ -34,6 +34,7 @@ def details(identified: Identified) -> dict[str, Any]:
         "axis": identification.axis,
         "date": identified.date,
         "recorded": recording_day(identified.sources),
+        "temperature": quantity(recording_temperature(identified.sources), "degC"),
         "lead": quantity(identification.I_P, "m/rad"),
         "parameters": {
             name: _estimate(estimate, identification.I_P) for name, estimate in identification.estimates.items()

@@ -10,7 +10,7 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.estimation.identify import AxisLimits, Provenance
 from feedsim.estimation.identify.friction_file import interval_text, value_text
-from feedsim.estimation.identify.read import recording_day
+from feedsim.estimation.identify.read import recording_day, recording_temperature
 from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.compare import Comparison
@@ -41,7 +41,7 @@ from feedsim.report.content import (
     tile_value,
 )
 from feedsim.report.formatting import display_unit, minus, powers, remarked, three, typeset
-from feedsim.report.provenance import finite, hashed, inputs_part
+from feedsim.report.provenance import finite, hashed, inputs_part, quantity
 from feedsim.report.replay.report import pictures_of
 from feedsim.scenario import Drive, Friction, Machine, Subject
 from feedsim.scenario.axis_units import ParameterGroup
@@ -436,6 +436,7 @@ def details(report: DriveReport) -> dict[str, Any]:
     """What summary.json has besides the figures."""
     return {
         "recorded": recording_day(report.sources),
+        "temperature": quantity(recording_temperature(report.sources), "degC"),
         "settings": dict(report.settings),
         "axes": {
             axis: {

@@ -93,7 +93,7 @@ COMMANDS = {
     "import": ("`import feedsim`", ["-c", "import feedsim"]),
     "version": ("`feedsim --version`", [*FEEDSIM, "--version"]),
     "help": ("`feedsim --help`", [*FEEDSIM, "--help"]),
-    "validate": ("`feedsim check scenarios/xz_circle.yaml`", [*FEEDSIM, "validate", str(CIRCLE)]),
+    "validate": ("`feedsim check scenarios/xz_circle.yaml`", [*FEEDSIM, "check", str(CIRCLE)]),
     "run": ("`feedsim run scenarios/xz_circle.yaml`", [*FEEDSIM, "run", str(CIRCLE), "--quiet", "--out"]),
     "drawn": (
         "the same with `--figures png,svg`",

@@ -133,7 +133,7 @@ def main() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead of numpy
     from feedsim import analysis, scenario
     from feedsim.cli import main as command
-    from feedsim.report import run as report
+    from feedsim.jobs.result import Result
     from feedsim.report.page import Partial
     from feedsim.simulation import cosim, nc
     from feedsim.simulation.cosim.system import System
@@ -143,7 +143,7 @@ def main() -> int:
     for home, name, part in (
         (scenario, "load", "read"), (nc, "plan", "plan"), (System, "__init__", "open"),
         (System, "initialise", "initialise"), (of_runs, "pose_use", "pose"), (Partial, "__call__", "rows"),
-        (analysis, "evaluate", "evaluate"), (report, "write", "report"), (builtins, "__import__", "libraries"),
+        (analysis, "evaluate", "evaluate"), (Result, "save", "report"), (builtins, "__import__", "libraries"),
     ):  # fmt: skip
         setattr(home, name, clock.timed(part, getattr(home, name)))
     simulate = clock.timed("trace", cosim.run)

@@ -299,7 +299,8 @@ def test_a_study_goes_on(fault: str, place: Callable[[str], Path], fmus: Path) -
 # A process that executes another maker's unit itself: FMPy's logger is then that unit's for all others, too.
 HERE = """
 import pickle, sys
-from feedsim import cosim, scenario
+from feedsim import scenario
+from feedsim.simulation import cosim
 from feedsim.simulation.cosim import worker
 from feedsim.simulation.judge import judged
 worker.AVAILABLE = False

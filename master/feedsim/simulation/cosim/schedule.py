@@ -215,7 +215,7 @@ REPORTED_EVERY = 2048
 # The same in a process that is watched: at first, and in the end; an eighth of what has been done between.
 WATCHED = 16, 512
 # Rows that are held at the least of what is long.
-RING = 1024
+RING = 4096
 
 
 class Buffered(Protocol):

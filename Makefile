@@ -266,7 +266,7 @@ pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full
 identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320 logs of known axes, good and flawed (half an hour; docs/trust.md)
 	$(PY) benchmarks/identification_study.py
 
-drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of eleven (half an hour of one core; docs/trust.md)
+drive-study: fmus $(VENV)/.run ## whether intervals of drives hold the truth, by kind of log: 20 logs of each of twenty (an hour of one core; docs/trust.md)
 	$(PY) benchmarks/drive_study.py
 
 circle-study: fmus $(VENV)/.run ## whether causes come out of circles that no rule was set on (a minute; ARGS='--seed 7': others; docs/trust.md)

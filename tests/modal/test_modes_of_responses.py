@@ -5,15 +5,17 @@ from __future__ import annotations
 import csv
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 from scipy.signal import cont2discrete, lfilter
 
 from feedsim.cli import main
 from feedsim.estimation.modal.estimate import estimated, period_of
-from feedsim.estimation.modal.rational import fitted
+from feedsim.estimation.modal.rational import Fitted, Mode, fitted
 from feedsim.files.trace import Trace, write_csv
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.files.trace.response_files import write_response
@@ -68,6 +70,53 @@ def test_modes_and_their_number_come_back(modes: list[tuple[float, float, float,
     assert found.delay["motor"] == pytest.approx(4e-4, abs=5e-5)
     assert found.delay["scale"] == pytest.approx(8e-4, abs=5e-5)
     assert found.rigid["scale"] == pytest.approx(-50.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("further", "why"),
+    [
+        ((70.0, 2e-4, 0.009, 0.0), "it is 0.17 Hz wide, and the lines there are 1 Hz apart"),
+        ((75.0, 0.05, 0.02, 0.0), "its ratio of inertias is 0.011, by (f_r/f_a)^2 - 1 of dip and peak 0.82"),
+        ((30.0, 0.2, 0.009, 0.0), "it changes the response by 2.2 % at most"),
+    ],
+    ids=["narrow", "under another peak", "hidden"],
+)
+def test_modes_that_lines_do_not_show(further: tuple[float, float, float, float], why: str) -> None:
+    """Beside a mode of 62 Hz that they do show, and which stays without a word."""
+    frequency = np.arange(5.0, 220.0)
+    fit = fitted(frequency, closed_form(frequency, ONE), {name: np.zeros(215) for name in ("motor", "scale")}, 1)
+    assert fit.implausible(frequency) == []
+    assert len(fitted(frequency, {"motor": fit.response("motor", frequency)}, {"motor": np.zeros(215)}).modes) == 1
+    own = Mode(*further[:2], 0.0, 0.0, {"motor": 50 * further[2], "scale": 50 * further[3]})
+    two = replace(
+        fit, modes=tuple(sorted((*fit.modes, own), key=lambda mode: mode.frequency)), parameters=with_mode(own, fit)
+    )
+    ((mode, said),) = two.implausible(frequency)
+    assert mode is own
+    assert said.startswith(why)
+    assert two.without(own) == pytest.approx(fit.parameters)
+
+
+def with_mode(mode: Mode, fit: Fitted) -> Array:
+    """The parameters of a fit with one mode, and those of a second one."""
+    x = fit.parameters
+    poles = [*x[:3], np.log(2 * np.pi * mode.frequency), np.log(mode.damping)]
+    return np.array([*poles, *x[3:6], mode.residues["motor"], *x[6:9], mode.residues["scale"]])
+
+
+@pytest.mark.skipif("FEEDSIM_TWO_INERTIA" not in os.environ, reason="FEEDSIM_TWO_INERTIA names no record")
+def test_few_lines_of_a_measured_bench() -> None:
+    """Of 40 lines, some 5 Hz apart near 56 Hz, cross-validation takes a mode of half a hertz there besides."""
+    record = loadmat(os.environ["FEEDSIM_TWO_INERTIA"])
+    current, angle = (np.ravel(record[name]).astype(float) for name in ("iq_adx", "theta_mx"))
+    found = estimated([current], {"motor": [angle]}, 1 / 2500, period=2500)
+    rows = np.unique(np.searchsorted(found.frequency, np.geomspace(11.0, 249.0, 40)))
+    frequency = found.frequency[rows]
+    values = {"motor": found.values["motor"][rows] * (2j * np.pi * frequency) ** 2}
+    fit = fitted(frequency, values, {"motor": found.relative["motor"][rows]})
+    assert [mode.frequency for mode in fit.modes] == pytest.approx([76.3], abs=0.5)
+    assert fit.modes[0].residues["motor"] / fit.rigid["motor"] == pytest.approx(1.0, abs=0.03)
+    assert all("left out: it is" in each for each in fit.refused)
 
 
 def bench(count: int, periodic: bool, seed: int) -> tuple[Array, Array]:

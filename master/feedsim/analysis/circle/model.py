@@ -108,12 +108,14 @@ class Fit:
         unsure: what a term may be off by as the loops' response is not known better [m].
         offset: of the written angles; None where they are those of the machine's own scales. whole: no path is an arc.
         tails: of every path, the columns of which ``tail`` is the sum (N, T).
+        moved: of recorded turns, what the terms would change by if another window were left out (K,) [m]; else 0.
     """
 
     names: tuple[str, ...]
     values: Array
     covariance: Array
     quantile: float
+    moved: Array
     angle: tuple[Array, ...]
     residual: tuple[Array, ...]
     reversal: tuple[NDArray[np.int64], ...]
@@ -151,7 +153,7 @@ class Fit:
         along = part / length if length > 0 else np.full(len(rows), 1 / math.sqrt(len(rows)))
         own = self.quantile * math.sqrt(max(float(along @ self.covariance[np.ix_(rows, rows)] @ along), 0.0))
         besides = self.hidden if "squareness" in names else self.wound.get(names[0], 0.0)
-        half = math.hypot(own, self.unsure, besides)
+        half = math.hypot(own, self.unsure, besides, float(np.linalg.norm(along * self.moved[rows])))
         # Noise alone makes an amplitude: it is one if both parts together differ from zero.
         zero = len(rows) == 2 and length < pair_quantile(self.free) * half / self.quantile
         return max(half, length) if zero else half
@@ -262,7 +264,12 @@ def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape
         result = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(degrees)), shape)
         if _calm(result):
             break
-    return result
+    if not (circle.recorded and result.whole):
+        return result
+    # Nobody knows how the peaks of a recorded machine die away.
+    beside = ANGLES_BEHIND[2 if degrees == ANGLES_BEHIND[1] else 1]
+    other = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(beside)), shape)
+    return replace(result, moved=result.values - other.values)
 
 
 def separating_radius(circle: CircleUnderTest, axes: Sequence[str]) -> float:
@@ -350,6 +357,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         values=np.array([values[name] for name in names]),
         covariance=unit[:, None] * covariance[: len(names), : len(names)] * unit,
         quantile=student(count),
+        moved=np.zeros(len(names)),
         free=count,
         angle=tuple(entry.angle for entry in undone),
         residual=tuple(np.split(residual, ends)),

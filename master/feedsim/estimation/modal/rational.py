@@ -14,8 +14,8 @@ away most; their number is that which predicts lines best that the fit has not s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import nan, pi, sqrt
+from dataclasses import dataclass, replace
+from math import log, nan, pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,12 @@ TRIAL_FREQUENCIES = 80  # frequencies at which a further mode is tried
 TRIED_DAMPING = (0.01, 0.04)
 LOW_D, HIGH_D = 1e-4, 0.7
 MAX_DELAY = 5e-3  # [s] of a delay
+# Share of a mode's frequency within which its peak is: friction alone makes one at low frequencies.
+PEAK_DISTANCE = 0.25
+EXTREME_POINTS = 20000  # of a response whose dips and peaks are looked for
+# A residue may differ from dip and peak by this factor: other modes and damping move them. What changes a response by
+# less than this share, and has neither, is what a linear model of an axis lacks.
+RATIO_FACTOR, LEAST_EFFECT = 3.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,7 @@ class Fitted:
         modes: by frequency. parameters: (P,) of the model.
         predicted: number of modes -> rms of the residual, in its standard deviations, of lines that a fit had not seen.
         rigid_sigma: output -> standard deviation of a_c.
+        refused: sentences on modes that cross-validation took and the lines do not show.
     """
 
     outputs: tuple[str, ...]
@@ -72,6 +79,47 @@ class Fitted:
     modes: tuple[Mode, ...]
     parameters: Array
     predicted: Mapping[int, float]
+    refused: tuple[str, ...] = ()
+
+    def without(self, mode: Mode) -> Array:
+        """(P',) the parameters less those of a mode."""
+        shape = _Shape(len(self.outputs), len(self.modes))
+        k = int(np.argmin(np.abs(np.exp(self.parameters[1 : 1 + 2 * shape.modes : 2]) / (2 * pi) - mode.frequency)))
+        own = [shape.of_output(self.parameters, c) for c in range(shape.outputs)]
+        poles = np.delete(self.parameters[: 1 + 2 * shape.modes], [1 + 2 * k, 2 + 2 * k])
+        return np.concatenate([poles, *(np.delete(values, 2 + k) for values in own)])
+
+    def implausible(self, frequency: Array) -> list[tuple[Mode, str]]:
+        """Modes that lines at `frequency` (N,) [Hz] do not show, and why; the least one first.
+
+        A mode is seen where lines lie within its half-power width or between its dip and its peak. Between those two it
+        has r = (f_r/f_a)^2 - 1, with light damping its residue over that of all that is softer. Dip and peak that say
+        something else are those of another mode, or of a damping that makes up for what is no mode.
+        """
+        motor, softer = self.outputs[0], self.rigid[self.outputs[0]]
+        fine = np.geomspace(float(frequency[0]), float(frequency[-1]), EXTREME_POINTS)
+        height = np.log(np.abs(self.response(motor, fine)))
+        peaks, dips = extremes(fine, height), extremes(fine, -height)
+        result: list[tuple[float, Mode, str]] = []
+        for mode in self.modes:
+            f, share = mode.frequency, mode.residues[motor] / softer
+            softer += mode.residues[motor]
+            at = min(max(int(np.searchsorted(frequency, f)), 1), len(frequency) - 1)
+            apart = float(frequency[at] - frequency[at - 1])
+            width = max(2 * mode.damping * f, f - f / sqrt(1 + max(share, 0.0)))
+            own = [peak for peak in peaks if abs(peak / f - 1) < PEAK_DISTANCE]
+            pairs = [(peak / dip) ** 2 - 1 for peak in own for dip in dips if dip < peak]
+            why = ""
+            if width < apart:
+                why = f"it is {width:.2g} Hz wide, and the lines there are {apart:.2g} Hz apart"
+            elif pairs and not any(share / RATIO_FACTOR < pair < share * RATIO_FACTOR for pair in pairs):
+                near = min(pairs, key=lambda pair: abs(log(pair / max(share, 1e-9))))
+                why = f"its ratio of inertias is {share:.2g}, by (f_r/f_a)^2 - 1 of dip and peak {near:.2g}"
+            elif not pairs and share < 2 * mode.damping * LEAST_EFFECT:
+                why = f"it changes the response by {50 * share / mode.damping:.2g} % at most"
+            if why:
+                result.append((share, mode, why))
+        return [(mode, why) for _, mode, why in sorted(result, key=lambda entry: entry[0])]
 
     def response(self, output: str, frequency: Array) -> Complexes:
         """(N,) acceleration over the input."""
@@ -81,7 +129,7 @@ class Fitted:
 
     def dips(self, output: str, low: float, high: float) -> list[float]:
         """Antiresonances [Hz]: least magnitudes between two frequencies."""
-        frequency = np.geomspace(low, high, 20000)
+        frequency = np.geomspace(low, high, EXTREME_POINTS)
         return extremes(frequency, -np.log(np.abs(self.response(output, frequency))))
 
 
@@ -191,7 +239,15 @@ def fitted(
     else:
         count = len(chain) - 1
     ended = problem.solved(_Shape(len(names), count), chain[count], every, FINAL)
-    return _of(names, problem, ended, count, predicted)
+    fit, refused = _of(names, problem, ended, count, predicted), []
+    while modes is None and (said := fit.implausible(frequency)):
+        mode, why = said[0]
+        refused.append(f"a mode of {mode.frequency:.4g} Hz is left out: {why}")
+        rest = tuple(other for other in fit.modes if other is not mode)
+        begin = fit.without(mode)
+        ended = problem.solved(_Shape(len(names), len(rest)), begin, every, FINAL)
+        fit = _of(names, problem, ended, len(rest), predicted)
+    return replace(fit, refused=tuple(refused))
 
 
 @dataclass(frozen=True, eq=False)
@@ -374,8 +430,6 @@ def _powers(frequency: Array, at: float) -> Array:
 
 
 MOTOR, SCALE = "motor", "scale"
-# Share of a mode's frequency within which its peak is: friction alone makes one at low frequencies.
-PEAK_DISTANCE = 0.25
 OFF = 0.1  # share by which inertia and lead may differ from the machine's without a word
 MAX_DEVIATIONS = 3.0, 30.0  # dB and degrees that 90 % of the motor's lines have to be within
 HELD = 0.9  # share of the lines that a fit is judged by
@@ -443,7 +497,7 @@ def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: i
         )
     low, high = float(frequency[0]), float(frequency[-1])
     motor = measured.values[MOTOR]
-    fine = np.geomspace(low, high, 20000)
+    fine = np.geomspace(low, high, EXTREME_POINTS)
     model = np.log(np.abs(fit.response(MOTOR, fine)))
     dips = tuple((f, *least(frequency, motor, f)) for f in extremes(fine, -model))
     peaks = tuple(
@@ -491,7 +545,9 @@ def _within(logarithm: Complexes) -> tuple[float, float]:
 def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[list[str], list[str]]:
     """Warnings and notes: senses, units, delays."""
     warnings: list[str] = []
-    notes = list(measured.notes)
+    notes = list(measured.notes) + [f"axis {axis}: {why}" for why in fit.refused]
+    for mode, why in fit.implausible(measured.frequency):  # of a number that was given
+        warnings.append(f"axis {axis}: the mode of {mode.frequency:.4g} Hz is doubtful: {why}")
     if fit.rigid[MOTOR] < 0:
         notes.append(f"axis {axis}: the motor counts against its torque; its sign is turned")
     if SCALE in fit.rigid and fit.rigid[SCALE] * fit.rigid[MOTOR] < 0:

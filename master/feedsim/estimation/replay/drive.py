@@ -39,6 +39,7 @@ from feedsim.estimation.identify.result import Correlation, Estimate
 from feedsim.estimation.replay.closed_loop import AxisRecord, Begin, Replay
 from feedsim.estimation.replay.estimates import (
     beside_line,
+    beside_modes,
     contradicts_line,
     correlation_of,
     elastic_modes,
@@ -58,6 +59,7 @@ from feedsim.estimation.replay.tuning import (
     Tuned,
     first_weights,
     other_cycle,
+    possible_modes,
     with_rivals,
 )
 from feedsim.files.trace.trace import Array
@@ -330,6 +332,7 @@ def identify_drive(
     parts: dict[str, float] = {}
     may_be: Sequence[Tuned | Tried] = ()
     rivals: Sequence[Tried] = ()
+    elastic_rivals: Sequence[Tried] = ()
     chosen: tuple[str, ...] = ()
     if structure_known:
         own = {name for name, block in BLOCKS.items() if driven and _has(problem.start, block)}
@@ -350,6 +353,8 @@ def identify_drive(
             chosen, parts, found, undecided = friction_parts(problem, found, progress)
             found, further = with_rivals(problem, found, far=False)
             rivals = [*(one for one in rivals if one.taken), *further]
+        elastic_rivals = possible_modes(problem, found) if modes == 0 else []
+        rivals = [*rivals, *elastic_rivals]
         without = found
         may_be = [*undecided, *(one for one in rivals if not one.taken)]
     elastic: Mapping[int, float] = {}
@@ -372,7 +377,7 @@ def identify_drive(
         predicted = predicted[0], nan
     estimates = estimates_of(problem, found, unseen, delay, gain, structure_known)
     if may_be:
-        estimates = with_undecided(estimates, without, may_be)
+        estimates = beside_modes(with_undecided(estimates, without, may_be), elastic_rivals)
     if not structure_known:
         estimates = beside_line(each, problem.machine, estimates)
     if begin is not None and begin.one_way:

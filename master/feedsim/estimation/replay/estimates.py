@@ -27,9 +27,10 @@ from feedsim.estimation.least_squares import (
 )
 from feedsim.estimation.replay.closed_loop import AxisRecord
 from feedsim.estimation.replay.machine_files import KEYS, ElasticMode, modes_of
-from feedsim.estimation.replay.tuning import Problem, Tuned
+from feedsim.estimation.replay.tuning import Problem, Tried, Tuned
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
+from feedsim.foundation.arguments import spelt
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Machine
 
@@ -45,8 +46,10 @@ SHARED_LAG = "{} only the lag shows, T_dyn + T_sym + (1 - k_ffw)/K_v, and it may
 SHARING = ("T_sym", "k_ffw")
 LINE_SHARE = 0.02  # standard deviation of a line's inertia, and of its load over the friction, besides its own
 BESIDE_LINE = "{} is {:.4g} +- {:.2g} {} by the torque line of rigid motion, which needs no model of the drive"
-ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "filter_1.f", "J", "M_0", "F_C",
-         "F_S", "v_s", "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
+MODE_SHOWS = "the record speaks for an {}; give {} auto, which fits it"
+ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "filter_1.f", "filter_1.D_den", "J",
+         "M_0", "F_C", "F_S", "v_s", "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry",
+         "delay")  # fmt: skip
 
 
 class _Valued(Protocol):
@@ -232,6 +235,18 @@ def with_undecided(
         if moved > 0:
             wider[name] = replace(one, sigma=hypot(one.sigma, moved / NORMAL_95)).judged()
     return wider
+
+
+def beside_modes(estimates: Mapping[str, Estimate], modes: Sequence[Tried]) -> dict[str, Estimate]:
+    """Estimates of a rigid axis whose record speaks for an elastic mode: the speed controller that makes up for it is
+    another one."""
+    shown = [one for one in modes if one.gain > one.least]
+    if not shown:
+        return dict(estimates)
+    reason = MODE_SHOWS.format(max(shown, key=lambda one: one.gain).name, spelt("modes"))
+    hidden = {name: replace(one, status="undetermined", reason=reason)
+              for name, one in estimates.items() if name in ("K_p", "T_n")}  # fmt: skip
+    return {**estimates, **hidden}
 
 
 def _line_of(axis_record: AxisRecord, machine: Machine) -> dict[str, Estimate]:

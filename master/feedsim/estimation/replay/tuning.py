@@ -24,7 +24,7 @@ from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.least_squares import NORMAL_95, LeastSquares, Point, correlation_length, half_width, secant
 from feedsim.estimation.parameter import Parameter
 from feedsim.estimation.replay.closed_loop import AxisRecord, Mask, Replay, of_cycle, per_row_of
-from feedsim.estimation.replay.machine_files import modes_of, with_modes
+from feedsim.estimation.replay.machine_files import KEYS, modes_of, with_modes
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import FeedsimError, InputError
 from feedsim.scenario import Filter, Machine
@@ -72,6 +72,7 @@ TABLE: Mapping[str, Row] = {
     "omega_0": Row(0.7, log=True),
     "D": Row(0.5, log=True),
     "filter_1.f": Row(0.7, log=True),  # of the low-pass that stands for a current loop
+    "filter_1.D_den": Row(0.5, log=True),
     "k_ffw": Row(0.5, lower=0.0, upper=1.5),
     "T_sym": Row(3e-3, lower=0.0, upper=0.02),
     "T_dyn": Row(10e-3, lower=0.0, upper=0.1),
@@ -215,7 +216,8 @@ class Problem:
             }
         )  # fmt: skip
         if "filter_1.f" in values:
-            low_pass = drive.filter_1.model_copy(update={"f": values["filter_1.f"]})
+            of_filter = {name: values[f"filter_1.{name}"] for name in ("f", "D_den") if f"filter_1.{name}" in values}
+            low_pass = drive.filter_1.model_copy(update=of_filter)
             drive = drive.model_copy(update={"filter_1": low_pass})
         torques = {name: values[name] / scale for name in ("F_C", "sigma_0", "sigma_1", "sigma_2", "F_log")}
         friction = self.machine.shipped_friction(self.each.axis, "the identification of a drive").model_copy(
@@ -477,9 +479,11 @@ def with_either(estimates: Mapping[str, Estimate], other: OtherCycle) -> dict[st
 
 FITTED_SHARE = 0.5  # of what the test needs: a rival that is predicted to gain less is not fitted
 ERROR_RATE = 0.01  # of each test: how often a rival is taken that the axis does not have
-CURRENT_DAMPING = 1.0  # of the low-pass that stands for a current loop
+CURRENT_DAMPING, OTHER_DAMPING = 1.0, 0.7  # of the low-pass that stands for a current loop: at first, and as it begins
 BEGIN_CURRENT = 1400.0  # [Hz] of that low-pass: twice the bandwidth
 BEGIN_MODEL = {"omega_0": 1000.0, "D": 1.0}  # [rad/s], [1] of a reference model
+# Of elastic modes that a rigid axis may have: [Hz], damping, and shape at motor and scale over that of rigid motion.
+MODE_PLACES, MODE_DAMPING, MODE_SHAPE = (25.0, 50.0, 100.0), 0.03, 0.3
 
 
 @dataclass(frozen=True)
@@ -526,6 +530,24 @@ def rivals_of(problem: Problem) -> list[Rival]:
     if drive.ideal_current_loop and drive.filter_1.type == "off":
         low_pass = Filter.model_construct(type="low_pass", f=BEGIN_CURRENT, D_num=None, D_den=CURRENT_DAMPING)
         result.append(Rival("current loop", {"filter_1": low_pass}, {"filter_1.f": BEGIN_CURRENT}))
+    elif "filter_1.D_den" not in problem.start and drive.filter_1.type == "low_pass":
+        result.append(Rival("damping of the current loop", {}, {"filter_1.D_den": OTHER_DAMPING}))
+    return result
+
+
+def possible_modes(problem: Problem, fit: Tuned) -> list[Tried]:
+    """What an elastic mode may do to the values of a rigid axis: at places over the usual range, by two runs each, in
+    which the scale moves with the motor and against it."""
+    start, result = dict(problem.start), []
+    count = 2 * len(MODE_PLACES)
+    for frequency in MODE_PLACES:
+        both = []
+        for sign in (1.0, -1.0):
+            mode = frequency, MODE_DAMPING, MODE_SHAPE, sign * MODE_SHAPE
+            problem.start = start | dict(zip((f"{key}_1" for key in KEYS), mode, strict=True))
+            both.append(_predicted(problem, fit, Rival(f"elastic mode of {frequency:g} Hz", {}), count))
+        result.append(max(both, key=lambda one: one.gain))
+    problem.start = start
     return result
 
 
@@ -559,12 +581,13 @@ def with_rivals(problem: Problem, fit: Tuned, far: bool) -> tuple[Tuned, list[Tr
         fit, far = problem.fitted(fit.names, fit.values, fit), False
 
 
-def _predicted(problem: Problem, fit: Tuned, rival: Rival) -> Tried:
+def _predicted(problem: Problem, fit: Tuned, rival: Rival, tests: int = 1) -> Tried:
     """By one run with the rival as it begins: what a step towards it gains, and how far it may lead at 95 %.
 
-    Of the change of the residuals, what the parameters of the fit make up for says nothing.
+    Of the change of the residuals, what the parameters of the fit make up for says nothing. tests: that share the error
+    rate.
     """
-    least = 0.5 * float(chi2.isf(ERROR_RATE, rival.freedom))
+    least = 0.5 * float(chi2.isf(ERROR_RATE / tests, rival.freedom))
     try:
         changed = problem.residuals(fit.names, fit.values) - fit.residuals
     except InputError:  # the units cannot run it

@@ -347,8 +347,9 @@ def answers(report: MountsReport) -> list[str]:
     }[mounts.verdict]
     parts = [f"{verdict}."]
     stop = max(mounts.ring_downs, key=lambda one: one.recorded_swings[0].amplitude if one.recorded_swings else 0.0)
-    if mounts.verdict == "not linear" and len(stop.recorded_swings) > 1:
-        first, last = stop.recorded_swings[0], stop.recorded_swings[-1]
+    swings = stop.simulated_swings[: len(stop.recorded_swings)]  # as long as they are seen, but without noise
+    if mounts.verdict == "not linear" and len(swings) > 1:
+        first, last = swings[0], swings[-1]
         parts[0] = (
             f"{verdict}: behind {stop.name} the machine swings at {first.frequency:.3g} Hz with "
             f"{100 * first.damping:.2g} % damping at first, at {last.frequency:.3g} Hz with {100 * last.damping:.2g} % "

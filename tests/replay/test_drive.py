@@ -193,10 +193,10 @@ def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     off = [f"--set=axes.X.drive.{each}" for each in ("K_v=3.5 (m/min)/mm", "T_sym=3 ms", "k_ffw=98 %", "T_n=16 ms")]
     assert main(["identify", "drive", *words, str(tmp_path / "drive"), *machine, *off]) == 0
     said = json.loads((tmp_path / "drive" / "summary.json").read_text())["answer"]
-    assert re.match(
-        r"X: the position of the record is met to .* um rms .*The record determines K_v, k_ffw, ", said[0]
-    ), said
-    assert 'class="answer">X: the position' in (tmp_path / "drive" / "report.html").read_text(encoding="utf-8")
+    assert re.match(r"X: K_v 4\.00 .* that the record determines\)\. It meets the position to .* um rms ", said[0]), (
+        said
+    )
+    assert 'class="answer">X: K_v' in (tmp_path / "drive" / "report.html").read_text(encoding="utf-8")
     assert_numbers_agree(tmp_path / "drive")
     true = load_machine(MACHINES / "one_axis").axes["X"].drive
     found = json.loads((tmp_path / "drive" / "summary.json").read_text())["axes"]["X"]["parameters"]

@@ -8,7 +8,7 @@ import numpy as np
 from drawn_circles import Causes, driven
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose
-from feedsim.analysis.circle.changed import changed, named
+from feedsim.analysis.circle.words import changed, named
 
 CIRCLE = CircleUnderTest(("X", "Z"), 0.1, 1 / 60, recorded=True)
 PAIRS, SAMPLES = 40, 720

@@ -10,8 +10,8 @@ from typing import Annotated
 
 from feedsim.analysis import Diagnosis, Named
 from feedsim.analysis.circle import diagnose, further
-from feedsim.analysis.circle.changed import Change
 from feedsim.analysis.circle.records import SAME_FEED, RecordedCircle, read_circle
+from feedsim.analysis.circle.words import Change
 from feedsim.analysis.circularity import axis_letters
 from feedsim.files.columns import load_columns
 from feedsim.foundation.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt

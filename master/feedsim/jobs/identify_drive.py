@@ -31,7 +31,7 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.records import Asked
+from feedsim.jobs.replay import Asked
 from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report.replay import drive as page
 from feedsim.report.replay.drive import DriveReport

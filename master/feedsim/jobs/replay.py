@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated
 
 from feedsim.analysis import Named
 from feedsim.design.tune import Proposal
 from feedsim.design.tune.proposals import of_drives
-from feedsim.estimation.replay.compare import replayed
-from feedsim.estimation.replay.open_loop import driven
-from feedsim.files.trace import write_csv
+from feedsim.estimation.identify import Recorded
+from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.replay.closed_loop import window as window_of
+from feedsim.estimation.replay.compare import driven, replayed
+from feedsim.files.columns import Columns, load_columns
+from feedsim.files.fields import no_axis
+from feedsim.files.trace import Mark, Recording, read_recording, write_csv
+from feedsim.foundation.arguments import Changes, given, listed, settings, spelt
+from feedsim.foundation.errors import InputError, Note, few
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -30,12 +37,134 @@ from feedsim.jobs.parameters import (
     job,
     out,
 )
-from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Kind, Result, announce, kept
 from feedsim.report.replay import report as page
 from feedsim.report.replay.report import Replayed
-from feedsim.scenario import Drive, Machine
+from feedsim.scenario import Drive, Machine, Subject, load_subject
 from feedsim.structure import checked_modes
+
+# --- A record of a control and the machine that goes with it, as replays and identifications of drives read them ------
+
+
+MOST_NAMED = 20  # columns that a note names
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A recording, the axes of it, and the part that counts.
+
+    window: begin and end [s]; None: all. settings: what was asked for by argument, as the user wrote it, without paths.
+    changes: of the machine.
+    """
+
+    recording: Recording
+    subject: Subject | None
+    axes: tuple[str, ...]
+    mapping: Columns | None
+    window: tuple[float, float] | None
+    settings: Mapping[str, str]
+    changes: Sequence[str]
+
+    @classmethod
+    def of(
+        cls,
+        record: File,
+        machine: File | None,
+        axes: str | Sequence[str] | None,
+        columns: File | None,
+        window: str | None,
+        changes: Changes,
+    ) -> Asked:
+        """Read machine, mapping and recording. Raises InputError: a faulty file, no such axis, no such window."""
+        texts = settings(changes)
+        subject = load_subject(machine, texts) if machine is not None else None
+        chosen = _axes(axes, subject.machine if subject is not None else None)
+        mapping = load_columns(columns) if columns is not None else None
+        recording = read_recording(record)
+        part = None
+        if window is not None:
+            with given("window", window):
+                part = window_of(window, recording.marks)
+        text = axes if isinstance(axes, str) else ",".join(axes or ())
+        asked = {name: value for name, value in (("axes", text), ("window", window or "")) if value}
+        return cls(recording, subject, chosen, mapping, part, asked, texts)
+
+    @property
+    def machine(self) -> Machine | None:
+        """The machine, where one is given."""
+        return self.subject.machine if self.subject is not None else None
+
+    @property
+    def marks(self) -> Sequence[Mark]:
+        """Events of the record, such as blocks of its program."""
+        return self.recording.marks
+
+    @property
+    def inputs(self) -> list[Path]:
+        """Files that are read."""
+        return [self.recording.path, *(file for _, file in (self.subject.files if self.subject is not None else ()))]
+
+    @property
+    def asked_for(self) -> list[str]:
+        """All that was asked for, as texts."""
+        return [*self.changes, *(f"{name}={text}" for name, text in self.settings.items())]
+
+    @cached_property
+    def read(self) -> Mapping[str, Recorded]:
+        """Axis -> all of its record."""
+        return read_axes(self.recording, self.axes, self.machine, self.mapping)
+
+    @cached_property
+    def records(self) -> dict[str, AxisRecord]:
+        """Axis -> the stretch of its record that holds the window."""
+        return {axis: windowed(axis, recorded, self.window) for axis, recorded in self.read.items()}
+
+    def each_axis(self) -> tuple[dict[str, Recorded], dict[str, AxisRecord], dict[str, str]]:
+        """`read` and `records` of the axes that have them, and why another one has none.
+
+        Raises InputError: none of them has.
+        """
+        read: dict[str, Recorded] = {}
+        records: dict[str, AxisRecord] = {}
+        refused: dict[str, str] = {}
+        for axis in self.axes:
+            try:
+                recorded = read_axes(self.recording, [axis], self.machine, self.mapping)[axis]
+                records[axis], read[axis] = windowed(axis, recorded, self.window), recorded
+            except InputError as error:
+                refused[axis] = str(error)
+        if not read:
+            raise InputError.of(f"{self.recording.path}", dict.fromkeys(refused.values()))
+        return read, records, refused
+
+    def unread(self, read: Mapping[str, Recorded]) -> list[str]:
+        """A note on the columns of the file that none of the axes is read from; those of the axes come first."""
+        used = {column for recorded in read.values() for column in recorded.provenance.columns.values()}
+        numbers = {name.rpartition("|")[2] for name in used if "|" in name}  # of the axes of a capture
+        used |= {f"POWER|{number}" for number in numbers}  # which their pitch is by
+        others = [name for name in self.recording.names if name not in used]
+        names = sorted(others, key=lambda name: name.rpartition("|")[2] not in numbers)
+        return [Note(f"{self.recording.path}: columns that are not read: {few(names, MOST_NAMED)}")] if names else []
+
+
+def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[str, ...]:
+    option = spelt("axes")
+    if axes is None:
+        if machine is None:
+            raise InputError(f"{option}: which axes of the record are meant? For example {option} X,Y")
+        return tuple(machine.axes)
+    result = listed(axes)
+    text = axes if isinstance(axes, str) else ",".join(axes)
+    for axis in result if machine is not None else ():
+        if machine is not None and axis not in machine.axes:
+            raise InputError(f"{option} {text}: {no_axis(axis, machine.axes)}")
+    if not result or len({*result}) < len(result):
+        raise InputError(f"{option} {text}: names of axes are needed, each once, such as X,Y")
+    return result
+
+
+# --- The setpoints of a record through the simulated axes, beside what was recorded -----------------------------------
+
 
 KIND = Kind("replay", page.FILES)
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from feedsim.analysis import Diagnosis, Figure, answer
 from feedsim.analysis.circle import CircleUnderTest, TurnedPath, name, worth_telling
-from feedsim.analysis.circle.changed import Change, changed, named
 from feedsim.analysis.circle.records import RecordedCircle
+from feedsim.analysis.circle.words import Change, changed, named
 from feedsim.analysis.circularity import axis_letters
 from feedsim.analysis.evaluate import FIGURE_UNITS, about, both_directions, cause_figures
 from feedsim.design.tune import of_circle

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, t
 
 from feedsim.analysis.circle.diagnosis import Diagnosis, Term
 from feedsim.analysis.circle.geometry import TurnedPath
@@ -372,6 +371,8 @@ def changed(
         if (key := (term.key, term.axis, term.order)) in terms and term.key not in ("rest", "offset")
         and term.determined and terms[key].determined
     ]  # fmt: skip
+    from scipy.stats import t  # a run, which says why a circle is not round, does without
+
     wider = t.ppf(1 - (1 - LEVEL) / (2 * max(len(pairs), 1)), free) / t.ppf(0.5 + LEVEL / 2, free)
     changes = []
     for one, other in pairs:
@@ -402,6 +403,8 @@ def differing_share(
     both = float(np.var(one[known]) + np.var(other[known])) if free > 4 else 0.0
     if both <= 0:
         return 1.0, math.inf
+    from scipy.stats import norm, t
+
     share = math.sqrt(float(np.var((other - one)[known])) / both)
     return min(1.0, max(LEAST_DIFFERING_SHARE, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))), float(free)
 

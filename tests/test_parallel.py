@@ -17,6 +17,12 @@ from feedsim.foundation.parallel import in_parallel
 forks = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
 
 
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a process of a single thread, whatever other tests have started in this one."""
+    monkeypatch.setattr(threading, "active_count", lambda: 1)
+
+
 def squared(k: int, say: Callable[..., None]) -> tuple[int, int]:
     say("squaring", k)
     if k == 3:
@@ -31,6 +37,7 @@ def cores(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> in
 
 
 @forks
+@pytest.mark.usefixtures("alone")
 def test_results_and_reports_are_those_of_one_process(cores: int) -> None:
     said: list[tuple[object, ...]] = []
     results = in_parallel([partial(squared, k) for k in (7, 5, 6)], lambda *words: said.append(words))
@@ -48,6 +55,7 @@ def test_the_first_error_in_order_is_raised_whole(cores: int) -> None:
 
 
 @forks
+@pytest.mark.usefixtures("alone")
 def test_a_task_that_is_worked_beside_others_starts_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parallel, "cores", lambda: 2)
 
@@ -70,6 +78,7 @@ def test_a_process_with_threads_is_not_forked(monkeypatch: pytest.MonkeyPatch) -
 
 
 @forks
+@pytest.mark.usefixtures("alone")
 def test_a_process_that_is_killed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parallel, "cores", lambda: 2)
 

@@ -52,7 +52,7 @@ def test_the_answer_is_the_run_of_the_table(way: str, choose: Callable[..., Any]
     assert int(found[2]) == int(best["run"])
     assert float(found[1]) == pytest.approx(float(best["Z.peak_torque [N.m]"]), rel=5e-3)
     assert answer.split(";")[0] in said
-    words = " ".join(page.words)
+    words = " ".join(" ".join(page.words).split())
     assert f"feedsim check study.yaml --row {best['run']}" in words
     assert "It lies at the end of what was tried of feed" in answer
     assert_numbers_agree(folder / "out")

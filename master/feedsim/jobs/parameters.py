@@ -16,6 +16,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
+from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -441,8 +442,8 @@ def _word(value: Any, unit: str) -> str | None:
     if isinstance(value, Path):
         inside = value.is_absolute() and value.is_relative_to(Path.cwd())
         return (value.relative_to(Path.cwd()) if inside else value).as_posix()
-    if isinstance(value, int | float):
-        return f"{value!r} {unit}".strip()
+    if isinstance(value, Real):  # of numpy, too
+        return f"{value} {unit}".strip()
     return value if isinstance(value, str) else None
 
 

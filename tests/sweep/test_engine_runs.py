@@ -19,7 +19,7 @@ from feedsim.foundation import units
 from feedsim.scenario import Base, Change, load
 from feedsim.simulation import cosim
 from feedsim.simulation.judge import judged
-from feedsim_packager import exchange, toolchain
+from feedsim_packager import native, toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"
@@ -66,7 +66,7 @@ def bundle(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
     archives.mkdir()
     for unit in ("plant", "controller", "friction"):
         shutil.copy(fmus / f"{unit}.fmu", archives)
-    exchange.build(archives, toolchain.find_compiler())
+    native.build("exchange", archives, toolchain.find_compiler())
     base = Base.read(folder / "z_positioning.yaml", SHORT)
     found = Bundle.of_base(base, base.files, archives)
     shutil.rmtree(folder)

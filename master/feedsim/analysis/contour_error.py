@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,11 @@ from feedsim.motions.planner.nearest import Feet
 from feedsim.motions.program import Programmed
 from feedsim.scenario import Drive, ForeignUnit, Machine
 from feedsim.scenario.axis_units import ParameterGroup
-from feedsim.simulation import cosim
-from feedsim.simulation.cosim import Run
-from feedsim.simulation.cosim.schedule import Progress
 from feedsim.simulation.nc import Program, Segment
+
+if TYPE_CHECKING:
+    from feedsim.simulation.cosim import Run
+    from feedsim.simulation.cosim.schedule import Progress
 
 Integers = NDArray[np.int64]
 
@@ -406,6 +408,8 @@ def with_frictionless(run: Run, fmus: Path | None = None, progress: Progress | N
 
     Raises SimulationError: a unit failed.
     """
+    from feedsim.simulation import cosim  # what reads records alone does without the units
+
     scenario = run.scenario
     machine = without_friction(scenario.machine)
     if machine is None:

@@ -35,7 +35,6 @@ from feedsim.motions.positioning_cycle import Visits
 from feedsim.motions.program import Programmed
 from feedsim.motions.setpoints import Recorded
 from feedsim.scenario import CircleTest, ContourTest, Machine, Positioning, PositioningAccuracy, Scenario
-from feedsim.simulation.cosim.plant import plant_modes
 from feedsim.simulation.nc import Program, Segment
 
 # --- Figures that need more of a circle than its radii: why it is not round, and both directions together -------------
@@ -312,6 +311,8 @@ class CircleTask:
         """The closed loops; None where a drive is not the shipped one."""
         try:
             # Gain, drag and what follows of all axes are asked for one by one at the same few frequencies.
+            from feedsim.simulation.cosim.plant import plant_modes  # what reads records alone does without it
+
             system = LinearSystem(self.machine, plant_modes(self.machine)[0], kept_from=1)
             return system if system.drives else None
         except InputError:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from feedsim.analysis.figures import Array, Figure, column, last_outside, up_cro
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
 from feedsim.motions.positioning_cycle import Visits
-from feedsim.simulation import cosim
-from feedsim.simulation.cosim import Run
-from feedsim.simulation.cosim.schedule import Progress
 from feedsim.structure.modes import checked_modes, with_mounts, write_modes
 from feedsim.structure.mounts import read_mounts
+
+if TYPE_CHECKING:
+    from feedsim.simulation.cosim import Run
+    from feedsim.simulation.cosim.schedule import Progress
 
 RINGING_WINDOW = (0.030, 0.400)  # s after the end of the NC motion: the first swing is left out, it is a forced one
 REST_DELAY = 1.0  # s after the end of the NC motion
@@ -97,6 +98,8 @@ def with_clamped(run: Run, fmus: Path | None = None, progress: Progress | None =
 
     Raises SimulationError: a unit failed.
     """
+    from feedsim.simulation import cosim  # what reads records alone does without the units
+
     scenario, machine = run.scenario, run.scenario.machine
     if machine.mounts is None or machine.plant is not None or machine.foreign_units:
         return run

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from feedsim.report.formatting import minus
 from feedsim.report.run.axis_plots import accuracy_picture, contour_picture
 from feedsim.scenario import CircleTest, PositioningAccuracy, Scenario
 from feedsim.scenario.model import OF_CIRCLES, OF_POSITIONING, Sheet
-from feedsim.simulation.cosim import Run
+
+if TYPE_CHECKING:
+    from feedsim.simulation.cosim import Run
 
 HTML, CSV, XLSX = "sheet.html", "sheet.csv", "sheet.xlsx"
 SIMULATED = "Simulated by feedsim. Nothing was measured on a machine."

@@ -160,18 +160,18 @@ def test_the_search_finds_pages_from_disk(browser: Any, site: Path) -> None:
 
 
 SCREENS = {"1366x768": (1366, 768), "phone": (390, 844)}
-# Bottom of each part of the machine's page, in the window: circle (without what lies beside or below it), cause, knob.
+# Bottom of each part of the machine's page, in the window: circle (without what lies beside or below it), lesson, knob.
 BOTTOMS = """() => {
     const bottom = selector => document.querySelector(selector).getBoundingClientRect().bottom;
     const { top, height, width } = document.querySelector("figure[id^=contour-] svg.chart").getBoundingClientRect();
     return { circle: top + Math.min(height, width), marked: document.querySelectorAll(".knob.pointed").length,
-             knob: bottom(".knob.pointed"), cause: bottom("section[id^=why-] .answer") };
+             knob: bottom(".knob.pointed"), lesson: bottom("#lesson") };
 }"""
 
 
 @pytest.mark.parametrize("screen", SCREENS)
 def test_the_first_page_has_the_machine_on_one_screen(browser: Any, site: Path, screen: str) -> None:
-    """Circle, why it is not round, and the one knob of the lesson, without a scroll."""
+    """Circle, the lesson that says why it is not round, and its one knob, without a scroll."""
     if not (site / "machine.html").is_file():
         pytest.skip("no module of the machine (make page-module)")
     width, height = SCREENS[screen]
@@ -181,7 +181,6 @@ def test_the_first_page_has_the_machine_on_one_screen(browser: Any, site: Path, 
     assert frame is not None
     frame.wait_for_function("(({ asked, shown, loops }) => asked && asked === shown && asked === loops)"
                             "(document.documentElement.dataset)")  # fmt: skip
-    frame.wait_for_function("document.querySelector('section[id^=why-]:not(.stale)') !== null")
     top = page.locator("iframe.machine").bounding_box()["y"]
     bottoms = frame.evaluate(BOTTOMS)
     assert bottoms.pop("marked") == 1

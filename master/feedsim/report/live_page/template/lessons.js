@@ -20,7 +20,7 @@ const LESSONS = [
     start: (held, of) => ({ [key_of(held.plane[0], "drive.k_ffw")]: 0, [key_of(held.plane[1], "drive.k_ffw")]: 0, [key_of(held.plane[1], "drive.K_v")]: 0.8 * of(key_of(held.plane[0], "drive.K_v")) }),
     turn: held => [key_of(held.plane[1], "drive.K_v")],
     text: ({ plane: [a, b] }) => [`The feedforward of both axes is off, and K_v of ${b} is a fifth below that of ${a}. Each axis lags by feed / K_v, and ${b} lags more: the circle is an ellipse that lies at 45°.`,
-      `Turn K_v of ${b} until it lies no longer. The other direction of travel turns the ellipse the other way: that tells a mismatch from axes that are not square.`],
+      `Turn K_v of ${b} until the ellipse is gone. The other direction of travel turns the ellipse the other way: axes that are not square do not do so.`],
     look: (held, view) => { const off = oblique(view); return { done: Math.abs(off) < 1, text: `The ellipse at 45° is ${um(Math.abs(off))} high; below 1 µm it is gone.` }; },
     after: "What is left is smaller than the programmed circle: both axes lag. Feedforward (k_ffw) brings the radius back.",
   },

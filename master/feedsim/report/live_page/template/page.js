@@ -52,7 +52,7 @@ function answered({ data }) {
     document.documentElement.dataset.shown = String(asked);
   } else {
     view.result = data.result;
-    for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.toggle("stale", changed().length > 0);
+    for (const section of document.querySelectorAll("section[id^=why-]")) section.hidden = changed().length > 0;
     show();
   }
   if (again) ask();
@@ -323,7 +323,7 @@ function lesson_begin(lesson, seen = true) {
   by("lesson-state").textContent = "";
   for (const { row } of inputs) row.classList.remove("pointed");
   for (const key of lesson.turn(HELD)) { const k = KNOBS.findIndex(knob => knob.key === key); if (k >= 0) inputs[k].row.classList.add("pointed"); }
-  by("lesson-more").open = innerWidth >= 992 && innerHeight >= 740; // else its knobs would lie below the first screen
+  by("lesson-more").open = innerWidth >= 992 && innerHeight >= 640; // else its knobs would lie below the first screen
   by("page").classList.add("in-lesson");
   if (seen) by("lesson").focus();
 }

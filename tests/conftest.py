@@ -13,8 +13,6 @@ from hypothesis import HealthCheck, settings
 # numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import rotation
-
 if TYPE_CHECKING:
     from feedsim.simulation.cosim.friction_law import FrictionLaw
     from pint_registry import Registry
@@ -43,21 +41,6 @@ def handlers_of_signals() -> Iterator[None]:
     for number, handler in before.items():
         if handler is not None:
             signal.signal(number, handler)
-
-
-LEFT_OUT = {ROOT / "tests" / file for file in rotation.left_out(rotation.turn())}
-
-
-def pytest_ignore_collect(collection_path: Path) -> bool | None:
-    """Files whose turn it is not."""
-    return True if collection_path in LEFT_OUT else None
-
-
-def pytest_report_header() -> str | None:
-    """How much is left out, and how all of it runs."""
-    if not LEFT_OUT:
-        return None
-    return f"{len(LEFT_OUT)} slow files wait for their turn (tests/rotation.py); without FEEDSIM_TURN all run"
 
 
 def _inputs() -> list[Path]:

@@ -20,8 +20,6 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
-sys.path.insert(0, str(TESTS))
-from rotation import turn  # noqa: E402
 
 # What has an iteration, an order or pinned digits in it, but no statistics. The rest, many minutes: --all.
 REFERENCES = ("reference/test_reference.py", "estimation/test_fit.py", "identify/test_stribeck.py")
@@ -113,9 +111,7 @@ def main(arguments: list[str] | None = None) -> int:
     extensions, able = here["numpy"], flags()
     print(f"this machine: OpenBLAS {', '.join(kernels)}; numpy {', '.join(map(str, extensions))}", flush=True)
     failed, tried = [], set[str]()
-    number = turn()
-    first = 0 if number is None else number % len(SETTINGS)
-    for setting in SETTINGS[first:] + SETTINGS[:first]:
+    for setting in SETTINGS:
         if setting.flag and setting.flag not in able:
             print(f"{setting.name}: left out, the processor has no {setting.flag}", flush=True)
             continue
@@ -142,10 +138,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"{setting.name}: {time.perf_counter() - begun:.0f} s", flush=True)
         if done.returncode:
             failed.append(setting.name)
-        if number is not None:
-            print("the others wait for their turn; without FEEDSIM_TURN all run", flush=True)
-            break
-    if number is None and not tried - set(kernels):
+    if not tried - set(kernels):
         print("OpenBLAS took the machine's own kernel every time: nothing was tried")
         return 1
     print(f"failed: {', '.join(failed)}" if failed else "the same verdict under each")

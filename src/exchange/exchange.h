@@ -3,7 +3,7 @@
  * A cycle is a list of operations, worked through in order: calls of FMI functions on buffers that the master owns, and
  * small vector arithmetic in between. The loop knows neither units nor schemes nor recordings; which operations make a
  * cycle is the master's business (feedsim/simulation/cosim/schedule.py), and so is all memory. No globals, no
- * allocation, no printing: a call that fails ends the loop, and the unit has told its logger why.
+ * allocation, no printing: a call that fails ends the loop, and the unit has given its logger the reason.
  *
  * The master reads the layout below as text and leaves a library alone that has another one. */
 #ifndef FEEDSIM_EXCHANGE_H

@@ -24,8 +24,8 @@ void log_write_list(Unit *unit, unsigned category, const char *format, va_list a
 #endif
     ;
 
-/* What fmi2SetDebugLogging asks for. No categories: all of them. With debug logging off errors are still told, since a
- * status without its reason serves nobody; an importer that names categories gets those alone. false with a warning
+/* What fmi2SetDebugLogging asks for. No categories: all of them. With debug logging off errors are still logged, since
+ * a status without its reason serves nobody; an importer that names categories gets those alone. false with a warning
  * logged where a name is unknown (the others hold). */
 bool log_select(Unit *unit, bool on, size_t count, const fmi2String names[]);
 

@@ -31,7 +31,7 @@ double unit_slope(const Unit *unit, unsigned vr);
 bool unit_sloped(const Unit *unit);
 /* The model's own state inside the block; valid after derive(). */
 void *unit_state(Unit *unit);
-/* Start of the experiment [s], as told by fmi2SetupExperiment (0 without it). */
+/* Start of the experiment [s], as given by fmi2SetupExperiment (0 without it). */
 double unit_start_time(const Unit *unit);
 
 /* Directory of the unpacked resources, a UTF-8 path without closing separator; NULL where the importer gave none. */

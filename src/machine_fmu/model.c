@@ -163,7 +163,7 @@ static void machine_show_late(Unit *unit) {
 
 enum { FAR_TEXT_SIZE = 256 };
 
-/* Steps longer than the position cycle, and nobody told how the setpoints go on: the drives see stairs. */
+/* Steps longer than the position cycle, and no derivative says how the setpoints go on: the drives see stairs. */
 static void warn_of_held(Unit *unit, Machine *machine, double h) {
     const double T_pos = unit_axis(unit, 0)->drive_T_pos;
     if (machine->warned || unit_scalars(unit)->motion_built_in || unit_scalars(unit)->setpoints_delay > 0 ||

@@ -152,8 +152,8 @@ void modal_prepare(Modal *modal, double h) {
     modal->h = h;
 }
 
-/* MODAL_LANES numbers side by side, each worked like the others. Compilers that have vectors are told that these are
- * some: left to find them by themselves, one pairs lanes that lie apart. Written out, as loops are left in memory. */
+/* MODAL_LANES numbers side by side, each computed like the others. The type names them a vector where the compiler has
+ * vectors: without it, one compiler pairs lanes that lie apart. Written out, since loops stay in memory. */
 #ifdef __GNUC__
 typedef double LanePart __attribute__((vector_size(2 * sizeof(double))));
 #define EACH_PART(work) work(0) work(1)

@@ -137,7 +137,7 @@ static double setpoints_uneven(double cycle, double t) {
     return UNEVEN * cycle + 4 * DBL_EPSILON * fabs(t);
 }
 
-/* The fault of the time of row `count`, told in `message`; the rows before it are sound. */
+/* The fault of the time of row `count`, described in `message`; the rows before it are sound. */
 static bool setpoints_check_time(const Setpoints *table, size_t count, const char *source, unsigned line, char *message,
                                  size_t message_size) {
     char text[4][NUMBER_TEXT_SIZE];

@@ -170,7 +170,7 @@ def build(
     """Compile and pack `unit` into `out`. `build_directory` keeps what was staged; without it nothing stays.
 
     `targets`: platforms for which it is compiled, checked to run on machines other than this one; without, for this
-    machine by its own compiler. `progress` is told in a line of every library that is ready.
+    machine by its own compiler. `progress` gets a line for every library that is ready.
     """
     name = unit.table.unit
     with tempfile.TemporaryDirectory(prefix="packager-") as temporary:

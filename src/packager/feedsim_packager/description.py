@@ -61,7 +61,7 @@ def capabilities(variables: Iterable[Variable]) -> dict[str, bool | int]:
         "needsExecutionTool": False,
         "canHandleVariableCommunicationStepSize": True,
         "canInterpolateInputs": True,  # where there are none, all of them: some tools ask every unit of a system
-        "maxOutputDerivativeOrder": 1 if continuous else 0,  # values that are held have none (it would be told as 0)
+        "maxOutputDerivativeOrder": 1 if continuous else 0,  # values that are held have none (it would be stated as 0)
         "canRunAsynchronuously": False,  # spelled so in the standard
         "canBeInstantiatedOnlyOncePerProcess": False,
         "canNotUseMemoryManagementFunctions": False,

@@ -73,7 +73,7 @@ def check(content: bytes, axes: Sequence[str], where: str) -> tuple[GridAxis, ..
     """Check the file's content for a machine with these axes; `where` names it. Returns the grid.
 
     Raises:
-        InputError: names the first fault and its byte; what follows a fault cannot be told apart.
+        InputError: names the first fault and its byte; what follows a fault cannot be distinguished.
     """
     try:
         return _check(_Reader(_numbers(content)), axes)

@@ -35,7 +35,7 @@ UNEVEN = 1e-6
 # Bytes of a table that is embedded in the sources. A byte takes some four in C and some hundred while it is compiled.
 LARGEST_EMBEDDED = 2**20
 
-_MOST_PROBLEMS = 20  # told at once
+_MOST_PROBLEMS = 20  # listed at once
 _LARGEST_DOUBLE_STEP = 2.0**-52
 
 

@@ -72,7 +72,7 @@ class Live {
     figure.querySelector(".still").replaceWith(this.room);
   }
 
-  // On grey paper lines that differ in colour alone are told apart by dashes (style.css.j2).
+  // On grey paper dashes distinguish lines that differ in colour alone (style.css.j2).
   told_apart() {
     const seen = [], lines = this.chart.panels.flatMap(panel => panel.curves || []).filter(entry => !entry.dots && !entry.filled && !entry.dash && entry.width < 5);
     for (const curve of lines) {

@@ -16,7 +16,7 @@ from program_helpers import ends, read
 
 from feedsim.foundation.errors import InputError
 from feedsim.motions.part_program import Blending, Motion
-from feedsim.motions.part_program.interpreter import Interpreter
+from feedsim.motions.part_program.movements import Movements
 
 HALF = 0.5
 ROOT3 = math.sqrt(3) / 2
@@ -302,7 +302,7 @@ def test_the_fast_way_of_lines_is_that_of_all_blocks(dialect: str, monkeypatch: 
         return found
 
     fast = results()
-    monkeypatch.setattr(Interpreter, "_execute_line", lambda self, words: False)
+    monkeypatch.setattr(Movements, "execute_line", lambda self, words: False)
     assert results() == fast
     assert 50 < sum(isinstance(result, list) for result in fast) < 400
 

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run axe ends check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all wasm-compiler page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
+.PHONY: help run axe ends check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all wasm-compiler page-module release lint format schemas reference check-reference bench bench-release worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -144,6 +144,7 @@ $(foreach unit,$(UNITS),$(eval fmus/$(unit).fmu $(BUILD)/fmus-all/$(unit).fmu: \
 # Made anew they are the same, byte for byte.
 DIST := dist
 release: docs $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheel, source archive, archives in one file, bill of materials and sums, into dist/
+	$(if $(SLOWER),@echo "slower, and why: $(SLOWER)",$(PY) benchmarks/release.py --check)
 	PYTHONPATH=src/distribution $(PY) -m feedsim_distribution.release --archives $(BUILD)/fmus-all --site $(BUILD)/site --out $(DIST)
 
 # --- run -----------------------------------------------------------------------------------------------------------
@@ -239,6 +240,10 @@ check-reference: fmus $(VENV)/.run ## compare all units and both scenarios, wire
 bench: fmus $(VENV)/.importers ## measure everything, other simulators too; writes docs/benchmarks and the pages' figures (seven minutes)
 	$(PY) benchmarks/all.py --images docs/images
 	$(PY) benchmarks/page.py
+
+# What a release is refused for: a command that is slower by 3 % beyond the quartiles, or figures of another commit.
+bench-release: fmus $(VENV)/.importers ## commands in pairs with those of another version: AGAINST=TAG (twenty minutes)
+	$(PY) benchmarks/release.py --against $(AGAINST)
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py

@@ -25,7 +25,7 @@ import provenance
 
 SLOWER = 1.03  # ratio of times above which a command has become slower
 RECORDS = ROOT / "scenarios" / "records"
-CIRCLE = "scenarios/xz_circle.yaml"
+CIRCLE, MACHINE = "scenarios/xz_circle.yaml", "scenarios/machines/test_centre"
 # Name -> words of the command by version, newest first: which of them a version knows, its first run shows. OUT: folder
 # that it writes to; LOGS: traces of constant speeds and of sines, written before by this version.
 CASES: dict[str, tuple[list[str], ...]] = {
@@ -34,8 +34,8 @@ CASES: dict[str, tuple[list[str], ...]] = {
     "circle, 20 turns": (["run", CIRCLE, "--quiet", "--out", "OUT", "--set", "motions.0.turns=20"],),
     "`frf`": (["frf", CIRCLE, "--quiet", "--out", "OUT"],),
     "`identify friction`, two logs": (
-        ["identify", "friction", "LOGS", "--axes", "Z", "--quiet", "--out", "OUT"],
-        ["identify", "LOGS", "--axes", "Z", "--quiet", "--out", "OUT"],
+        ["identify", "friction", "LOGS", "--axes", "Z", "--machine", MACHINE, "--quiet", "--out", "OUT"],
+        ["identify", "LOGS", "--axes", "Z", "--machine", MACHINE, "--quiet", "--out", "OUT"],
     ),
     "`identify drive`": (
         ["identify", "drive", str(RECORDS / "log" / "log.csv"), "--columns", str(RECORDS / "log" / "columns.yaml"),

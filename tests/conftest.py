@@ -27,9 +27,10 @@ os.environ["FEEDSIM_CACHE"] = ""
 settings.register_profile("feedsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("feedsim")
 
-# A shell's job in the background ignores Ctrl-C, and so would all that is started here.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# A shell's job in the background ignores Ctrl-C, one behind nohup SIGHUP, and so would all that is started here.
+for number, handler in ((signal.SIGINT, signal.default_int_handler), (getattr(signal, "SIGHUP", None), signal.SIG_DFL)):
+    if number is not None and signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, handler)
 
 
 @pytest.fixture(autouse=True)

@@ -18,7 +18,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
     const size_t axes = plant->axes, shown = PORTS_SHOWN * axes;
-    const size_t joints = shown * (3 * size + 2 * ports) + 4 * axes * axes + 8 * axes + 2 * ports;
+    const size_t joints = shown * (3 * size + 2 * ports) + 6 * axes * axes + 8 * axes + 2 * ports;
     const size_t scratch = 4 * ports + axes + joints + crossing;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
@@ -52,12 +52,13 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
             (Forecast){.q = at, .v = at + size, .f = at + 2 * size, .held = held, .ramp = held + ports};
         at += 3 * size + 2 * ports;
     }
-    double **const matrices[] = {&plant->held, &plant->ramp, &plant->by_angle, &plant->by_n};
+    double **const matrices[] = {&plant->held, &plant->ramp,        &plant->by_way,
+                                 &plant->by_n, &plant->by_way_ramp, &plant->by_n_ramp};
     for (size_t i = 0; i < sizeof matrices / sizeof *matrices; i++, at += axes * axes) {
         *matrices[i] = at;
     }
-    double **const vectors[] = {&plant->v_free, &plant->angle_free, &plant->n_free,  &plant->v,
-                                &plant->angle,  &plant->n,          &plant->motor_u, &plant->motor_du};
+    double **const vectors[] = {&plant->v_free, &plant->way_free, &plant->n_free,  &plant->v,
+                                &plant->way,    &plant->n,        &plant->motor_u, &plant->motor_du};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++, at += axes) {
         *vectors[i] = at;
     }
@@ -268,6 +269,7 @@ static bool plant_join_motors(Unit *unit, const Plant *plant) {
         p->c = v->transmission_stiffness * p->lead * p->lead;
         p->d = v->transmission_damping * p->lead * p->lead;
         p->half = p->on ? v->transmission_play / 2 / fabs(p->lead) : 0;
+        p->rate = p->on ? transmission_rate(p, 1 / most - p->J) : 0;
     }
     return true;
 }

@@ -1,6 +1,6 @@
 /* Forces that the structure's own motion makes: friction at the guides, and transmissions between motors and structure.
  *
- * They follow from speeds and angles at the end of a step and act within it. The step is a linear map, so that what the
+ * They follow from speeds and ways at the end of a step and act within it. The step is a linear map, so that what the
  * ports show at its end is known ahead, but for these forces (modal_forecast()). They are settled with one another
  * there, in a few numbers, and then the modes are advanced once, with all forces known. */
 #include <math.h>
@@ -8,7 +8,9 @@
 #include "numbers.h"
 #include "plant.h"
 
-enum { JOINT_PASSES = 20 };
+enum { JOINT_PASSES = 20, JOINT_SUBSTEPS = 1000 };
+static const double JOINT_ANGLE = 0.3; /* of a contact's wave in a substep, at most [rad] */
+static const double two_pi = 6.28318530717958647693;
 
 static Forecast *plant_forecast(const Plant *plant, PortShown shown, size_t axis) {
     return &plant->forecasts[shown * plant->axes + axis];
@@ -26,13 +28,21 @@ static void plant_prepare_joints(Plant *plant, const Modal *modal, double h) {
         }
         if (plant->transmissions[i].on) {
             modal_forecast(modal, i, true, plant_forecast(plant, MOTOR_SPEED, i));
-            modal_forecast(modal, i, false, plant_forecast(plant, MOTOR_ANGLE, i));
+            Forecast *way = plant_forecast(plant, MOTOR_WAY, i);
+            modal_forecast(modal, i, false, way);
+            for (size_t k = 0; k < modal->size; k++) { /* from the start: of a slide far out no digit is lost */
+                way->q[k] -= modal->shape[i * modal->size + k];
+            }
         }
         for (size_t j = 0; j < axes; j++) {
             plant->held[i * axes + j] = plant_forecast(plant, SLIDE_SPEED, i)->held[slides + j];
             plant->ramp[i * axes + j] = plant_forecast(plant, SLIDE_SPEED, i)->ramp[slides + j];
             plant->by_n[i * axes + j] = plant_forecast(plant, MOTOR_SPEED, i)->held[j];
-            plant->by_angle[i * axes + j] = plant_forecast(plant, MOTOR_ANGLE, i)->held[j];
+            plant->by_way[i * axes + j] = plant_forecast(plant, MOTOR_WAY, i)->held[j];
+            plant->by_n_ramp[i * axes + j] =
+                plant_forecast(plant, MOTOR_SPEED, i)->ramp[j] - plant->by_n[i * axes + j] / 2;
+            plant->by_way_ramp[i * axes + j] =
+                plant_forecast(plant, MOTOR_WAY, i)->ramp[j] - plant->by_way[i * axes + j] / 2;
         }
     }
     plant->foretold = modal;
@@ -97,22 +107,30 @@ static bool plant_settle_transmissions(Plant *plant, double *state, double *end,
     GuideState *guides = plant_guides(plant, end);
     double largest = 0, change = INFINITY;
     bool guides_settled = true;
+    TransmissionPorts ports = {.way_free = plant->way_free,
+                               .n_free = plant->n_free,
+                               .by_way = plant->by_way,
+                               .by_n = plant->by_n,
+                               .by_way_ramp = plant->by_way_ramp,
+                               .by_n_ramp = plant->by_n_ramp};
     if (!plant->guided) {
-        return transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, plant->angle_free,
-                                 plant->n_free, plant->by_angle, plant->by_n, start, motors, h, settled);
+        return transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, &ports, start, motors, h,
+                                 settled);
     }
+    ports.way_free = plant->way;
+    ports.n_free = plant->n;
     for (size_t i = 0; i < axes; i++) {
         guides[i].F = guides_start[i].F + guides_start[i].slope * h; /* a first guess */
     }
     for (int pass = 0; pass < JOINT_PASSES; pass++) {
         for (size_t i = 0; i < axes; i++) {
-            const Forecast *angle = plant_forecast(plant, MOTOR_ANGLE, i), *n = plant_forecast(plant, MOTOR_SPEED, i);
-            plant->angle[i] = plant->angle_free[i] + plant_by_guides(plant, angle, guides_start, guides);
+            const Forecast *way = plant_forecast(plant, MOTOR_WAY, i), *n = plant_forecast(plant, MOTOR_SPEED, i);
+            plant->way[i] = plant->way_free[i] + plant_by_guides(plant, way, guides_start, guides);
             plant->n[i] = plant->n_free[i] + plant_by_guides(plant, n, guides_start, guides);
             plant->y[i] = motors[i].T;
         }
-        if (!transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, plant->angle, plant->n,
-                               plant->by_angle, plant->by_n, start, motors, h, settled)) {
+        if (!transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, &ports, start, motors, h,
+                               settled)) {
             return false;
         }
         largest = change = 0;
@@ -126,7 +144,8 @@ static bool plant_settle_transmissions(Plant *plant, double *state, double *end,
         for (size_t i = 0; i < axes; i++) {
             plant->v[i] = plant->v_free[i];
             for (size_t j = 0; j < axes; j++) {
-                plant->v[i] += plant_forecast(plant, SLIDE_SPEED, i)->held[j] * motors[j].T;
+                const Forecast *v = plant_forecast(plant, SLIDE_SPEED, i);
+                plant->v[i] += v->held[j] * (motors[j].T - motors[j].ramp / 2) + v->ramp[j] * motors[j].ramp;
             }
         }
         if (!plant_settle_guides(plant, plant->v, state, end, h, &guides_settled)) {
@@ -135,6 +154,30 @@ static bool plant_settle_transmissions(Plant *plant, double *state, double *end,
     }
     *settled = *settled && guides_settled && !(change > unsettled * largest);
     return true;
+}
+
+bool plant_substeps(Unit *unit, const Plant *plant, double h, size_t *count) {
+    const Transmission *fastest = plant->transmissions;
+    for (size_t i = 1; i < plant->axes; i++) {
+        fastest = plant->transmissions[i].rate > fastest->rate ? &plant->transmissions[i] : fastest;
+    }
+    /* a step that ends exactly there needs no further one */
+    const double needed = ceil(fastest->rate * h / JOINT_ANGLE * (1 - 1e-9));
+    *count = needed > 1 ? (size_t)fmin(needed, JOINT_SUBSTEPS) : 1;
+    if (needed <= JOINT_SUBSTEPS) {
+        return true;
+    }
+    const size_t axis = (size_t)(fastest - plant->transmissions);
+    const AxisBlock *v = unit_axis(unit, axis);
+    char text[5][NUMBER_TEXT_SIZE];
+    return unit_fail(unit,
+                     "the contact '%s.transmission' is too fast for a step of %s s: with a stiffness of %s N/m and a "
+                     "damping of %s N.s/m it answers at %s Hz, and needs substeps of %s s; allowed are %.0f in a step: "
+                     "take a shorter step, or a softer contact",
+                     unit_axis_name(unit, axis), number_text(text[0], h),
+                     number_text(text[1], v->transmission_stiffness), number_text(text[2], v->transmission_damping),
+                     number_text(text[3], fastest->rate / two_pi), number_text(text[4], JOINT_ANGLE / fastest->rate),
+                     (double)JOINT_SUBSTEPS);
 }
 
 bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, double *end, double h, size_t *acting) {
@@ -157,8 +200,7 @@ bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, dou
         }
         if (plant->transmissions[i].on) {
             plant->n_free[i] = plant_without_joints(unit, plant, plant_forecast(plant, MOTOR_SPEED, i), count, state);
-            plant->angle_free[i] =
-                plant_without_joints(unit, plant, plant_forecast(plant, MOTOR_ANGLE, i), count, state);
+            plant->way_free[i] = plant_without_joints(unit, plant, plant_forecast(plant, MOTOR_WAY, i), count, state);
         }
     }
     if (!(plant->driven ? plant_settle_transmissions(plant, state, end, h, &settled)
@@ -178,7 +220,9 @@ bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, dou
     for (size_t i = 0; i < axes; i++) {
         const size_t slide = slides + i;
         if (plant->transmissions[i].on) {
-            plant->u[i] += plant_transmissions(plant, end)[i].T;
+            const TransmissionState *motor = &plant_transmissions(plant, end)[i];
+            plant->u[i] += motor->T - motor->ramp / 2;
+            plant->du[i] += motor->ramp;
         }
         if (plant->guides[i].on) {
             if (!(plant->u[slide] != 0 || plant->du[slide] != 0)) {
@@ -211,7 +255,7 @@ void plant_start_joints(Unit *unit, Plant *plant, double *state) {
 
 void plant_follow_joints(Unit *unit, const Plant *plant, const Modal *modal, double *end) {
     const size_t slides = plant_slides(plant);
-    const double *q_end = end + plant_ports(plant), *v_end = q_end + plant->size;
+    const double *v_end = end + plant_ports(plant) + plant->size;
     for (size_t i = 0; i < plant->axes; i++) {
         if (plant->guides[i].on) {
             GuideState *guide = &plant_guides(plant, end)[i];
@@ -221,11 +265,7 @@ void plant_follow_joints(Unit *unit, const Plant *plant, const Modal *modal, dou
             }
         }
         if (plant->cells > 1 && plant->transmissions[i].on) { /* the motor turned along with the structure */
-            TransmissionState *motor = &plant_transmissions(plant, end)[i];
-            const double angle = modal_sum(modal, i, q_end);
-            motor->angle += angle - motor->angle_s;
-            motor->angle_s = angle;
-            motor->n_s = modal_sum(modal, i, v_end);
+            plant_transmissions(plant, end)[i].n_s = modal_sum(modal, i, v_end);
         }
     }
 }
@@ -250,7 +290,7 @@ void plant_show_transmissions(Unit *unit, const Plant *plant, double *state) {
             AxisBlock *axis = unit_axis(unit, i);
             axis->n_a = axis->n_fr = motor->n;
             axis->transmission_F = motor->C / plant->transmissions[i].lead;
-            axis->transmission_way = (motor->angle - motor->angle_s) * plant->transmissions[i].lead;
+            axis->transmission_way = motor->delta * plant->transmissions[i].lead;
             axis->transmission_heat = motor->heat;
         }
     }

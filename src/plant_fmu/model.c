@@ -128,16 +128,19 @@ static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
     return true;
 }
 
-static bool plant_step(Unit *unit, double t, double h) {
-    (void)t; /* the structure does not change with time */
-    Plant *plant = unit_derived(unit);
+/* Step `index` of `count` equal ones of h, with what is measured at its end in y. */
+static bool plant_advance(Unit *unit, Plant *plant, double h, size_t index, size_t count) {
     Modal *modal = &plant->modal[plant_head(unit)->cell];
     const size_t ports = plant_ports(plant), size = plant->size;
     const uint64_t place = 1 - plant_head(unit)->place;
     double *state = plant_state(unit), *end = plant_state_at(unit, plant, place);
     double *q_end = end + ports, *v_end = q_end + size;
     const bool joined = plant->guided || plant->driven, mounted = plant->mounts.on;
-    plant_gather(unit, h, plant->u, plant->du);
+    plant_gather(unit, h * (double)count, plant->u, plant->du);
+    for (size_t i = 0; count > 1 && i < ports; i++) {
+        plant->du[i] /= (double)count;
+        plant->u[i] += (double)index * plant->du[i];
+    }
     modal_prepare(modal, h);
     const double *u = plant->u, *du = plant->du;
     size_t acting = 0;
@@ -183,12 +186,28 @@ static bool plant_step(Unit *unit, double t, double h) {
         plant_follow_joints(unit, plant, &plant->modal[plant_head(unit)->cell], end);
     }
     plant_head(unit)->place = place;
+    return true;
+}
+
+static bool plant_step(Unit *unit, double t, double h) {
+    (void)t; /* the structure does not change with time */
+    Plant *plant = unit_derived(unit);
+    size_t count = 1;
+    if (plant->driven && !plant_substeps(unit, plant, h, &count)) {
+        return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (!plant_advance(unit, plant, count > 1 ? h / (double)count : h, i, count)) {
+            return false;
+        }
+    }
+    double *end = plant_state(unit);
     plant_show(unit, plant, plant->y);
-    if (joined) {
+    if (plant->guided || plant->driven) {
         plant_show_guides(unit, plant, end);
         plant_show_transmissions(unit, plant, end);
     }
-    if (mounted) {
+    if (plant->mounts.on) {
         plant_show_mounts(unit, plant, end);
     }
     if (plant->errors) {

@@ -31,6 +31,7 @@
 #define plant_slide_speed PREFIXED(plant_slide_speed)
 #define plant_tool_speed PREFIXED(plant_tool_speed)
 #define plant_start_joints PREFIXED(plant_start_joints)
+#define plant_substeps PREFIXED(plant_substeps)
 #define plant_join PREFIXED(plant_join)
 #define plant_follow_joints PREFIXED(plant_follow_joints)
 #define plant_show_guides PREFIXED(plant_show_guides)
@@ -115,17 +116,18 @@ typedef struct Plant {
     Mounts mounts;
 
     /* What follows counts where there is a guide or a transmission. */
-    Forecast *forecasts;                  /* [PORTS_SHOWN][axes], for */
-    const Modal *foretold;                /* this modal system */
-    double foretold_h;                    /* and this step */
-    double *held, *ramp;                  /* [axes][axes] mobilities of the slides */
-    double *by_angle, *by_n;              /* [axes][axes] what torques at the motors' ports add there */
-    double *v_free, *angle_free, *n_free; /* [axes] slides and motors' ports without these forces */
-    double *v, *angle, *n;                /* [axes] with some of them */
-    double *motor_u, *motor_du;           /* [axes] torques on the motors */
-    size_t *acting;                       /* [ports] where forces act, */
-    const double **shapes;                /* [ports] the modes' shapes there */
-    double *u_acting, *du_acting;         /* [ports] and the forces */
+    Forecast *forecasts;                /* [PORTS_SHOWN][axes], for */
+    const Modal *foretold;              /* this modal system */
+    double foretold_h;                  /* and this step */
+    double *held, *ramp;                /* [axes][axes] mobilities of the slides */
+    double *by_way, *by_n;              /* [axes][axes] what torques at the motors' ports add there */
+    double *by_way_ramp, *by_n_ramp;    /* [axes][axes] the same of their changes about the mean */
+    double *v_free, *way_free, *n_free; /* [axes] slides and motors' ports without these forces */
+    double *v, *way, *n;                /* [axes] with some of them */
+    double *motor_u, *motor_du;         /* [axes] torques on the motors */
+    size_t *acting;                     /* [ports] where forces act, */
+    const double **shapes;              /* [ports] the modes' shapes there */
+    double *u_acting, *du_acting;       /* [ports] and the forces */
 } Plant;
 
 /* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
@@ -140,7 +142,7 @@ typedef struct StateHead {
 } StateHead;
 
 /* What a Forecast is of. */
-typedef enum PortShown { SLIDE_SPEED, MOTOR_SPEED, MOTOR_ANGLE, PORTS_SHOWN } PortShown;
+typedef enum PortShown { SLIDE_SPEED, MOTOR_SPEED, MOTOR_WAY, PORTS_SHOWN } PortShown;
 
 enum {
     GUIDE_DOUBLES = sizeof(GuideState) / sizeof(double),
@@ -237,7 +239,10 @@ double plant_tool_speed(Unit *unit, const Plant *plant, const Modal *modal, size
 /* --- joints.c: friction at the guides, and transmissions */
 /* Their initial state; what the motors' ports of the state get is then the structure's. */
 void plant_start_joints(Unit *unit, Plant *plant, double *state);
-/* Ahead of a step: what they do over it, into `end` and among u and du. *acting: how many of shapes, u_acting and
+/* Into how many equal steps one of h is cut, so that each is short enough for the fastest contact; of the parameters
+ * and h alone. False with the reason logged where they are too many. */
+bool plant_substeps(Unit *unit, const Plant *plant, double h, size_t *count);
+/* Ahead of each of them: what they do over it, into `end` and among u and du. *acting: how many of shapes, u_acting and
  * du_acting there are. False with the reason logged. */
 bool plant_join(Unit *unit, Plant *plant, const Modal *modal, double *state, double *end, double h, size_t *acting);
 /* Behind it, with y measured: the structure as the modes of its cell have it. */

@@ -6,11 +6,11 @@
  *   C       = c e + d de/dt             e = dead zone of half the play b of delta: delta -+ b/2 in contact, 0 between
  *   delta   = angle of the motor less that of the structure
  *
- * So a stiff contact without play leaves the structure as it is. Over a step C and T are held at their means: C as the
- * quotient of the spring's energy and the way, (V+ - V)/(delta+ - delta) + d (e+ - e)/h, J dn_s/dt as J (n_s+ - n_s)/h.
- * The step is implicit, of second order, stable for any stiffness, and work and energy agree to rounding: the discrete
- * gradient of O. Gonzalez, Time integration and discrete Hamiltonian systems, J. Nonlinear Science 6 (1996). A wave of
- * angular frequency omega has a period longer by (omega h)^2/12 of itself.
+ * So a stiff contact without play leaves the structure as it is. Over a step, C and T are straight lines with the mean
+ * and the first moment of what they stand for: C along the cubic through delta and its speed at both ends, with the
+ * instants at which it enters or leaves the contact; J dn_s/dt by n_s at the ends and the way between. The step is
+ * implicit and symmetric in time: of fourth order while the contact holds, and the energy of a free contact stays
+ * within bounds. It settles where transmission_rate() times h is small; the caller sees to that.
  *
  * Angles in rad, torques in N.m, all at the motor. Pure functions; the memory is the caller's. */
 #ifndef FEEDSIM_TRANSMISSION_H
@@ -21,6 +21,7 @@
 
 #include "prefix.h"
 
+#define transmission_rate PREFIXED(transmission_rate)
 #define transmission_step PREFIXED(transmission_step)
 
 typedef struct Transmission {
@@ -29,24 +30,36 @@ typedef struct Transmission {
     double c, d; /* [N.m/rad], [N.m.s/rad] */
     double half; /* b/2 [rad] */
     double lead; /* for who shows it at the slide [m/rad] */
+    double rate; /* of it, transmission_rate() [1/s] */
 } Transmission;
 
 /* All numbers, so that it lies among those of a state. */
 typedef struct TransmissionState {
-    double angle, n;     /* of the motor [rad], [rad/s] */
-    double angle_s, n_s; /* of the structure at the rotor's port, which the caller writes */
-    double C;            /* torque of the contact at the end of the step [N.m] */
-    double T;            /* mean torque on the structure over the last step [N.m] */
-    double u;            /* M_a - M_fr at the end of the step [N.m] */
-    double heat;         /* of the damping since the start [J] */
+    double delta;   /* [rad] */
+    double n;       /* of the motor [rad/s] */
+    double n_s;     /* of the structure at the rotor's port, which the caller writes */
+    double C;       /* torque of the contact at the end of the step [N.m] */
+    double T, ramp; /* torque on the structure over the last step: its mean, and its change over it [N.m] */
+    double u;       /* M_a - M_fr at the end of the step [N.m] */
+    double heat;    /* of the damping since the start [J] */
 } TransmissionState;
 
-/* Advance over h [s] > 0 from start[axes] to end[axes], whose T are the torques for the structure. u, du [axes]: M_a -
- * M_fr at the start, and its change. angle_free, n_free [axes]: the structure at the end of the step with T = 0;
- * by_angle, by_n [axes][axes]: what a held T of 1 of each axis (column) adds there. False where a torque is no finite
- * number. *settled: the torques agree with one another, to 1e-6 of the largest at least. */
-bool transmission_step(size_t axes, const Transmission *p, const double *u, const double *du, const double *angle_free,
-                       const double *n_free, const double *by_angle, const double *by_n, const TransmissionState *start,
-                       TransmissionState *end, double h, bool *settled);
+/* What the structure shows at the rotors' ports at the end of a step. */
+typedef struct TransmissionPorts {
+    const double *way_free, *n_free;       /* [axes] with all T = 0: how far it turns, and its speed then */
+    const double *by_way, *by_n;           /* [axes][axes] what a held T of 1 of each axis (column) adds */
+    const double *by_way_ramp, *by_n_ramp; /* [axes][axes] the same of a T that runs from -1/2 to 1/2 */
+} TransmissionPorts;
+
+/* How fast the closed contact answers [1/s]: its angular frequency sqrt(c/J_r), or d/(2 J_r) where that is more;
+ * J_r: of J and J_s side by side, J_s > 0 the inertia of the structure that answers at once, without J. */
+double transmission_rate(const Transmission *p, double J_s);
+
+/* Advance over h [s] > 0 from start[axes] to end[axes], whose T and ramp are the torques for the structure. u, du
+ * [axes]: M_a - M_fr at the start, and its change. False where a torque is no finite number. *settled: the torques
+ * agree with one another, to 1e-6 of the largest at least. */
+bool transmission_step(size_t axes, const Transmission *p, const double *u, const double *du,
+                       const TransmissionPorts *ports, const TransmissionState *start, TransmissionState *end, double h,
+                       bool *settled);
 
 #endif

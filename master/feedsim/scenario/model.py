@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,14 +60,22 @@ class Scheme:
 SCHEMES = {scheme.name: scheme for scheme in (Scheme(*row) for row in units.cycle()["SCHEMES"])}
 
 
+MOST_STEPS = 1000  # in a control cycle
+# By how much [rad] a motor behind a contact swings on in an exchange step, about. Friction follows it from step to
+# step: the axes of the default machine stay within 2 nm of steps without end, with play and its impacts.
+SWING_IN_STEP = 0.037
+
+
 class Coupling(Model):
     """How plant and friction are exchanged."""
 
     scheme: Literal[tuple(SCHEMES)] = Field(  # type: ignore[valid-type]
         default="extrapolated", description="Order of the units and use of input slopes within an exchange step"
     )
-    substeps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
-        default=1, description="Exchange steps of plant and friction per control cycle"
+    substeps: Annotated[StrictInt, Field(ge=1, le=MOST_STEPS)] = Field(
+        default=1,
+        description="Exchange steps of plant and friction per control cycle; where it is not given, more with a stiff "
+        "transmission",
     )
     call_limit: Annotated[float, Quantity("s", above=0, example="60 s")] = Field(
         default=60.0, description="Time after which a call of another maker's unit is ended"
@@ -75,6 +84,20 @@ class Coupling(Model):
         default="separate",
         description="Structure, drives and friction as units of their own, or as one unit (machine.fmu), same results",
     )
+
+    def steps(self, machine: Machine) -> int:
+        """Exchange steps in a control cycle: `substeps` where it is given, else one, or what stiff contacts with play
+        need.
+
+        A motor of inertia J [kg.m2] behind a contact of stiffness k [N/m] swings with I_P sqrt(k/J) [rad/s]. One unit
+        that is run (`units: one`) takes one step; other makers' units have steps of their own.
+        """
+        if "substeps" in self.model_fields_set or self.units == "one" or machine.foreign_units:
+            return self.substeps
+        contacts = ((axis.I_P, axis.transmission) for axis in machine.axes.values() if axis.transmission is not None)
+        swings = (I_P * math.sqrt(contact.stiffness / contact.inertia) for I_P, contact in contacts if contact.play > 0)
+        swing = max(swings, default=0.0) * machine.cycles.T_c
+        return max(1, min(round(swing / SWING_IN_STEP), MOST_STEPS))
 
 
 # --- A scenario: a machine, its motions, how the units are coupled, what is recorded and what is evaluated ------------

@@ -190,7 +190,7 @@ TRUSTED_SHARE, TRUSTED_ENERGY = 3e-4, 1e-3
 def exchange_stability(scenario: Scenario, modes: Modes) -> list[str]:
     """Explicit exchange needs a friction slope well below 2 J_inf/h."""
     scheme = SCHEMES[scenario.coupling.scheme]
-    step = scenario.machine.cycles.T_c / scenario.coupling.substeps
+    step = scenario.machine.cycles.T_c / scenario.coupling.steps(scenario.machine)
     warnings: list[str] = []
     unknown = [name for name, axis in scenario.machine.axes.items() if isinstance(axis.friction, ForeignUnit)]
     if unknown:
@@ -215,14 +215,12 @@ def exchange_stability(scenario: Scenario, modes: Modes) -> list[str]:
 def energy(run: Run, loops: Sequence[Loop]) -> list[str]:
     """The coupling is blamed where nothing else is known to make an axis chatter."""
     coupling = run.scenario.coupling
-    step = run.scenario.machine.cycles.T_c / coupling.substeps
+    steps = coupling.steps(run.scenario.machine)
+    step = run.scenario.machine.cycles.T_c / steps
     if any(loop.growing for loop in loops):
         why = "that is a consequence of the unstable control loop, and says nothing of the coupling"
     else:
-        why = (
-            "it is unstable or too coarse, and the result is not to be trusted; try coupling.substeps above "
-            f"{coupling.substeps}"
-        )
+        why = f"it is unstable or too coarse, and the result is not to be trusted; try coupling.substeps above {steps}"
     return [
         f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
         f"friction work (scheme {coupling.scheme}, exchange step {step * 1e6:.6g} us): {why}"

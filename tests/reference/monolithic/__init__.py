@@ -61,7 +61,7 @@ def _input(machine: Machine, setpoints: Setpoints, cycles: int, steps: int) -> b
     parts.append(modes.ravel().tolist())
     parts.append([float(len(machine.mounts)), *machine.mounts.ravel().tolist()])
     for name, axis in machine.axes.items():
-        parts.append([axis.x_0, axis.M_0])
+        parts.append([axis.x_0, axis.M_0, *axis.contact])
         parts.append([axis.friction[key] for key in FRICTION_KEYS] + [axis.drive[key] for key in DRIVE_KEYS])
         parts.append([*setpoints.x_s[name].tolist(), *setpoints.n_ffw[name].tolist()])
     return "".join("\n".join(repr(v) for v in part) + "\n" for part in parts).encode()

@@ -32,12 +32,17 @@ T_SYM_HELD = {"X": 4.416e-3, "Y": 3.621e-3, "Z": 3.090e-3}
 
 @dataclass
 class Axis:
-    """One feed axis: start position [m], constant load [N.m], friction and drive parameters by name (SI)."""
+    """One feed axis: start position [m], constant load [N.m], friction and drive parameters by name (SI).
+
+    contact: inertia on the motor's side [kg.m2], stiffness [N.m/rad], damping [N.m.s/rad], half of the play [rad]; of
+    one axis at most; inertia 0: none.
+    """
 
     x_0: float
     M_0: float
     friction: dict[str, float]
     drive: dict[str, float]
+    contact: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass

@@ -93,7 +93,7 @@ static void read_axis(FILE *file, Friction *f, Drive *d) {
 static void record(FILE *file, const double *x_start, const double *M_a) {
     for (int a = 0; a < machine.axes; ++a) {
         const Control *c = &control[a];
-        double n = dot(machine.n_port[a], state.v, machine.modes);
+        double n = motor_speed(&machine, &state, a);
         double row[] = {x_start[a] + dot(machine.x_port[a], state.q, machine.modes),
                         n,
                         M_a[a],
@@ -144,6 +144,7 @@ int main(int argc, char **argv) {
         return 1;
     }
     read_mounts(input, modes);
+    int contacts = 0;
     double x_start[MAX_AXES], M_a[MAX_AXES] = {0}, M_next[MAX_AXES];
     for (int a = 0; a < machine.axes; ++a) {
         Drive *drive = &control[a].drive;
@@ -151,6 +152,12 @@ int main(int argc, char **argv) {
         drive->T_pos = T_pos;
         x_start[a] = number(input, "start position");
         machine.M_0[a] = number(input, "M_0");
+        Contact *contact = &machine.contact[a];
+        double *const values[] = {&contact->J, &contact->c, &contact->d, &contact->half};
+        for (size_t i = 0; i < sizeof values / sizeof *values; ++i) {
+            *values[i] = number(input, "contact");
+        }
+        contacts += contact->J > 0;
         read_axis(input, &machine.friction[a], drive);
         double *series = malloc(2 * (size_t)setpoints * sizeof *series);
         for (int i = 0; i < 2 * setpoints; ++i) {
@@ -162,10 +169,14 @@ int main(int argc, char **argv) {
         control[a].setpoints = setpoints;
         control_start(&control[a]);
     }
+    if (contacts > 1) {
+        fprintf(stderr, "monolithic: more than one contact\n");
+        return 1;
+    }
     for (long k = 0; k <= cycles; ++k) {
         for (int a = 0; a < machine.axes; ++a) {
             double x_a = x_start[a] + dot(machine.x_port[a], state.q, machine.modes);
-            M_next[a] = control_sample(&control[a], k, x_a, dot(machine.n_port[a], state.v, machine.modes));
+            M_next[a] = control_sample(&control[a], k, x_a, motor_speed(&machine, &state, a));
         }
         record(output, x_start, M_a);
         for (int a = 0; a < machine.axes; ++a) {

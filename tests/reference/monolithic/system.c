@@ -15,6 +15,14 @@ static double clip(double value, double limit) {
     return value > limit ? limit : value < -limit ? -limit : value;
 }
 
+double motor_speed(const System *s, const State *x, int a) {
+    return s->contact[a].J > 0 ? x->motor_n[a] : dot(s->n_port[a], x->v, s->modes);
+}
+
+static double contact_torque(const Contact *p, double delta, double rate) {
+    return fabs(delta) > p->half ? p->c * (delta - copysign(p->half, delta)) + p->d * rate : 0;
+}
+
 static double steady_deflection(const Friction *p, double n) {
     double speed = fabs(n);
     double ratio = speed / p->v_s;
@@ -40,6 +48,7 @@ double friction_torque(const Friction *p, double n, double z, double c, double *
 /* Time derivative of the whole state at one Runge-Kutta stage; dq/dt is v and needs no room of its own. */
 typedef struct {
     double v[MAX_MODES], z[MAX_AXES], c[MAX_AXES];
+    double motor_n[MAX_AXES], delta[MAX_AXES];
     double F_f[MAX_MOUNTS], F_v[MAX_MOUNTS], E[MAX_MOUNTS];
 } Rate;
 
@@ -56,9 +65,18 @@ static double mount_force(const Mount *p, const State *x, int m, double speed, R
 static void rate_of(const System *s, const State *x, const double *M_a, Rate *rate) {
     double F[MAX_AXES];
     for (int a = 0; a < s->axes; ++a) {
-        double n = dot(s->n_port[a], x->v, s->modes);
+        const Contact *contact = &s->contact[a];
+        double n = motor_speed(s, x, a);
         double c = clip(x->c[a], s->friction[a].W / 2);
-        F[a] = M_a[a] - s->M_0[a] - friction_torque(&s->friction[a], n, x->z[a], c, &rate->z[a]);
+        F[a] = M_a[a] - friction_torque(&s->friction[a], n, x->z[a], c, &rate->z[a]);
+        rate->motor_n[a] = rate->delta[a] = 0;
+        if (contact->J > 0) {
+            rate->delta[a] = n - dot(s->n_port[a], x->v, s->modes);
+            const double C = contact_torque(contact, x->delta[a], rate->delta[a]);
+            rate->motor_n[a] = (F[a] - C) / contact->J;
+            F[a] = C;
+        }
+        F[a] -= s->M_0[a];
         rate->c[a] = n;
     }
     for (int i = 0; i < s->modes; ++i) {
@@ -76,6 +94,15 @@ static void rate_of(const System *s, const State *x, const double *M_a, Rate *ra
             rate->v[i] -= port[i] * force;
         }
     }
+    for (int a = 0; a < s->axes; ++a) { /* J dn/dt of the structure is no load of it */
+        const double J = s->contact[a].J, *port = s->n_port[a];
+        if (J > 0) {
+            const double more = J * dot(port, rate->v, s->modes) / (1 - J * dot(port, port, s->modes));
+            for (int i = 0; i < s->modes; ++i) {
+                rate->v[i] += port[i] * more;
+            }
+        }
+    }
 }
 
 /* out = x + h * rate, where the rate of q is the v of the stage the rate belongs to. */
@@ -89,6 +116,8 @@ static void shifted(const System *s, const State *x, const State *stage, const R
     for (int a = 0; a < s->axes; ++a) {
         out->z[a] = x->z[a] + h * rate->z[a];
         out->c[a] = x->c[a] + h * rate->c[a];
+        out->motor_n[a] = x->motor_n[a] + h * rate->motor_n[a];
+        out->delta[a] = x->delta[a] + h * rate->delta[a];
     }
     for (int m = 0; m < s->mounts; ++m) {
         out->F_f[m] = x->F_f[m] + h * rate->F_f[m];
@@ -129,6 +158,8 @@ void advance(const System *s, State *x, double T, int steps, const double *M_beg
             x->v[i] = v + h / 6 * (k1.v[i] + 2 * k2.v[i] + 2 * k3.v[i] + k4.v[i]);
         }
         for (int a = 0; a < s->axes; ++a) {
+            x->motor_n[a] += h / 6 * (k1.motor_n[a] + 2 * k2.motor_n[a] + 2 * k3.motor_n[a] + k4.motor_n[a]);
+            x->delta[a] += h / 6 * (k1.delta[a] + 2 * k2.delta[a] + 2 * k3.delta[a] + k4.delta[a]);
             x->z[a] += h / 6 * (k1.z[a] + 2 * k2.z[a] + 2 * k3.z[a] + k4.z[a]);
             x->c[a] = clip(x->c[a] + h / 6 * (k1.c[a] + 2 * k2.c[a] + 2 * k3.c[a] + k4.c[a]), s->friction[a].W / 2);
         }

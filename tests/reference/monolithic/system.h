@@ -21,9 +21,16 @@ typedef struct {
     double port[MAX_MODES];
 } Mount;
 
+/* Between a motor of inertia J and the structure, which holds J: C = c e + d de/dt, e the dead zone of +-half of the
+ * angle of the motor less that of the structure. J = 0: none. */
+typedef struct {
+    double J, c, d, half;
+} Contact;
+
 typedef struct {
     int axes, modes; /* modes: padded to whole vectors with zero columns */
     Friction friction[MAX_AXES];
+    Contact contact[MAX_AXES]; /* of one axis at most */
     double M_0[MAX_AXES];
     double stiffness[MAX_MODES], damping[MAX_MODES]; /* omega^2 [1/s^2], 2 D omega [1/s]; mass-normalised */
     double n_port[MAX_AXES][MAX_MODES];              /* torque in, speed out */
@@ -36,10 +43,14 @@ typedef struct {
 typedef struct {
     double q[MAX_MODES], v[MAX_MODES]; /* modal displacement and its derivative */
     double z[MAX_AXES], c[MAX_AXES];
+    double motor_n[MAX_AXES], delta[MAX_AXES]; /* of motors with a contact: speed, angle ahead of the structure */
     double F_f[MAX_MOUNTS], F_v[MAX_MOUNTS];
     double F_s[MAX_MOUNTS], side[MAX_MOUNTS]; /* of mounts: force at the last reversal, sign of the speed since */
     double E[MAX_MOUNTS];                     /* work done against K_e x + F_f + F_v */
 } State;
+
+/* Speed of a motor. */
+double motor_speed(const System *system, const State *state, int axis);
 
 double dot(const double *a, const double *b, int count);
 

@@ -526,7 +526,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
         *sentences(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
-    scheme, step = SCHEMES[coupling.scheme], machine.cycles.T_c / coupling.substeps
+    scheme, step = SCHEMES[coupling.scheme], machine.cycles.T_c / coupling.steps(machine)
     bounds = {name: scheme.stable_share * 2 * modes.J_inf(name) / step for name in machine.axes}
     # Judged is all friction of an axis, wherever it acts.
     friction = {f"{name}.friction.{key}": value for name, axis in machine.axes.items()

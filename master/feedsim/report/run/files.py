@@ -244,7 +244,7 @@ def details(
             "set": list(scenario.settings),
             "overrides": list(scenario.overrides),
             "duration": quantity(run.program.duration, "s"),
-            "coupling": scenario.coupling.model_dump(),
+            "coupling": scenario.coupling.model_dump() | {"substeps": scenario.coupling.steps(machine)},
             "recording_interval": quantity(scenario.recording.interval, "s"),
             "logging": logging_part(scenario.logging, run.log),
             "motions": [

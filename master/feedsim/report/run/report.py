@@ -471,7 +471,7 @@ def provenance(run: JudgedRun) -> Section:
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
         (
             "Coupling",
-            f"{coupling.scheme}, {counted(coupling.substeps, 'exchange step')} per control cycle"
+            f"{coupling.scheme}, {counted(coupling.steps(machine), 'exchange step')} per control cycle"
             + (", inside one unit" if coupling.units == "one" else ""),
         ),
     ]

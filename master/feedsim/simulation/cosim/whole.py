@@ -122,7 +122,7 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
         )
     values: dict[str, Parameter] = {
         "coupling.scheme": SCHEMES[coupling.scheme].number,
-        "coupling.substeps": coupling.substeps,
+        "coupling.substeps": coupling.steps(machine),
         "motion.built_in": built_in,
     }
     for name, axis in machine.axes.items():
@@ -147,7 +147,7 @@ def system_of(machine: Machine, coupling: Coupling, fmus: Path, *, only_shipped:
 def cycle_of(system: System, coupling: Coupling) -> Cycle:
     """A control cycle of such a system."""
     kind = WholeCycle if isinstance(system, Whole) else Cycle
-    return kind(system, SCHEMES[coupling.scheme], system.machine.cycles.T_c, coupling.substeps)
+    return kind(system, SCHEMES[coupling.scheme], system.machine.cycles.T_c, coupling.steps(system.machine))
 
 
 class Whole(System):

@@ -184,6 +184,36 @@ def test_a_load_goes_with_the_scale_of_the_torques(log: Path) -> None:
     assert np.max(np.abs(moved(1.0, 2.0) - moved(1.0, 1.0))) > 1e-6
 
 
+def test_rests_at_both_ends_are_not_run_where_motion_is_asked_for(log: Path) -> None:
+    """The motion is that of the whole record; ahead of it and behind it the axis stays as the run begins and ends."""
+    machine = load_machine(MACHINE)
+    whole = windowed("Z", read_axes(log, ["Z"], machine)["Z"], None)
+    still = np.full(200, 1.0)
+
+    def longer(values: Array) -> Array:
+        return np.concatenate([still * values[0], values, still * values[-1]])
+
+    assert whole.record.setpoint is not None
+    assert whole.record.angle is not None
+    record = replace(
+        whole.record, time=whole.record.interval * np.arange(len(whole.record) + 400),
+        torque=longer(whole.record.torque), angle=longer(whole.record.angle), setpoint=longer(whole.record.setpoint),
+        deviation=None, speed_setpoint=None, feedforward=None, speed=None,
+    )  # fmt: skip
+    each = replace(whole, record=record, rows=np.ones(len(record), dtype=bool))
+    with Replay(machine, {"Z": each}) as all_rows, Replay(machine, {"Z": each}, only_motion=True) as motion:
+        first, last = motion.run
+        assert last - first < 0.75 * len(record)
+        assert first <= each.first_moving < np.max(np.flatnonzero(each.moving)) <= last
+        for per_row in (1, 2):
+            asked = machine, ("x_a", "M_a"), per_row
+            one, other = (replay.follow(*asked)["Z"] for replay in (all_rows, motion))
+            rows = np.flatnonzero(np.repeat(each.moving, per_row)[: len(one["x_a"])])
+            assert other["x_a"][rows] == pytest.approx(one["x_a"][rows], abs=2e-9)
+            assert other["M_a"][rows] == pytest.approx(one["M_a"][rows], abs=2e-3)
+            assert np.ptp(other["x_a"][: first * per_row + 1]) == np.ptp(other["x_a"][last * per_row :]) == 0
+
+
 def test_a_torque_logged_late_is_told(log: Path, tmp_path: Path) -> None:
     whole = read_csv(log)
     late = np.interp(whole.time - 0.7e-3, whole.time, whole["Z.M_a"])

@@ -87,6 +87,9 @@ BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
 # The state of drive and friction is not known where a record begins in motion; it has died away after that.
 START_TRANSIENT = 0.1  # [s]
 CYCLES_BEHIND = 4  # position cycles that the program goes on behind the last row
+# [s] of rest that are run ahead of the first motion and behind the last one, where only motion is asked for. Behind it
+# that is more than a torque may be late.
+REST_AHEAD, REST_BEHIND = 0.1, 0.01
 # The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.
 MOVES, FOLLOWS = 1e-4, 0.02  # share, [s]
 CLEARLY_NEARER = 0.5  # of the sum of squares that is off
@@ -251,7 +254,8 @@ class Replay(Closing):
 
     Attributes:
         records: axis -> its record; all over the same time.
-        lead: time that the run begins ahead of the first row [s].
+        lead: time that the run begins ahead of its first row [s].
+        run: rows that are run, the first and the last one.
         preloaded: whether axes rest with the torque of their records ahead of the first motion; else friction takes up
             what the constant load leaves it.
 
@@ -265,7 +269,10 @@ class Replay(Closing):
         *,
         coupling: Coupling | None = None,
         fmus: Path | None = None,
+        only_motion: bool = False,
     ) -> None:
+        """only_motion: rests ahead of the first motion and behind the last one are not run; the axes have in these rows
+        what they have where the run begins and ends."""
         self.records, self._follower = dict(records), Follower(coupling=coupling, fmus=fmus)
         one = next(iter(records.values())).record
         self.time, self.interval = one.time, one.interval
@@ -284,13 +291,14 @@ class Replay(Closing):
                 f"{one.name}: {1e3 * self.interval:.6g} ms between rows are no whole multiple of the control cycle of "
                 f"{machine.name}, {1e6 * T_c:.6g} us; set machine.cycles.control"
             )
+        self.run = self._rows_in_motion(machine) if only_motion else (0, len(self.time) - 1)
         self.pose = dict(machine.pose)
         self._into = {}
         for axis, value in records.items():
             speed = float(self._spline(value)(0.0, 1)) if _begins_in_motion(value.record) else 0.0
             limits = machine.axes[axis].max_acceleration, machine.path.jerk
             self._into[axis] = speed_change(speed, *limits)
-            self.pose[axis] = float(value.setpoint[0]) - self._into[axis].distance
+            self.pose[axis] = float(value.setpoint[self.run[0]]) - self._into[axis].distance
         run_in = max(change.duration for change in self._into.values())
         self.lead = self.interval * np.ceil((SETTLING_TIME + run_in) / self.interval)
         self.preloaded = False
@@ -304,6 +312,15 @@ class Replay(Closing):
             self._load(axis_record) for axis_record in records.values() if axis_record.record.load is not None
         ]
 
+    def _rows_in_motion(self, machine: Machine) -> tuple[int, int]:
+        """The first and the last row of a run of what moves, and of some rest; the first at the begin of a cycle."""
+        first = min(record.first_moving for record in self.records.values()) - round(REST_AHEAD / self.interval)
+        last = max(int(np.max(np.flatnonzero(record.moving), initial=0)) for record in self.records.values())
+        per_cycle = max(round(machine.cycles.T_pos / self.interval), 1)
+        last = min(last + math.ceil(REST_BEHIND / self.interval), len(self.time) - 1)
+        first = max(first, 0) // per_cycle * per_cycle
+        return (first, last) if first < last else (0, len(self.time) - 1)
+
     @staticmethod
     def _spline(axis_record: AxisRecord) -> CubicSpline:
         return CubicSpline(axis_record.record.time - axis_record.record.time[0], axis_record.setpoint)
@@ -312,8 +329,9 @@ class Replay(Closing):
         """The known load of a record over the time of the run; ahead of the record it is that of the first row."""
         record = axis_record.record
         assert record.load is not None
-        time = np.concatenate([[0.0], self.time - self.time[0] + self.lead])
-        torque = np.concatenate([record.load[:1], record.load])
+        first = self.run[0]
+        time = np.concatenate([[0.0], self.time[first:] - self.time[first] + self.lead])
+        torque = np.concatenate([record.load[first : first + 1], record.load[first:]])
         place = f"load of {record.name}"
         if record.load_on_slide:  # a force counts in the direction of the axis there
             return Acting(place, SlideLoad.model_construct(axis=axis_record.axis), time, -torque / axis_record.I_P)
@@ -357,21 +375,21 @@ class Replay(Closing):
         return Program(program.time, x_s, n_ffw)
 
     def _planned(self, machine: Machine, T_pos: float) -> Program:
-        length = float(self.time[-1] - self.time[0])
-        count = int(np.ceil((self.lead + length) / T_pos)) + CYCLES_BEHIND
+        begin, end = (float(self.time[row] - self.time[0]) for row in self.run)
+        count = int(np.ceil((self.lead + (end - begin)) / T_pos)) + CYCLES_BEHIND
         time = T_pos * np.arange(count + 1, dtype=np.float64)
         x_s = {axis: np.full(len(time), position) for axis, position in machine.pose.items()}
         n_ffw = {axis: np.zeros(len(time)) for axis in machine.axes}
         for axis, axis_record in self.records.items():
             spline, into = self._spline(axis_record), self._into[axis]
             own = time - self.lead
-            within = np.clip(own, 0.0, length)
+            within = np.clip(own + begin, begin, end)
             x, v = spline(within), spline(within, 1)
-            ahead, behind = own < 0, own > length
+            ahead, behind = own < 0, own > end - begin
             covered, v[ahead] = into.at(own[ahead] + into.duration)
-            x[ahead] = covered - into.distance + float(axis_record.setpoint[0])
+            x[ahead] = covered - into.distance + float(axis_record.setpoint[self.run[0]])
             # Nothing is compared behind the last row: the axis goes on as it was.
-            x[behind] += v[behind] * (own[behind] - length)
+            x[behind] += v[behind] * (own[behind] - (end - begin))
             x_s[axis], n_ffw[axis] = x, v / machine.axes[axis].I_P
         return Program(time, x_s, n_ffw)
 
@@ -391,10 +409,13 @@ class Replay(Closing):
         trace = self._follower.follow(
             machine, self.program(machine, scale), columns, self.interval / per_row, loads=loads
         )
+        begin, end = self.run
         first = round(self.lead / self.interval) * per_row
-        rows = slice(first, first + (len(self.time) - 1) * per_row + 1)
+        rows = slice(first, first + (end - begin) * per_row + 1)
+        beside = begin * per_row, (len(self.time) - 1 - end) * per_row
         return {
-            axis: {signal: np.array(trace[f"{axis}.{signal}"][rows]) for signal in signals} for axis in self.records
+            axis: {signal: np.pad(trace[f"{axis}.{signal}"][rows], beside, "edge") for signal in signals}
+            for axis in self.records
         }
 
     def close(self) -> None:

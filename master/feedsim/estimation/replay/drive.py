@@ -248,6 +248,8 @@ class DriveFound:
         rivals: structures of the drive that were tried besides.
         modes: elastic ones. modes_predicted: number of modes -> rms of the position [m] of every quarter of the motion,
             by a fit to the other three. correlation: of the estimates that have an interval.
+        simulated: first and last instant of the record that the units were run over [s]: without its rests at both
+            ends.
     """
 
     axis: str
@@ -266,6 +268,7 @@ class DriveFound:
     modes_predicted: Mapping[int, float] = field(default_factory=dict)
     correlation: Correlation | None = None
     rivals: Sequence[Tried] = ()
+    simulated: tuple[float, float] = (nan, nan)
 
 
 def identify_drive(
@@ -392,6 +395,7 @@ def identify_drive(
         rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, other, problem.runs,
         elastic_modes(problem, found, unseen), elastic,
         correlation_of(problem, found, unseen, delay, gain, estimates), rivals,
+        (float(replay.time[replay.run[0]]), float(replay.time[replay.run[1]])),
     )  # fmt: skip
 
 

@@ -294,6 +294,10 @@ def report_of(report: DriveReport) -> Report:
     rows = [
         ("Record", report.sources[0].file.name),
         ("Runs of the units", str(sum(one.runs for one in drives.values()))),
+        (
+            "Simulated, without rests at the ends",
+            ", ".join(f"{axis} {one.simulated[0]:.4g} to {one.simulated[1]:.4g} s" for axis, one in drives.items()),
+        ),
     ]
     return Report(
         f"Drive of {', '.join(drives)}",
@@ -467,6 +471,7 @@ def details(report: DriveReport) -> dict[str, Any]:
                 "modes_predicted": {str(count): value for count, value in one.modes_predicted.items()},
                 "limits": _limits_part(report.found.limits.get(axis)),
                 "runs": one.runs,
+                "simulated": {"from": one.simulated[0], "to": one.simulated[1], "unit": "s"},
             }
             for axis, one in report.found.drives.items()
         },

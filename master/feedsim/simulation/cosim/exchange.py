@@ -93,6 +93,11 @@ def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[No
     return None, (Note(f"the cycle loop ran in Python, some 30 times slower than the native one, same bits: {why}"),)
 
 
+def _address(array: NDArray[Any]) -> int:
+    """Of its first entry; array.ctypes takes five times as long."""
+    return int(array.__array_interface__["data"][0])
+
+
 class Exchange(Executor):
     """Has operations worked by the native loop."""
 
@@ -105,21 +110,24 @@ class Exchange(Executor):
         self._table = np.zeros(len(self._operations) + 1, dtype=_OPERATION)
         self._table["kind"] = OPERATION_CODES.index("end")
         for at, operation in enumerate(self._operations):
-            self._write(self._table[at], operation)
+            self._table[at] = self._row(operation)
 
-    def _write(self, row: Any, o: Operation) -> None:
-        row["kind"], row["count"], row["s"], row["h"] = OPERATION_CODES.index(o.kind), o.count, o.s, o.h
-        for name in ("references", "orders", "y", "a", "b"):
-            row[name] = getattr(o, name).ctypes.data
+    def _row(self, o: Operation) -> tuple[float, ...]:
+        """Its fields, in their order. A row at once is written in a tenth of the time of its fields one by one."""
+        kind, what, call, component, a = OPERATION_CODES.index(o.kind), 0, 0, 0, _address(o.a)
+        first = every = stride = rows = 0
         if o.unit is not None and o.kind != "finite":
-            row["call"], row["component"] = o.unit.address(o.kind), o.unit.component
+            call, component = o.unit.address(o.kind), o.unit.component
         if o.bond is not None:
-            self._bonds.append(np.array([getattr(o.bond, name).ctypes.data for name in BOND], dtype=np.uintp))
-            row["a"] = self._bonds[-1].ctypes.data
+            self._bonds.append(np.array([_address(getattr(o.bond, name)) for name in BOND], dtype=np.uintp))
+            a = _address(self._bonds[-1])
         if o.when is not None:
-            row["kind"], row["what"] = OPERATION_CODES.index("due"), row["kind"]
-            row["next"], row["every"] = o.when.first, o.when.every
-            row["rows"], row["stride"] = len(o.y), o.y.strides[0]
+            kind, what = OPERATION_CODES.index("due"), kind
+            first, every, rows, stride = o.when.first, o.when.every, len(o.y), o.y.strides[0]
+        references, orders, y, b = (_address(array) for array in (o.references, o.orders, o.y, o.b))
+        return (
+            kind, o.count, call, component, references, orders, y, o.s, o.h, a, b, what, every, first, stride, rows, 0
+        )  # fmt: skip
 
     def run(self, begin: int, end: int) -> None:
         mark = self.mark

@@ -26,7 +26,7 @@ from identification_logs import FLAWS, Log, made, names
 from feedsim.estimation.identify import Asked, identify, named_apart, read_traces
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.columns import load_columns
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 
 LONGEST = 120  # s of one core: a log that takes longer is given up
@@ -55,7 +55,7 @@ class Outcome:
     errors: dict[str, float]
     sigmas: dict[str, float]
     states: dict[str, str]
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
     advice: tuple[str, ...]
     seconds: float
 
@@ -67,7 +67,7 @@ class Outcome:
     @property
     def named(self) -> bool:
         """Whether a warning names the cause: a word of each flaw that there is, or of one of them."""
-        said = " ".join(self.warnings).lower()
+        said = " ".join(map(str, self.warnings)).lower()
         return any(word in said for flaw in self.flaws for word in FLAWS[flaw].words)
 
 
@@ -91,7 +91,7 @@ def judged(log: Log) -> Outcome:
     errors: dict[str, float] = {}
     sigmas: dict[str, float] = {}
     states: dict[str, str] = {}
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     advice: tuple[str, ...] = ()
     refused = ""
     begun = process_time()
@@ -102,7 +102,7 @@ def judged(log: Log) -> Outcome:
             asked = Asked(axis="Z", inertia=log.inertia, delay=log.delay)
             with FrictionLaw() as law:
                 found = identify(named_apart(recorded), law, asked.with_traces(sources))
-        warnings = (*(text for source in sources for text in source.warnings), *found.warnings)
+        warnings = (*(finding for source in sources for finding in source.warnings), *found.warnings)
         advice = found.advice
         for name, estimate in found.estimates.items():
             states[name] = estimate.status

@@ -24,6 +24,7 @@ from feedsim.estimation.identify.result import (
     Stretch,
 )
 from feedsim.files.trace import Trace
+from feedsim.foundation.errors import Finding
 from feedsim.scenario import load_subject
 from scenario_helpers import MACHINE
 
@@ -143,7 +144,8 @@ def identification(**changes: Any) -> Identification:
     names = tuple(name for name, each in found.items() if each.status == "estimated")
     whole = Identification(
         "Z", I_P, found, correlation(names, 5), stationary(found), dynamic(found),
-        ("sigma_1 is known to 6.7 % only",), ("add a sine of 2 um at 20 Hz",),
+        (Finding("parameter-uncertain", "doubt", "sigma_1 is known to 6.7 % only", "sigma_1"),),
+        ("add a sine of 2 um at 20 Hz",),
         {"stage 1": 0.4, "stage 2": 2.5},
         {"J": replace(found["J"], sigma=1e-4, status="estimated"), "F_C": replace(found["F_C"], value=1.9)},
     )  # fmt: skip

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import subprocess
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from feedsim.foundation.errors import Finding
 from feedsim.report.live_page.html import computing
 
 NODE = shutil.which("node")
@@ -47,6 +47,6 @@ def answers(data: dict[str, Any], asked: list[dict[str, Any]], folder: Path) -> 
     return found
 
 
-def without_loops(warnings: Iterable[str]) -> list[str]:
+def without_loops(warnings: Iterable[Finding]) -> list[str]:
     """What a run warns of and a page does, too: a page does not judge loops, it has a frequency response."""
-    return sorted(str(text) for text in warnings if not re.match(r"axis \w+: the (speed|position) loop ", str(text)))
+    return sorted(finding.text for finding in warnings if finding.code not in ("loop-unstable", "loop-margins-thin"))

@@ -13,6 +13,7 @@ import numpy as np
 
 from feedsim.analysis import Figure, Named, diagnoses
 from feedsim.files.trace import Trace
+from feedsim.foundation.errors import Finding
 from feedsim.jobs.run import result_of
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.report.page import Partial
@@ -37,7 +38,7 @@ class FakeRun:
         default_factory=lambda: {"plant": {"guid": "0011223344556677-8899aabbccddeeff", "version": "0.1.0"}}
     )
     pose: PoseUse | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     loads: tuple[Work, ...] = ()
     log: Trace | None = None
     native: bool = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import csv
 import re
 import tokenize
 from collections import defaultdict
@@ -183,3 +184,39 @@ def test_names_say_what_they_are_of() -> None:
 def test_a_private_word_is_found() -> None:
     tree = ast.parse('"""It is told."""\ndef f():\n    """Not told."""\n    raise E(f"{x} cannot be told")\n')
     assert [each.lineno for each in texts(tree) if PRIVATE.search(str(each.value))] == [4]
+
+
+# --- codes of findings ------------------------------------------------------------------------------------------------
+
+
+def produced() -> dict[str, list[str]]:
+    """Codes with which the package makes findings -> where. A call without a literal code fails, but for one that has
+    the fields of an entry (``**entry``)."""
+    found = defaultdict(list)
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Finding"):
+                continue
+            if not node.args and [keyword.arg for keyword in node.keywords] == [None]:
+                continue
+            code = node.args[0]
+            for each in (code.body, code.orelse) if isinstance(code, ast.IfExp) else (code,):
+                assert isinstance(each, ast.Constant), f"{path}:{node.lineno}: the code is no literal"
+                found[str(each.value)].append(f"{path.relative_to(PACKAGE)}:{node.lineno}")
+    return found
+
+
+def test_every_code_of_a_finding_is_in_the_table_and_every_code_of_the_table_is_produced() -> None:
+    with (PACKAGE / "foundation" / "findings.csv").open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    assert head == ["code", "meaning"]
+    codes, places = [code for code, _ in rows], produced()
+    assert codes == sorted({*codes})
+    assert {code: places[code] for code in {*places} - {*codes}} == {}
+    assert {*codes} - {*places} == set()
+    for code, meaning in rows:
+        assert re.fullmatch(r"[a-z]+(-[a-z]+)+", code), code
+        assert meaning
+        assert not PRIVATE.search(meaning), code
+    # One place, or a few that mean the same.
+    assert max(map(len, places.values())) <= 4

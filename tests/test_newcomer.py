@@ -105,11 +105,21 @@ def literals() -> Iterator[str]:
                 yield node.value
 
 
+def finding_codes() -> list[str]:
+    """Codes of the table of findings."""
+    table = (ROOT / "master" / "feedsim" / "foundation" / "findings.csv").read_text(encoding="utf-8")
+    return [line.partition(",")[0] for line in table.splitlines()[1:]]
+
+
 def test_messages_that_the_page_explains_are_those_of_the_program() -> None:
     page = (DOCS / "how-to" / "warnings.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (.*?) \|", page, re.MULTILINE)
-    quoted = [quote for row in rows for quote in re.findall(r"`([^`]+)`", row)]
-    assert len(quoted) > 12
+    findings, _, errors = page.partition("## Errors")
+    codes, quoted = (
+        [quote for row in re.findall(r"^\| (.*?) \|", part, re.MULTILINE) for quote in re.findall(r"`([^`]+)`", row)]
+        for part in (findings, errors)
+    )
+    assert (len(codes), len(quoted)) == (13, 5)
+    assert {*codes} <= {*finding_codes()}
     texts = list(literals())
     for quote in quoted:
         parts = [part.strip() for part in quote.split("...") if part.strip()]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import inspect
 import json
 import os
@@ -65,9 +66,22 @@ def pages() -> dict[str, str]:
         "variables": variables(),
         "control-names": control_names(),
         "signal-names": signal_names(),
+        "findings": findings(),
         "benchmarks": benchmarks(),
         "gallery": gallery(),
     }
+
+
+def findings() -> str:
+    """What results may warn of or note: codes, and what they mean."""
+    with (ROOT / "master" / "feedsim" / "foundation" / "findings.csv").open(encoding="utf-8", newline="") as file:
+        _, *rows = csv.reader(file)
+    return "\n".join([
+        "# Findings", "", "Codes of all findings of results: in Python, in `summary.json` and behind `--json`. A code "
+        "keeps its meaning from version to version; texts may change. What to do: "
+        "[a warning, or a result that looks wrong](../how-to/warnings.md).", "", "| code | meaning |", "|---|---|",
+        *(f"| `{code}` | {meaning} |" for code, meaning in rows), "",
+    ])  # fmt: skip
 
 
 def gallery() -> str:

@@ -35,8 +35,9 @@ ELSEWHERE = {
 # Sources of pages of the reference: a link to one is a link to the page.
 MADE = {
     DOCS / "benchmarks": "reference/benchmarks.md",
-    ROOT / "master" / "feedsim" / "control" / "names.csv": "reference/control-names.md",
-    ROOT / "master" / "feedsim" / "identify" / "signals.py": "reference/signal-names.md",
+    ROOT / "master" / "feedsim" / "files" / "control" / "names.csv": "reference/control-names.md",
+    ROOT / "master" / "feedsim" / "estimation" / "identify" / "signals.py": "reference/signal-names.md",
+    ROOT / "master" / "feedsim" / "foundation" / "findings.csv": "reference/findings.md",
     ROOT / "scenarios" / "schemas": "reference/files.md",
 }
 _LINK = re.compile(r"(?P<text>!?\[(?:[^\[\]]|\[[^\]]*\])*\])\((?P<target>[^)#\s]+)(?P<anchor>#[^)\s]*)?\)")

@@ -5,6 +5,7 @@ from feedsim.analysis.figures import Figure as Figure
 from feedsim.files.trace import Trace as Trace
 from feedsim.files.trace.files import read_trace as read_trace
 from feedsim.foundation.errors import FeedsimError as FeedsimError
+from feedsim.foundation.errors import Finding as Finding
 from feedsim.foundation.errors import InputError as InputError
 from feedsim.foundation.errors import OutputError as OutputError
 from feedsim.foundation.errors import SimulationError as SimulationError

@@ -9,6 +9,8 @@ import identification_logs as logs
 import pytest
 from identification_study import BY_CHANCE, Outcome, judged, summary, told
 
+from feedsim.foundation.errors import Finding
+
 # Of the kinds that cost least; the study has them all.
 KINDS = (
     "good", "position_only_1um", "no_slow_speeds", "strokes_only", "sines_only", "clipped", "warms_5", "warms_30",
@@ -32,7 +34,7 @@ def test_what_is_called_estimated_holds_the_truth_or_a_warning_names_the_cause(k
     if not flaws:
         assert not far
         # Its strokes go from slow to fast once.
-        assert all("drive the fastest speed first and last" in text for text in found.warnings)
+        assert {finding.code for finding in found.warnings} <= {"warming-not-separated"}
 
 
 def test_a_wrong_valley_of_the_first_fits_is_left(tmp_path: Path) -> None:
@@ -46,7 +48,7 @@ def test_the_study_counts() -> None:
     right = Outcome("good-0", (), "", "", {"F_C": 0.5}, {"F_C": 0.01}, {"F_C": 0.02}, {"F_C": "estimated"}, (), (), 2.0)
     chance = replace(right, off={"F_C": -2.5})
     silent = replace(right, flaws=("clipped",), off={"F_C": 9.0})
-    named = replace(silent, warnings=("the torque is cut off at 3 N.m",))
+    named = replace(silent, warnings=(Finding("record-clipped", "doubt", "the torque is cut off at 3 N.m"),))
     refused = replace(right, refused="InputError: unit", off={}, states={})
     lines = summary([right, chance, silent, named, refused])
     assert "| F_C | 4 | 25.0 % | 2 | 1 |" in lines

@@ -17,7 +17,7 @@ from command_helpers import Done, feedsim, summary_of
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
 from feedsim.files.trace import read_csv
-from feedsim.foundation.errors import SimulationError, severity
+from feedsim.foundation.errors import Finding, SimulationError
 from feedsim.report.compensate import _um, table_csv
 from report_helpers import Page, contents
 
@@ -123,14 +123,16 @@ def test_worse_than_without_is_the_first_thing_said(fmus: Path, tmp_path: Path) 
     assert "reversal X" not in first
     assert last.startswith("feedsim: note: axis X: model and machine have the same friction and delay")
     findings = summary_of(tmp_path / "out")["findings"]
-    assert [each["severity"] for each in findings] == ["wrong", "doubt", "note"]
+    assert [(each["code"], each["severity"]) for each in findings] == [
+        ("compensation-worse", "wrong"), ("compensation-larger", "doubt"), ("friction-known-exactly", "note"),
+    ]  # fmt: skip
     assert "dip_Z -0.288 -> -" in findings[1]["text"]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert page.index('class="wrong"') < page.index("model and machine have the same") < page.index('class="keys"')
 
 
 def test_worse_is_judged_figure_by_figure() -> None:
-    def told(reversal: float = 0.1e-6, **after: float) -> list[str]:
+    def told(reversal: float = 0.1e-6, **after: float) -> list[Finding]:
         before = {"G": 8.0, "G_ls": 8.0, "tool.G": 8.2, "glitch_Z": 7.9, "dip_Z": -0.3, "mean": 2.0}
         figures = {f"before.{name}": Figure(value, "um", "") for name, value in before.items()}
         figures |= {f"after.{name}": Figure(after.get(name, 0.05), "um", "") for name in before}
@@ -138,11 +140,13 @@ def test_worse_is_judged_figure_by_figure() -> None:
 
     assert told() == []
     assert told(dip_Z=-0.37, mean=-2.07) == []  # less than a hundredth of G
-    assert told(dip_Z=-0.76) == ["larger with compensation than without: dip_Z -0.3 -> -0.76 um"]
+    (larger,) = told(dip_Z=-0.76)
+    assert (larger.code, larger.severity, larger.place) == ("compensation-larger", "doubt", "dip_Z")
+    assert larger.text.endswith("dip_Z -0.3 -> -0.76 um")
     for found in (told(G=8.2), told(**{"tool.G": 9.0}), told(reversal=9e-6), told(G=np.nan)):
-        assert [severity(each) for each in found] == ["wrong"]
-    assert "reversal Z+ 7.9 -> 9 um" in told(reversal=9e-6)[0]
-    assert "G 8 -> not determined" in told(G=np.nan)[0]
+        assert [(each.code, each.severity) for each in found] == [("compensation-worse", "wrong")]
+    assert "reversal Z+ 7.9 -> 9 um" in told(reversal=9e-6)[0].text
+    assert "G 8 -> not determined" in told(G=np.nan)[0].text
 
 
 def test_without_the_table_there_is_none(done: tuple[Done, Path]) -> None:

@@ -18,7 +18,7 @@ from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.files.trace.response_files import read_response_csv, write_response
-from feedsim.foundation.errors import InputError, OutputError
+from feedsim.foundation.errors import Finding, InputError, OutputError
 from feedsim.jobs.frf import MachineResponses, result_of
 from feedsim.linear.loops import names, response, unit_of
 from feedsim.report import frf as report
@@ -323,7 +323,8 @@ def test_curves_laid_over_are_converted_or_taken_as_they_are(tmp_path: Path) -> 
     write_response(tmp_path / "d.csv", FrequencyResponse(f, {"Z.x_a/Z.M_a": [2.0, 4.0], "other": [1.0, 1.0]}))
     (overlay,), (warning,) = read_overlays(str(tmp_path / "d.csv"), known)
     assert overlay.name == "Z.x_a/Z.M_a"
-    assert "has no unit in the file; it is taken to be in m/(N.m)" in warning
+    assert (warning.code, warning.place) == ("unit-assumed", "Z.x_a/Z.M_a")
+    assert "it is taken to be in m/(N.m)" in warning.text
     with pytest.raises(InputError, match=r"holds none of the responses shown, but a\. Say which it is"):
         read_overlays(str(tmp_path / "c.csv"), known)
     with pytest.raises(InputError, match="um/N"):
@@ -374,8 +375,8 @@ def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypa
 
 def test_names_and_warnings_cannot_break_the_page() -> None:
     odd = replace(subject(), name='<script>"&', notes=("a < b",))
-    text = html(report_of(odd, responses(warnings=("gain < 1",)), []))
-    plain = Page(html(report_of(subject(), responses(warnings=("gain < 1",)), [])))
+    text = html(report_of(odd, responses(warnings=(Finding("not-settled", "doubt", "gain < 1"),)), []))
+    plain = Page(html(report_of(subject(), responses(warnings=(Finding("not-settled", "doubt", "gain < 1"),)), [])))
     assert Page(text).tags.count("script") == plain.tags.count("script")  # those of the chart
     assert '<script>"&' not in text
     assert text.index("gain &lt; 1") < text.index("a &lt; b") < text.index('class="keys"')
@@ -406,9 +407,5 @@ def test_every_shipped_machine_is_taken(fmus: Path, tmp_path: Path, machine: str
     place = ROOT / "scenarios" / "machines" / machine
     result = feedsim("frf", place, "--no-measure", "--out", tmp_path / "frf", fmus=fmus, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    notes = [each["text"] for each in summary_of(tmp_path / "frf")["findings"] if each["severity"] == "note"]
-    rigid = machine != "one_axis"
-    assert (
-        any(note.endswith("zero at all frequencies in this machine; there is nothing to draw") for note in notes)
-        is rigid
-    )
+    codes = [each["code"] for each in summary_of(tmp_path / "frf")["findings"]]
+    assert ("response-zero" in codes) == (machine != "one_axis")

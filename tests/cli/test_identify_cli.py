@@ -23,7 +23,7 @@ from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Correlation, Estimate, Plateau
 from feedsim.estimation.identify.stages import begins, merged_correlation, transitions
 from feedsim.files.trace import write_csv
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.units import parameters
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
@@ -316,10 +316,10 @@ def test_a_given_inertia_is_held_against_the_records(calls: dict[str, Any]) -> N
     torque = J * np.gradient(speed, 2e-3) + 1.6 * np.sign(speed) + 0.01 * speed
     moving = Record("general", time, torque, speed=speed)
     found = identify((moving,), no_law, options())
-    assert not any("inertia" in text for text in found.warnings)
+    assert "inertia-contradicted" not in [finding.code for finding in found.warnings]
     assert found.rigid["J"].value == pytest.approx(J, rel=0.01)  # what the window takes of a 0.5 Hz sine is below
     twice = identify((moving,), no_law, options(J=Estimate("J", 2 * J, "kg.m2", "inertia", status="given")))
-    assert any("the inertia is given as 0.0328" in text for text in twice.warnings)
+    assert any(f.code == "inertia-contradicted" and "given as 0.0328" in f.text for f in twice.warnings)
 
 
 @pytest.mark.parametrize("speeds", [7, 8])
@@ -360,18 +360,20 @@ def test_doubts_of_stage_1_count_where_it_is_used(
 ) -> None:
     own = stationary(estimates())
     plateaus = tuple(replace(p, record=record) for p in own.plateaus[: 2 * speeds])
-    doubtful = replace(own, plateaus=plateaus, warnings=("3 speeds only",))
+    few = Finding("speeds-few", "doubt", "3 speeds only")
+    vague = Finding("parameter-undetermined", "doubt", "gamma: vague", "gamma")
+    doubtful = replace(own, plateaus=plateaus, warnings=(few,))
     monkeypatch.setattr(stages, "stationary", lambda *words, **more: doubtful)
-    alone = replace(dynamic(estimates()), estimates=estimates(), warnings=("gamma: vague",))
+    alone = replace(dynamic(estimates()), estimates=estimates(), warnings=(vague,))
     monkeypatch.setattr(stages, "dynamic", lambda *words, **more: alone)
     found = identify(records(), no_law, options())
     assert found.prior == used
-    assert ("3 speeds only" in found.warnings) == found.prior
-    assert "gamma: vague" in found.warnings
+    assert (few in found.warnings) == found.prior
+    assert vague in found.warnings
     assert found.stationary is doubtful
     # Stage 1 alone is what there is: its doubts are those of the result.
     monkeypatch.setattr(stages, "transitions", lambda records: ())
-    assert "3 speeds only" in identify(records(), no_law, options()).warnings
+    assert few in identify(records(), no_law, options()).warnings
 
 
 def test_nothing_to_be_found(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,7 +105,8 @@ def test_a_half_of_a_filter_is_not_taken(place: Path, change: str) -> None:
         load_machine(place / "new").axes["X"].drive.filter_1 == load_machine(place / "centre").axes["X"].drive.filter_1
     )
     assert [each.parameter for each in result.made.values] == [f"drive.filter_{k}.type" for k in (2, 3, 4)]
-    assert "values not taken: X p1657" in result.findings[0] or "X p1659" in result.findings[0]
+    assert result.findings[0].code == "values-not-taken"
+    assert "X p1657" in result.findings[0].text or "X p1659" in result.findings[0].text
 
 
 def test_a_draft(place: Path) -> None:

@@ -28,7 +28,8 @@ def test_machine_data() -> None:
     # Without feedforward weight and symmetry are those of none, whatever the file has.
     assert values(found, "Y") == {"drive.K_v": pytest.approx(1500 / 60), "drive.k_ffw": 0.0, "drive.T_sym": 0.0}
     assert reasons(found)["MD32810"].startswith("no public source that was opened states its unit; s is supposed")
-    assert any("MD32200 POSCTRL_GAIN has other values in other elements" in note for note in found.notes)
+    (note,) = (note for note in found.notes if note.code == "value-differs-between-sets")
+    assert "MD32200 POSCTRL_GAIN" in note.text
 
 
 def test_a_unit_that_was_checked() -> None:
@@ -62,7 +63,7 @@ def test_parameters_of_a_drive() -> None:
         "drive.p": 4,
     }
     assert values(found, "") == {"cycles.control": 125e-6}
-    assert [text for text in found.doubts if "p1460" in text and "differs between data sets" in text]
+    assert [f for f in found.doubts if f.code == "value-differs-between-sets" and "p1460" in f.text]
 
 
 @pytest.mark.parametrize(
@@ -165,7 +166,8 @@ def test_a_container_with_drives() -> None:
     assert archive.places == {"PS000003": "", "PS000004": "SERVO_Y"}
     found = read([archive], {"X": "X1", "Y": "Y1"})
     assert "drive.K_p" not in values(found, "X")
-    assert "the files have PS000003, PS000004 (SERVO_Y): name it, --drives X=PS000003" in found.notes[0]
+    assert (found.notes[0].code, found.notes[0].remedy) == ("drive-not-known", "--drives X=PS000003")
+    assert "the files have PS000003, PS000004 (SERVO_Y)" in found.notes[0].text
     found = read([archive], {"X": "X1", "Y": "Y1"}, places={"X": ["PS000003"], "Y": ["PS000004"]})
     assert (values(found, "X")["drive.K_p"], values(found, "Y")["drive.K_p"]) == (7.5, 3.0)
     with pytest.raises(InputError, match="no drive object or list 'PS9'; the files have PS000003, PS000004"):
@@ -255,7 +257,8 @@ def test_values_far_outside_of_what_is_usual(change: tuple[str, str], said: str)
     assert read([opened("nc.tea", NC.encode())], {"X": "X1"}).doubts == []
     assert change[0] in NC
     (doubt,) = read([opened("nc.tea", NC.replace(*change).encode())], {"X": "X1"}).doubts
-    assert said in doubt
+    assert doubt.code == "value-unusual"
+    assert said in doubt.text
 
 
 def test_usual_ranges() -> None:

@@ -40,7 +40,9 @@ def test_a_list_of_twincat_cnc() -> None:
         "max_acceleration": pytest.approx(14.4),
         "drive.backlash_compensation.value": pytest.approx(12e-6),
     }
-    assert found.doubts == ["X: P-AXIS-00099 getriebe[i].kv differs between data sets; that of index 0 is taken"]
+    (doubt,) = found.doubts
+    assert (doubt.code, doubt.place) == ("value-differs-between-sets", "X")
+    assert "P-AXIS-00099 getriebe[i].kv" in doubt.text
 
 
 def test_an_xti_of_twincat_nc() -> None:

@@ -60,9 +60,10 @@ def test_a_sheet_and_a_page_have_values_that_people_write(tmp_path: Path) -> Non
 
 def test_nothing_taken_is_said_first(tmp_path: Path) -> None:
     file = written(tmp_path, "N32200 $MA_POSCTRL_GAIN[0,AX1]=R5\n")
-    assert fs.machine_import(file, "X=AX1").findings[0] == "no value was taken; the draft is empty"
+    assert fs.machine_import(file, "X=AX1").findings[0].code == "no-value-taken"
     result = fs.machine_import(file, "X=AX1", CENTRE)
-    assert result.findings[0] == "no value was taken; the machine file is as it was"
+    assert result.findings[0].code == "no-value-taken"
+    assert result.findings[0].text.endswith("the machine file is as it was")
 
 
 def test_nothing_is_said_to_be_replaced_by_a_job_that_fails(tmp_path: Path) -> None:

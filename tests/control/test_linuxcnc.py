@@ -114,7 +114,7 @@ def test_of_several_limits_the_tightest_acts(
 ) -> None:
     found = read([opened("m.ini", LIMITS.format(of_all, of_axis).encode())], {"X": "X"})
     assert values(found, "X")[parameter] == pytest.approx(expected)
-    assert any(note in text for text in found.notes) == bool(note)
+    assert any(note in finding.text for finding in found.notes) == bool(note)
 
 
 @pytest.mark.parametrize(

@@ -274,7 +274,7 @@ def test_what_programs_set_is_no_value_of_an_archive(archive: str, program: str)
     assert values_of(reading, "X") == {"drive.K_v": pytest.approx(5000 / 60), "max_acceleration": 6.0}
     refused = {item.name.number: item.reason for item in reading.refused}
     assert refused["MD32450"] == f"only the program {program} sets it, when it runs"
-    assert any("MD32300" in note and "set by programs" in note for note in reading.notes)
+    assert any(note.code == "value-set-by-programs" and "MD32300" in note.text for note in reading.notes)
 
 
 def test_a_condition_that_only_a_program_sets_is_missing() -> None:

@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 
 from feedsim import scenario
 from feedsim.cli import main
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Base, load_machine
 from feedsim.scenario.loads import ForceTable, ToolLoad
 from feedsim.simulation import cosim, judge, nc
@@ -47,7 +47,7 @@ def run(file: Path, fmus: Path, *overrides: str, native: bool | None = None) -> 
     return judged(cosim.run(scenario.load(file, list(overrides)), fmus=fmus, native=native))
 
 
-def warnings_ahead(file: Path, fmus: Path, *overrides: str) -> tuple[str, ...]:
+def warnings_ahead(file: Path, fmus: Path, *overrides: str) -> tuple[Finding, ...]:
     loaded = scenario.load(file, list(overrides))
     return judge.check(loaded, nc.plan(loaded), fmus=fmus)
 
@@ -295,27 +295,29 @@ def test_what_only_a_wrong_unit_or_place_explains_is_told_ahead(file: Path, fmus
     assert sound == ()
     (big,) = warnings_ahead(file, fmus, DWELL, step.format("tool, direction: X", "N", "30 kN", "N"))
     # 30 kN I_P = 11.94 N.m over 0.13986 N.m
-    assert "loads.0: the load on the tool in X reaches 3e+04 N, 11.94 N.m at the motor of X, 85.3 times" in big
+    assert big.code == "load-too-large"
+    assert "reaches 3e+04 N, 11.94 N.m at the motor of X, 85.3 times" in big.text
     (place,) = warnings_ahead(file, fmus, DWELL, step.format("motor, axis: X", "N.m", "30 N.m", "N.m"))
-    assert "loads.0: the load at the motor of X reaches 30 N.m, 215 times the drive's M_max, 0.1399 N.m" in place
+    assert (place.code, place.place.rpartition(" ")[2]) == ("load-too-large", "loads.0")
+    assert "reaches 30 N.m, 215 times the drive's M_max, 0.1399 N.m" in place.text
     (small,) = warnings_ahead(file, fmus, DWELL, step.format("tool, direction: X", "N", "0.03 N", "N"))
-    assert "1.2e-05 N.m at the motor of X, 0.0015 of the Coulomb friction F_C" in small.replace("1.194e-05", "1.2e-05")
+    assert small.code == "load-too-small"
+    assert "1.194e-05 N.m at the motor of X, 0.0015 of the Coulomb friction F_C" in small.text
     assert warnings_ahead(file, fmus, DWELL, step.format("tool, direction: Y", "N", "30 kN", "N")) == ()
 
 
 def test_a_load_that_drives_is_told_by_its_work(file: Path, fmus: Path) -> None:
-    def told(force: float) -> list[str]:
+    def told(force: float) -> list[Finding]:
         found = run(
             file, fmus, "motions=[{kind: dwell, duration: 1 s}, {kind: move, by: {X: 100 mm}, feed: 6 m/min}]",
             "loads=[{kind: tool, direction: X, "
             f"table: {{time: [1 s, 1.3 s, 1.6 s, 2 s], values: [0 N, {force} N, {force} N, 0 N]}}}}]",
         )  # fmt: skip
-        return [each for each in found.warnings if "drives the machine" in each]
+        return [finding for finding in found.warnings if finding.code == "load-drives"]
 
     assert told(-40) == []
     (wrong,) = told(40)
-    assert "loads.0: the load on the tool in X drives the machine" in wrong
-    assert wrong.endswith("its sign is wrong, and factor: -1 turns it")
+    assert (wrong.place.rpartition(" ")[2], wrong.remedy) == ("loads.0", "loads.0.factor=-1")
 
 
 @pytest.fixture
@@ -355,15 +357,17 @@ def test_the_recorded_motor_torque_tells_a_wrong_sign_and_size(
         file, fmus, f"motions=[{{kind: setpoints, file: {recorded}, columns: {{X: x}}}}]",
         f"loads=[{{kind: {kind}, axis: X, file: {recorded}, column: F, motor_torque: M, factor: {factor!r}}}]",
     )  # fmt: skip
-    told = [each for each in found.warnings if "J in the record" in each]
+    told = [finding for finding in found.warnings if finding.code == "load-contradicts-record"]
     if fits is None:
         assert told == []
         return
-    (text,) = told
+    (finding,) = told
     shown = fits / factor
     why = "shows little or nothing of it" if abs(shown) < 0.3 else "its sign is" if shown < 0 else "its size is wrong:"
-    assert why in text
-    assert float(text.rpartition("factor: ")[2]) == pytest.approx(fits, rel=0.03)
+    assert why in finding.text
+    key, _, value = finding.remedy.partition("=")
+    assert key == "loads.0.factor"
+    assert float(value) == pytest.approx(fits, rel=0.03)
 
 
 def test_a_load_at_the_start_lets_the_axis_sag(tmp_path: Path, fmus: Path) -> None:
@@ -375,7 +379,8 @@ def test_a_load_at_the_start_lets_the_axis_sag(tmp_path: Path, fmus: Path) -> No
         encoding="utf-8",
     )
     (told,) = warnings_ahead(file, fmus)
-    assert "loads.0: the load of 5 N.m at the motor of Y is not carried at the start" in told
+    assert (told.code, told.place.rpartition(" ")[2]) == ("load-not-carried", "loads.0")
+    assert "the load of 5 N.m at the motor of Y" in told.text
     assert warnings_ahead(file, fmus, "loads.0.factor=0.1") == (), "F_C of Y is 2 N.m: friction holds 0.5 N.m"
 
 

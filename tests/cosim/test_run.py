@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from feedsim import scenario
-from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation import cosim, judge, nc
 from feedsim.simulation.cosim import unpacked
@@ -139,25 +139,26 @@ def test_unstable_exchange_is_told(short: Path, fmus: Path) -> None:
     """Beyond 2 J_inf / h explicit exchange chatters without overflow: two warnings, one by rule, one by measurement."""
     result = run(short, fmus, "machine.axes.Z.friction.sigma_1=100 N.m.s/rad")
     assert result.coupling["Z.residual_peak"] > 1e-2 * abs(result.coupling["Z.friction_work"])
-    of_z = [warning for warning in result.warnings if warning.startswith("axis Z: ")]
-    assert any("sigma_1 + sigma_2 = 100" in warning for warning in of_z)
-    assert any("not to be trusted" in warning for warning in of_z)
+    of_z = {finding.code for finding in result.warnings if finding.place == "Z"}
+    assert of_z >= {"exchange-unstable", "exchange-loses-energy"}
     assert not run(short, fmus).warnings
 
 
 def test_stable_with_smaller_steps(short: Path, fmus: Path) -> None:
     """What the warning advises helps."""
     override = "machine.axes.Z.friction.sigma_1=50 N.m.s/rad"
-    assert run(short, fmus, override).warnings
-    assert not run(short, fmus, override, "coupling.substeps=2").warnings
+    remedies = {finding.remedy for finding in run(short, fmus, override).warnings}
+    assert remedies == {"coupling.substeps=2"}
+    assert not run(short, fmus, override, *remedies).warnings
 
 
 def test_active_limit_and_unit_warning_are_told(short: Path, fmus: Path) -> None:
     result = run(short, fmus, "machine.axes.Z.drive.M_max=3 N.m", "machine.axes.X.friction.W=0.001 rad")
-    assert any(
-        re.fullmatch(r"axis Z: torque limited in [0-9.]+ % of the recorded instants", w) for w in result.warnings
-    )
-    assert any(w.startswith("friction_X: parameter 'W' is 0.001 rad; keep it well above") for w in result.warnings)
+    found = {finding.code: finding for finding in result.warnings}
+    assert found["torque-clipped"].place == "Z"
+    assert re.fullmatch(r"axis Z: torque limited in [0-9.]+ % of the recorded instants", found["torque-clipped"].text)
+    assert found["unit-warns"].place == "friction_X"
+    assert found["unit-warns"].text.startswith("friction_X: parameter 'W' is 0.001 rad; keep it well above")
 
 
 def test_setpoints_in_the_trace_are_those_handed_over(short: Path, fmus: Path) -> None:
@@ -205,15 +206,17 @@ def test_what_stays_behind_is_used_again_and_goes_when_told(
 
 
 def test_warnings_that_need_no_run_come_before_it(short: Path, fmus: Path) -> None:
-    def foreseen(*overrides: str) -> tuple[str, ...]:
+    def foreseen(*overrides: str) -> tuple[Finding, ...]:
         loaded = scenario.load(short, list(overrides))
         return judge.check(loaded, nc.plan(loaded), fmus=fmus)
 
     assert foreseen() == ()
     (stability,) = foreseen("machine.axes.Z.friction.sigma_1=60 N.m.s/rad")
-    assert stability.startswith("axis Z: sigma_1 + sigma_2 = 60.01 N.m.s/rad is above 30.17")
+    assert (stability.code, stability.place) == ("exchange-unstable", "Z")
+    assert "sigma_1 + sigma_2 = 60.01 N.m.s/rad is above 30.17" in stability.text
     (width,) = foreseen("machine.axes.X.friction.W=0.001 rad")
-    assert width.startswith("friction_X: parameter 'W'")
+    assert (width.code, width.place) == ("unit-warns", "friction_X")
+    assert "parameter 'W'" in width.text
     (load,) = foreseen("machine.axes.Y.constant_load=20 N.m")
-    assert load.startswith("axis Y: the constant load of 20 N.m is not carried at the start")
+    assert (load.code, load.place) == ("load-not-carried", "Y")
     assert foreseen("machine.axes.Y.constant_load=20 N.m", "motions.0={kind: dwell, duration: 1 s}") == ()

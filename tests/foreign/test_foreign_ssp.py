@@ -41,7 +41,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
 
 def warnings_of(file: Path) -> str:
     with ssp.opened(file) as found:
-        return "\n".join(found.warnings)
+        return "\n".join(map(str, found.warnings))
 
 
 def same(one: JudgedRun, other: JudgedRun) -> bool:

@@ -152,7 +152,7 @@ def test_wired_and_out_of_an_ssp(
 ) -> None:
     loaded = placed(tmp_path, HABITS[name], programs)
     done = cosim.run(loaded, fmus=fmus)
-    assert HABITS[name].says in "\n".join(done.notes)
+    assert HABITS[name].says in "\n".join(map(str, done.notes))
     tolerance = 1e-12 if HABITS[name].rounding else 0.0  # some 500 cycles that round to 1.1e-16, in a loop that forgets
     assert same(done.trace, usual, tolerance)
     ssp.export(loaded, tmp_path / "s.ssp", fmus=fmus)
@@ -190,7 +190,7 @@ def test_a_unit_that_nobody_knows_counts_as_none(
             real.set("unit", "furlongs")
 
     done = cosim.run(placed(tmp_path, Habit(edit=every("Real", rename)), programs), fmus=fmus)
-    said = "\n".join(done.notes)
+    said = "\n".join(map(str, done.notes))
     assert "gives no unit for Speed (rad/s, not 'furlongs', which it does not define): taken to be in SI units" in said
 
 

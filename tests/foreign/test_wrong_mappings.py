@@ -155,7 +155,9 @@ def test_a_unit_without_units_is_taken_to_be_in_si(fmus: Path, libraries: Librar
         [f"machine.axes.Z.friction={ {**acme.MAPPED_FRICTION, 'fmu': str(fmu)} }"],
     )
     told = judge.check(loaded, nc.plan(loaded), fmus=fmus)
-    assert any("bare.fmu: modelDescription.xml gives no unit for Speed (rad/s), Torque (N.m)" in each for each in told)
+    (bare,) = (finding for finding in told if finding.code == "variable-without-unit")
+    assert bare.place == "Z"
+    assert "bare.fmu: modelDescription.xml gives no unit for Speed (rad/s), Torque (N.m)" in bare.text
 
 
 def test_what_needs_the_shipped_law_says_so(fmus: Path, libraries: Libraries, tmp_path: Path) -> None:

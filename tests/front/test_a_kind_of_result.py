@@ -14,7 +14,7 @@ from feedsim.analysis import Figure, Named
 from feedsim.cli.commands import finish
 from feedsim.files.trace import Array, Trace
 from feedsim.foundation.arguments import Call, calling
-from feedsim.foundation.errors import InputError, Note, OutputError, Wrong
+from feedsim.foundation.errors import Finding, InputError, OutputError
 from feedsim.jobs.parameters import command_line
 from feedsim.jobs.result import Kind, Result
 from feedsim.report.chart import Axis, Chart, Curve, Panel
@@ -54,7 +54,11 @@ def result_of(spectrum: Spectrum, begun: list[str]) -> Result[Spectrum]:
         )
         return Report(
             "Spectrum of Z", "1 axis", answer=["The highest line is at 20 Hz.", "It is the table's."],
-            warnings=[Note("2 s were recorded"), "the record is short", Wrong("the axis is clipped")],
+            warnings=[
+                Finding("columns-mapped", "note", "2 s were recorded"),
+                Finding("rows-missing", "doubt", "the record is short"),
+                Finding("torque-clipped", "wrong", "the axis is clipped", "Z", "axes.Z.drive.M_max=9 N.m"),
+            ],
             action="Type 20 Hz.", next_step=Step("Look again", "diff", {"results": [FOLDER]}),
             main=[Picture("spectrum", "Spectrum", "Amplitude.", Chart([panel]))], footer="",
         )  # fmt: skip
@@ -120,7 +124,10 @@ def test_terminal_page_json_and_notebook_say_the_same(
     assert (summary["kind"], summary["lines"], summary["keeps"]) == ("spectrum", 2, ["axis.yaml"])
     assert summary["answer"] == [*result.answers]
     assert summary["figures"] == {"Z.highest": {"value": 20.0, "unit": "Hz", "meaning": "highest line"}}
-    assert summary["findings"][0] == {"severity": "wrong", "text": "the axis is clipped"}
+    assert summary["findings"][0] == {
+        "code": "torque-clipped", "severity": "wrong", "text": "the axis is clipped", "place": "Z",
+        "remedy": "axes.Z.drive.M_max=9 N.m",
+    }  # fmt: skip
     assert set(summary["files"]) == {"report.html", "summary.json", "lines.csv", "axis.yaml"}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     for sentence in (*result.answers, "the axis is clipped", "Type 20 Hz."):

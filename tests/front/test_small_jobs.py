@@ -30,7 +30,11 @@ def test_a_valid_scenario_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -
 
 def test_what_a_run_warns_of_is_told_ahead() -> None:
     done = fs.check(SCENARIOS / "z_positioning.yaml", set=UNSTABLE)
-    assert "axis Z: the position loop is unstable" in done.findings[0]
+    assert isinstance(done.findings, tuple)
+    first = done.findings[0]
+    assert isinstance(first, fs.Finding)
+    assert (first.code, first.severity, first.place) == ("loop-unstable", "wrong", "Z")
+    assert str(first) == first.text
     assert repr(done).endswith("see .findings")
 
 

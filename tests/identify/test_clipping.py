@@ -48,8 +48,8 @@ def test_rows_at_a_limit_are_marked(record: Record, limit: float, share: float, 
     # The ends of a run of few rows, whose mean is below the limit, are all that may be missed.
     assert np.count_nonzero(cut & ~found.clipped) <= 0.05 * np.count_nonzero(cut)
     assert len(said) == 1
-    assert "cut off at" in said[0]
-    for text in said[0].split("cut off at ")[1].split(",")[0].split(" and "):
+    assert (said[0].code, said[0].place) == ("record-clipped", "cut")
+    for text in said[0].text.split("cut off at ")[1].split(",")[0].split(" and "):
         assert abs(float(text.removesuffix(" N.m"))) == pytest.approx(limit, rel=0.03)
 
 
@@ -61,7 +61,7 @@ def test_a_limit_in_one_direction_with_a_load(record: Record, side: float) -> No
     (found,), said = without_clipped([cut])
     assert found.clipped is not None
     assert np.count_nonzero(found.clipped != (side * torque >= side * limit)) < 0.01 * np.count_nonzero(found.clipped)
-    assert f"cut off at {limit:+.4g} N.m," in said[0]
+    assert f"cut off at {limit:+.4g} N.m," in said[0].text
 
 
 def test_the_curve_comes_back_from_what_is_left(record: Record) -> None:
@@ -136,7 +136,7 @@ def test_a_limit_beside_it_is_recognised(way: float, load: float, limit: float) 
     assert found.clipped is not None
     assert np.count_nonzero(cut & ~found.clipped) <= 0.05 * np.count_nonzero(cut)
     assert np.count_nonzero(found.clipped & (np.abs(true) < 0.8 * limit * np.max(np.abs(true)))) == 0
-    assert f"cut off at {'+' if load > 0 else '-'}" in said[0]
+    assert f"cut off at {'+' if load > 0 else '-'}" in said[0].text
 
 
 def drawn(seed: int, limit: float) -> tuple[Record, Record]:

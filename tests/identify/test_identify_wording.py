@@ -78,9 +78,13 @@ def test_each_reason_is_said_once() -> None:
     }
     said = ("sigma_1: its 95 % interval is +-135 % of the value", "M_0 and asymmetry: one direction only",
             "gamma: its 95 % interval is +-278 % of the value")  # fmt: skip
-    assert doubts(held, None) == said
+    found = doubts(held, None)
+    assert {finding.code for finding in found} == {"parameter-undetermined"}
+    assert tuple(finding.text for finding in found) == said
+    assert [finding.place for finding in found] == ["sigma_1", "M_0, asymmetry", "gamma"]
     # What stage 1 hands on it has said itself.
     first = stationary(estimates())
     load = replace(first.estimates["M_0"], status="undetermined", reason="one direction only")
     prior = replace(first, estimates={**first.estimates, "M_0": load})
-    assert doubts(held, prior) == (said[0], "asymmetry: one direction only", said[2])
+    left = tuple(finding.text for finding in doubts(held, prior))
+    assert left == (said[0], "asymmetry: one direction only", said[2])

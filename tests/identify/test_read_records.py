@@ -197,12 +197,13 @@ def test_pitch_and_torque_constant_of_mapping_and_machine(tmp_path: Path, machin
     Z = machine.axes["Z"]
     found = read_records(path, mapped(tmp_path, rest), machine=machine)
     assert (found.provenance.pitch, found.provenance.torque_constant) == (Z.pitch, Z.drive.K_t)
-    assert len(found.provenance.warnings) == 1
-    assert "'I' is an effective value; the machine's torque constant of" in found.provenance.warnings[0]
+    assert [finding.code for finding in found.provenance.warnings] == ["current-effective-value"]
     found = read_records(path, mapped(tmp_path, rest + "torque_constant: 9 N.m/A\n"), machine=machine)
     assert found.provenance.torque_constant == 9
     np.testing.assert_allclose(only(found).torque, 9 * TORQUE, **DIGITS)
-    assert "m.yaml:4: torque_constant: 9 N.m/A counts, not the" in found.provenance.warnings[0]
+    differs = found.provenance.warnings[0]
+    assert differs.code == "torque-constant-differs"
+    assert "m.yaml:4: torque_constant" in differs.place
     message = refusal(path, mapped(tmp_path, rest + "pitch: 7 mm\n"), machine=machine)
     assert "m.yaml:4: pitch: 7 mm; axis Z of machine" in message
     assert f"has {1e3 * Z.pitch:g} mm" in message
@@ -279,9 +280,10 @@ def test_a_load_is_told_where_it_leaves_less_of_the_torque(tmp_path: Path, name:
         assert said == ()
         return
     (only_one,) = said
-    assert f"a.csv:1: {name.split(' [')[0]!r} may be a known load, and is not read. With it" in only_one
-    assert only_one.endswith(f"mapping: {line}")
-    assert re.search(r"leaves \S+e-1\d in place of 0\.232 N\.m of the torque", only_one)
+    assert (only_one.code, only_one.remedy) == ("load-not-read", line)
+    assert only_one.place.endswith("a.csv:1")
+    assert f"{name.split(' [')[0]!r} may be a known load" in only_one.text
+    assert re.search(r"leaves \S+e-1\d in place of 0\.232 N\.m of the torque", only_one.text)
     # The line serves as it stands.
     found = read_records(path, mapped(tmp_path, text + line + "\n"))
     assert found.provenance.warnings == ()

@@ -58,7 +58,9 @@ def test_the_torque_is_taken_before_the_current(tmp_path: Path) -> None:
     found = read_records(path)
     np.testing.assert_allclose(only(found).torque, TORQUE, **DIGITS)
     assert found.provenance.axis == "Z"
-    assert found.provenance.warnings == (f"{path}: 'Z.i_q' is not used; the torque 'Z.M_a' is",)
+    (finding,) = found.provenance.warnings
+    assert (finding.code, finding.severity, finding.place) == ("column-not-used", "note", str(path))
+    assert "'Z.i_q' is not used; the torque 'Z.M_a' is" in finding.text
 
 
 def test_a_log_without_what_is_needed(tmp_path: Path) -> None:

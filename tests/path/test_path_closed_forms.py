@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.foundation.errors import InputError, severity
+from feedsim.foundation.errors import InputError
 from feedsim.motions.part_program import Blending
 from feedsim.motions.planner import Acts, plan_moves
 from path_helpers import Draft, limits_of, square
@@ -165,8 +165,8 @@ def test_roundings_that_take_longer_than_stops_are_noted() -> None:
     assert with_stops.duration == pytest.approx(2.6, abs=1e-9)
     assert not with_stops.notes
     (note,) = rounded.notes
-    assert severity(note) == "note"
-    assert "3 rounded corners take longer than exact stops: 2.654 s in place of 2.6 s" in note
+    assert (note.code, note.severity) == ("corners-slower-than-stops", "note")
+    assert "3 rounded corners take longer than exact stops: 2.654 s in place of 2.6 s" in note.text
     wide = plan_moves(square(tolerance=1e-3), limits)
     assert wide.duration < 2.6
     assert not wide.notes
@@ -176,7 +176,8 @@ def test_a_feed_above_the_limits_is_noted() -> None:
     draft = Draft(("X", "Y"), np.zeros(2), 2.0)
     draft.line(0.5, 0)
     (note,) = plan_moves(draft.moves, limits_of("XY", 1, 1, 20)).notes
-    assert note.startswith("made.mpf:1: F 120000 mm/min is above what the axes reach together, 84852.8 mm/min")
+    assert (note.code, note.place) == ("feed-out-of-reach", "made.mpf:1")
+    assert note.text.startswith("made.mpf:1: F 120000 mm/min is above what the axes reach together, 84852.8 mm/min")
 
 
 @pytest.mark.parametrize(

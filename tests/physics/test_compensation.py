@@ -13,7 +13,7 @@ import pytest
 from feedsim import scenario
 from feedsim.analysis import compensation as module
 from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
-from feedsim.foundation.errors import InputError, severity
+from feedsim.foundation.errors import InputError
 from feedsim.jobs.tune_feedforward import Compensated, result_of
 from feedsim.linear.plant import LinearDrive
 from feedsim.report.compensate import rows_of
@@ -156,9 +156,8 @@ def test_every_quadrant_within_reach(done: Compensation) -> None:
         assert figures[f"after.glitch_{crossing}"].value < LEFT * 1e6
     assert figures["after.G"].value < LEFT * 1e6
     (note,) = done.warnings
-    assert severity(note) == "note"
-    assert "axis X, Z: model and machine have the same friction and delay" in note
-    assert "leaves G up to 0.807 um (F_C, F_S -10 %)" in note
+    assert (note.code, note.severity, note.place) == ("friction-known-exactly", "note", "X, Z")
+    assert "leaves G up to 0.807 um (F_C, F_S -10 %)" in note.text
 
 
 def test_feedforward_is_ahead_by_the_lag_of_the_torque(done: Compensation) -> None:

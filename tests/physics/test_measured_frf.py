@@ -226,7 +226,7 @@ def test_moving_axis_with_friction(excited: Measure) -> None:
 def test_friction_at_standstill_is_warned_of(excited: Measure) -> None:
     """The bristles hold the axis: n/M reads some -50 dB at 1 Hz, where it is 20 dB without friction."""
     measurement = excited("Z", "M_add", seeds=(0,), signal={"band": (1, 400)}, friction=True)[0]
-    assert any("stands still with friction on" in warning for warning in measurement.warnings)
+    assert "axis-held-by-friction" in [finding.code for finding in measurement.warnings]
     found = estimate.measured([measurement], [("Z.n_a", "Z.M_a")])
     assert 20 * np.log10(abs(found["Z.n_a/Z.M_a"][0])) < -25
     assert "Z.M_fr" in measurement.trace
@@ -235,7 +235,7 @@ def test_friction_at_standstill_is_warned_of(excited: Measure) -> None:
 def test_reversal_under_friction_is_warned_of(excited: Measure) -> None:
     signal = {"band": (1, 400), "resolution": 4.0}
     measurement = excited("Z", "n_add", seeds=(0,), share=3, signal=signal, friction=True, offset_speed=-0.5)[0]
-    assert any("reverses under the excitation" in warning for warning in measurement.warnings)
+    assert "axis-reverses" in [finding.code for finding in measurement.warnings]
 
 
 def test_excitation_into_a_limit_is_refused(excited: Measure) -> None:
@@ -249,7 +249,7 @@ def test_excitation_into_a_limit_is_refused(excited: Measure) -> None:
 def test_unsettled_response_is_warned_of(excited: Measure) -> None:
     signal = {"band": (5, 400), "resolution": 10.0}
     hasty = excited("Z", "M_add", seeds=(0,), signal=signal, settle=0)[0]
-    assert any("has not settled" in warning for warning in hasty.warnings)
+    assert "not-settled" in [finding.code for finding in hasty.warnings]
     assert excited("Z", "M_add", seeds=(0,), signal=signal, settle=30)[0].unsettled < 1e-6
 
 

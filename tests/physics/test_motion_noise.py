@@ -81,8 +81,8 @@ def test_steps_of_the_position_widen_the_intervals(law: FrictionLaw) -> None:
         found = rough.estimates[name]
         assert found.sigma > 2 * exact.estimates[name].sigma, name
         assert abs(found.value - TRUE[name]) < 4 * found.sigma, name  # a bias of the smoothing is left
-    assert any("steps of the recorded position limit" in text for text in rough.warnings)
-    assert not any("steps of the recorded" in text for text in exact.warnings)
+    assert "motion-too-coarse" in [finding.code for finding in rough.warnings]
+    assert "motion-too-coarse" not in [finding.code for finding in exact.warnings]
 
 
 def test_half_a_row_late_is_taken_for_damping(law: FrictionLaw) -> None:
@@ -127,7 +127,7 @@ def test_the_intervals_hold_what_steps_of_the_position_and_their_smoothing_do(la
     for name, true in (("sigma_0", 300.0), ("sigma_1", 0.8), ("W", 0.04), ("gamma", 0.35), ("delay", 0.0)):
         each = found.estimates[name]
         assert each.status == "undetermined" or abs(each.value - true) < NORMAL_95 * each.sigma, name
-    assert any("steps of the recorded position limit" in text for text in found.warnings)
+    assert "motion-too-coarse" in [finding.code for finding in found.warnings]
 
 
 def test_strokes_alone_tell_the_curve_as_their_plateaus_do(law: FrictionLaw) -> None:
@@ -148,7 +148,7 @@ def test_sines_alone_offer_no_curve_that_they_leave_open(law: FrictionLaw) -> No
     found = dynamic([asked(record(law, sines(), 2e-3, true, 3e-7))], law, J=INERTIA, delay=0.0, I_P=I_P)
     for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2"):
         assert found.estimates[name].status == "undetermined", name
-    assert any("mm/min, their highest speed: above it is extrapolated" in text for text in found.warnings)
+    assert "curve-extrapolated" in [finding.code for finding in found.warnings]
     assert found.estimates["sigma_0"].value == pytest.approx(300, abs=NORMAL_95 * found.estimates["sigma_0"].sigma)
 
 

@@ -78,8 +78,7 @@ def test_undisturbed_record_gives_the_parameters_within_half_a_permille(record: 
         assert found.estimates[name].value == pytest.approx(TRUE[name], rel=5e-4), name
     assert worst(found) < 5e-4
     # Slow to fast: what viscous friction does meanwhile does not show.
-    assert len(found.warnings) == 1
-    assert "drive the fastest speed first and last" in found.warnings[0]
+    assert [finding.code for finding in found.warnings] == ["warming-not-separated"]
 
 
 @pytest.mark.parametrize(("name", "goal"), [("F_C", 0.01), ("F_S", 0.01), ("v_s", 0.03), ("F_log", 0.03)])

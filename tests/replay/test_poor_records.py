@@ -76,8 +76,9 @@ def test_torque_that_is_cut_off_determines_nothing(
     # Where a fourth of the rows is cut off, the rest of them do not separate the two, though the axis moves both ways.
     assert limit == 0.8 or one["F_C"].reason.startswith("torque that is not cut off determines only M_0 + friction")
     (said,) = found.clipped
-    assert said.startswith("axis X: log.csv: the torque is cut off at +")
-    assert "the torque of these rows is left out of the fit; record with a wider range" in said
+    assert (said.code, said.place) == ("record-clipped", "X")
+    assert said.text.startswith("axis X: log.csv: the torque is cut off at +")
+    assert "the torque of these rows is left out of the fit" in said.text
 
 
 def test_a_record_of_the_position_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

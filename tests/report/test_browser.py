@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import evaluate
+from feedsim.foundation.errors import Finding
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import Picture, Report
 from feedsim.report.formatting import PALETTE
@@ -209,7 +210,9 @@ def test_what_is_saved_is_what_is_shown(
 def test_a_long_path_in_a_warning_does_not_widen_a_phone(browser: Any) -> None:
     long = "/home/" + 20 * "somebody_"
     page = browser.new_page(viewport={"width": 360, "height": 800})
-    page.set_content(html(Report(long, long, [], "", warnings=[long], notes=[long], answer=[long])))
+    page.set_content(
+        html(Report(long, long, [], "", warnings=[Finding("not-settled", "doubt", long)], notes=[long], answer=[long]))
+    )
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
     page.close()
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import diagnoses, evaluate
-from feedsim.foundation.errors import Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.report import run as report
 from feedsim.report.content import Report, parted
 from feedsim.report.page import html
@@ -119,10 +119,11 @@ def test_paper_has_the_first_screen_and_what_is_unfolded(browser: Any, kinds: Ki
 
 
 def test_what_is_wrong_stands_ahead_of_the_answer() -> None:
-    wrong = Wrong("speed loop of X: UNSTABLE, it swings at 204 Hz")
-    run = replace(circle_run(), warnings=("something doubtful", wrong))
+    wrong = Finding("loop-unstable", "wrong", "speed loop of X: UNSTABLE, it swings at 204 Hz")
+    doubt = Finding("not-settled", "doubt", "something doubtful")
+    run = replace(circle_run(), warnings=(doubt, wrong))
     text = html(report.report.report_of(run, {}, []))
-    first = html(Report("t", "", [], "", answer=["the answer"], warnings=["something doubtful", wrong]))
+    first = html(Report("t", "", [], "", answer=["the answer"], warnings=[doubt, wrong]))
     assert first.index("UNSTABLE") < first.index("the answer") < first.index("something doubtful")
     assert text.index("UNSTABLE") < text.index("<main>")
 

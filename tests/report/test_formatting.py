@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from feedsim.analysis import Figure
+from feedsim.foundation.errors import Finding
 from feedsim.report.content import Report
 from feedsim.report.formatting import display_unit, duration, minus, powers, shown, typeset
 from feedsim.report.page import html
@@ -23,7 +24,8 @@ from report_helpers import Page
 )
 def test_words_are_printed_with_signs_of_their_own(said: str, printed: str) -> None:
     assert typeset(said) == printed
-    text = html(Report("t", "s", [], "", answer=[said], warnings=[said], notes=[said]))
+    finding = Finding("not-settled", "doubt", said)
+    text = html(Report("t", "s", [], "", answer=[said], warnings=[finding], notes=[said]))
     assert [word.strip() for word in Page(text).words].count(printed) == 3
 
 

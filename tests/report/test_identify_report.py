@@ -16,7 +16,7 @@ import pytest
 from agreement_helpers import assert_numbers_agree
 from feedsim.estimation.identify.friction_file import open_loop_line
 from feedsim.estimation.identify.result import Balance, Correlation, Identification
-from feedsim.foundation.errors import OutputError
+from feedsim.foundation.errors import Finding, OutputError
 from feedsim.jobs.identify import KIND, result_of
 from feedsim.report.chart import Grid
 from feedsim.report.identify import headline, rigid_line, table_lines, terminal_warnings
@@ -206,7 +206,8 @@ def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
 def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
     stage = identification().stationary
     assert stage is not None
-    doubtful = replace(stage, warnings=("F_log sits at its bound 0",))
+    at_bound = Finding("parameter-at-bound", "doubt", "F_log sits at its bound 0", "F_log")
+    doubtful = replace(stage, warnings=(at_bound,))
     apart = identified(found=identification(stationary=doubtful, prior=False))
     result_of(apart).save(tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -223,13 +224,17 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
     vague = replace(found.estimates["F_S"], status="undetermined", reason="its 95 % interval is +-281 % of the value")
     also = replace(found.estimates["v_s"], status="undetermined", reason="no Stribeck effect shows")
     both = {**found.estimates, "F_S": vague, "v_s": also}
-    repeating = ("F_S: its 95 % interval is +-281 % of the value",
-                 "v_s is not estimated but held at 2: no Stribeck effect shows",
-                 "F_S and W: its 95 % interval is +-281 % of the value")  # fmt: skip
+    wide = "its 95 % interval is +-281 % of the value"
+    repeating = (
+        Finding("parameter-undetermined", "doubt", f"F_S: {wide}", "F_S"),
+        Finding("parameter-held", "doubt", "v_s is not estimated but held at 2: no Stribeck effect shows", "v_s"),
+        Finding("parameter-undetermined", "doubt", f"F_S and W: {wide}", "F_S, W"),
+    )
     telling = (
-        "sigma_1 is known to 6.7 % only",
-        "W: its 95 % interval is +-281 % of the value",
-        "no Stribeck effect shows",
+        Finding("parameter-uncertain", "doubt", "sigma_1 is known to 6.7 % only", "sigma_1"),
+        Finding("parameter-undetermined", "doubt", f"W: {wide}", "W"),
+        Finding("stribeck-curve-missing", "doubt", "no Stribeck effect shows"),
+        Finding("parameter-held", "doubt", "v_s is not estimated but held at 2: another reason", "v_s"),
     )
     whole = identified(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
     assert terminal_warnings(whole) == list(telling)

@@ -143,5 +143,5 @@ def test_sines_alone_say_nothing_of_the_given_inertia(chosen: slice, warned: boo
     law: Any = None
     run = stages._Run(records()[chosen], law, Options("Z", I_P, J=given), lambda *_: None)
     run._compare(SimpleNamespace(J=replace(given, value=0.0132, sigma=1e-5, status="estimated")))
-    assert len(run.warnings) == warned
-    assert not warned or "the inertia is given as 0.0164 kg.m2" in run.warnings[0]
+    assert [finding.code for finding in run.warnings] == ["inertia-contradicted"] * warned
+    assert not warned or "the inertia is given as 0.0164 kg.m2" in run.warnings[0].text

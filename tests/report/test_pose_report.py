@@ -62,10 +62,11 @@ def test_whole_travel_against_a_dense_solver() -> None:
     assert axis.largest.frequency == pytest.approx(98.3, abs=0.1)
     assert axis.largest.change == pytest.approx(-0.36, abs=0.01)
     assert change.large == (axis,)
-    (sentence,) = warnings(change)
-    assert "axis Z moves 585 mm away" in sentence
-    assert "98.3 Hz" in sentence
-    assert "--poses Z=20mm" in sentence
+    (left,) = warnings(change)
+    assert (left.code, left.place) == ("pose-left", "Z")
+    assert "moves 585 mm away" in left.text
+    assert "98.3 Hz" in left.text
+    assert left.remedy.endswith("--poses Z=20mm")
 
 
 def test_static_compliances_against_the_full_matrices() -> None:
@@ -141,7 +142,9 @@ def test_a_run_with_one_pose(units: Path, tmp_path: Path) -> None:
     plan = scenario(Move(to={"Z": 0.3}, feed=0.5), Dwell(duration=0.05))
     run = judged(cosim.run(plan))
     assert run.pose.crossings is None
-    assert sum("axis Z moves 200 mm away" in warning for warning in run.warnings) == 1
+    (left,) = (finding for finding in run.warnings if finding.code == "pose-left")
+    assert (left.place, left.remedy) == ("Z", "feedsim export --plant ... --poses Z=20mm")
+    assert "moves 200 mm away" in left.text
     assert judge.check(plan, run.program)[-1] in run.warnings
     write_run(run, {}, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -186,7 +189,8 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     assert isinstance(part["crossings"], dict)
     assert part["crossings"]["count"] == 2
     far = judged(cosim.run(scenario(Move(to={"Z": 0.4}, feed=0.5), machine=machine)))
-    assert "axis Z leaves the plant's grid of poses (60 mm to 240 mm) by 160 mm" in "\n".join(far.warnings)
+    (left,) = (finding for finding in far.warnings if finding.code == "pose-grid-left")
+    assert "(60 mm to 240 mm) by 160 mm" in left.text
 
 
 # --- the command ------------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ import pytest
 from feedsim.analysis import Figure, evaluate
 from feedsim.cli.commands import finish, warn
 from feedsim.files.trace import read_csv
-from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.jobs.check import Checked
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
@@ -155,22 +155,31 @@ def test_names_from_files_cannot_break_the_page(tmp_path: Path) -> None:
 
 
 def test_warnings_stand_at_the_top(tmp_path: Path) -> None:
-    run = replace(positioning_run(), warnings=("Z: the torque was < limited",))
+    limited = Finding("torque-clipped", "doubt", "Z: the torque was < limited", "Z")
+    run = replace(positioning_run(), warnings=(limited,))
     write_run(run, evaluate(run), tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     warning = text.index("<strong>Warning:</strong> Z: the torque was &lt; limited")
     assert text.index("<h1>") < warning < text.index('class="note"') < text.index('class="keys"')
-    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["warnings"] == list(run.warnings)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["warnings"] == [limited.text]
+    assert summary["findings"] == [
+        {"code": "torque-clipped", "severity": "doubt", "text": limited.text, "place": "Z", "remedy": ""}
+    ]
     write_run(positioning_run(), {}, tmp_path)
     assert 'role="alert"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = (Note("as built"), "doubtful", Wrong("worse than < before"), "doubtful")
+    doubt = Finding("not-settled", "doubt", "doubtful")
+    wrong, note = (
+        Finding("compensation-worse", "wrong", "worse than < before"), Finding("values-to-check", "note", "as built"),
+    )  # fmt: skip
+    found = (note, doubt, wrong, doubt)
     write_run(replace(positioning_run(), warnings=found), {}, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    wrong = page.index('<p class="wrong"><strong>Wrong:</strong> worse than &lt; before</p>')
-    assert wrong < page.index("<strong>Warning:</strong> doubtful") < page.index('<p class="note">as built</p>')
+    first = page.index('<p class="wrong"><strong>Wrong:</strong> worse than &lt; before</p>')
+    assert first < page.index("<strong>Warning:</strong> doubtful") < page.index('<p class="note">as built</p>')
     told = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert told["warnings"] == ["worse than < before", "doubtful"]
     assert [each["severity"] for each in told["findings"]] == ["wrong", "doubt", "note"]

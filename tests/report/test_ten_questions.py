@@ -14,7 +14,7 @@ import pytest
 
 from feedsim.analysis import evaluate
 from feedsim.foundation.arguments import Call, calling
-from feedsim.foundation.errors import Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.jobs.parameters import command_line
 from feedsim.report.content import FOLDER, Report, Step, typed
 from feedsim.report.page import html
@@ -48,9 +48,11 @@ def first_screen(browser: Any, file: Path) -> str:
 @pytest.fixture(scope="module")
 def unstable(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A stop whose position loop is unstable, as the judgement of a run words it."""
-    said = Wrong(
+    said = Finding(
+        "loop-unstable",
+        "wrong",
         "axis Z: the position loop is unstable with K_v = 30 (m/min)/mm: unstable while the axis slides, stable below "
-        "K_v = 27.5 (m/min)/mm"
+        "K_v = 27.5 (m/min)/mm",
     )
     run, folder = replace(positioning_run(), warnings=(said,)), tmp_path_factory.mktemp("unstable")
     write_run(run, evaluate(run), folder)
@@ -119,7 +121,16 @@ def test_findings_name_files_without_their_folders() -> None:
         r"C:\logs\capture.json: axis Y1 has gaps",
         "logs/capture.json: 3 of 4 rows, 10 mm/min, N.m/rad, and/or",
     ]
-    page = html(Report("t", "", [], "", warnings=said, notes=["see /home/me/a.yaml"]))
+    page = html(
+        Report(
+            "t",
+            "",
+            [],
+            "",
+            warnings=[Finding("rows-missing", "doubt", text) for text in said],
+            notes=["see /home/me/a.yaml"],
+        )
+    )
     assert "/home" not in page
     assert "C:\\" not in page
     for text in ("capture.json: axis X1", "capture.json: axis Y1", "logs/capture.json: 3 of 4", "see a.yaml"):

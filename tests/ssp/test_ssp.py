@@ -10,7 +10,7 @@ import pytest
 
 import ssp_helpers
 from feedsim import analysis, scenario
-from feedsim.foundation.errors import Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation import cosim, nc, ssp
 from feedsim.simulation.judge import JudgedRun, judged
@@ -279,8 +279,8 @@ def test_a_shorter_experiment(exported: Path, tmp_path: Path, stop: float, left:
         assert found.program.segments[:-1] == whole.program.segments[: left - 1]
         assert found.program.segments[-1].end == found.program.duration
         assert bool(found.scenario.evaluate) == evaluated
-        told = ("shorter.ssp: ends at 0.05 s, too early for evaluate.0 (positioning of Z, to 0.",)
-        assert [w.startswith(t) for w, t in zip(found.warnings, () if evaluated else told, strict=True)] != [False]
+        assert [finding.code for finding in found.warnings] == ["evaluation-left-out"] * (not evaluated)
+        assert evaluated or "too early for evaluate.0 (positioning of Z, to 0." in found.warnings[0].text
         analysis.check(found.scenario, found.program)
     part = run_ssp(file)
     for name in part.trace.columns:
@@ -310,7 +310,9 @@ def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
     late = with_stop(exported, tmp_path / "late.ssp", 1000.0 + end, 1000.0)
     assert_same(run_ssp(exported), run_ssp(late))
     with ssp.opened(late) as found:
-        assert found.warnings == ("late.ssp: starts at 1000 s; results count time from there: their 0 s is its 1000 s",)
+        (finding,) = found.warnings
+        assert (finding.code, finding.place) == ("start-time-shifted", "late.ssp")
+        assert "their 0 s is its 1000 s" in finding.text
 
 
 def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> None:
@@ -344,8 +346,9 @@ def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> N
 def test_what_is_wrong_stays_so_in_an_ssp() -> None:
     file = Path("a.ssp")
     found = Opened(None, None, file, Path("there"), (), {"plant.fmu": "resources/plant.fmu"})  # type: ignore[arg-type]
-    (told,) = found.told([Wrong(f"{Path('there') / 'plant.fmu'}: bad")])
-    assert (type(told), told) == (Wrong, "a.ssp: resources/plant.fmu: bad")
+    archive = str(Path("there") / "plant.fmu")
+    (told,) = found.told([Finding("unit-warns", "wrong", f"{archive}: bad", archive)])
+    assert told == Finding("unit-warns", "wrong", "a.ssp: resources/plant.fmu: bad", "a.ssp: resources/plant.fmu")
 
 
 def test_written_anew_by_another_tool(exported: Path, tmp_path: Path) -> None:

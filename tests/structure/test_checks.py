@@ -10,7 +10,7 @@ import pytest
 from fe_models import assembly, chain, geometry
 from scipy import sparse
 
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.structure.parts import SI, UnitSystem
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.build import check, frequency_warnings
@@ -128,7 +128,9 @@ def test_degrees_of_freedom_with_nothing() -> None:
 def test_massless_is_fine_where_stiffness_holds_it() -> None:
     mass = MASS.copy()
     mass[1, 1] = 0.0
-    assert check(assembly(mass, STIFFNESS)) == ["1 degree of freedom follows statically, without mass: body[1] ux"]
+    (finding,) = check(assembly(mass, STIFFNESS))
+    assert finding.code == "freedom-massless"
+    assert "body[1] ux" in finding.text
 
 
 def test_a_massless_mechanism_is_named() -> None:
@@ -164,10 +166,9 @@ def test_a_part_that_is_held_on_its_own_is_a_warning() -> None:
     mass, stiffness = chain([100.0, 200.0, 300.0, 7.0, 8.0], [4e6, 9e6, 0.0, 5e6])
     stiffness[4, 4] += 1e5
     ports = {port: np.pad(vector, (0, 2)) for port, vector in assembly(MASS, STIFFNESS).ports.items()}
-    assert check(assembly(mass, stiffness, ports=ports)) == [
-        "a part of 2 degrees of freedom (body[3] ux, body[4] ux) is connected to the ground alone, not to the 3 of the "
-        "largest part"
-    ]
+    (finding,) = check(assembly(mass, stiffness, ports=ports))
+    assert finding.code == "part-on-ground"
+    assert "a part of 2 degrees of freedom (body[3] ux, body[4] ux)" in finding.text
 
 
 def test_a_rotor_that_drives_by_its_ports_alone_may_fly() -> None:
@@ -210,32 +211,34 @@ def test_ports_that_excite_nothing() -> None:
         assembly(MASS, STIFFNESS, ports={**ports, "n_X": ZEROS})
     )
     assert "port x_X excites nothing" in fault(assembly(MASS, STIFFNESS, ports={**ports, "x_X": ZEROS}))
-    assert check(assembly(MASS, STIFFNESS, ports={**ports, "tcp_Y": ZEROS, "tcp_Z": ZEROS})) == [
-        "ports tcp_Y, tcp_Z excite nothing: forces there move nothing, displacements stay 0"
-    ]
+    (finding,) = check(assembly(MASS, STIFFNESS, ports={**ports, "tcp_Y": ZEROS, "tcp_Z": ZEROS}))
+    assert (finding.code, finding.place) == ("port-idle", "tcp_Y, tcp_Z")
     assert "axis Y has no port n_Y" in fault(assembly(MASS, STIFFNESS, axes=("X", "Y")))
 
 
-def units(factor: float, spacing: float, system: UnitSystem | None = SI) -> list[str]:
+def units(factor: float, spacing: float, system: UnitSystem | None = SI) -> list[Finding]:
     mass, stiffness = chain([3000.0 * factor] * 3, [4e6, 9e6])
     return check(replace(assembly(mass, stiffness, geometry=geometry(3, spacing)), units=system))
 
 
-def test_units_that_look_like_others() -> None:
+@pytest.mark.parametrize(
+    ("factor", "spacing", "code", "size", "hint"),
+    [
+        (1e-3, 1.0, "model-mass-unusual", "9 kg", "9 looks like tonnes, units: {mass: t}"),
+        (1e3, 1.0, "model-mass-unusual", "9e+06 kg", "9e+06 looks like grams, units: {mass: g}"),
+        (1.0, 1000.0, "model-size-unusual", "2000 m", "2000 looks like millimetres, units: {length: mm}"),
+        (1.0, 1e-3, "model-size-unusual", "0.002 m", "was it converted from millimetres twice?"),
+    ],
+)
+def test_units_that_look_like_others(factor: float, spacing: float, code: str, size: str, hint: str) -> None:
+    (finding,) = units(factor, spacing)
+    assert finding.code == code
+    assert size in finding.text
+    assert finding.text.endswith(hint)
+
+
+def test_usual_mass_and_size_are_not_doubted() -> None:
     assert units(1.0, 1.0) == []
-    assert units(1e-3, 1.0) == [
-        "the model's mass is 9 kg; a machine has 20 kg to 1e+06 kg; 9 looks like tonnes, units: {mass: t}"
-    ]
-    assert units(1e3, 1.0) == [
-        "the model's mass is 9e+06 kg; a machine has 20 kg to 1e+06 kg; 9e+06 looks like grams, units: {mass: g}"
-    ]
-    assert units(1.0, 1000.0) == [
-        "the model measures 2000 m; a machine measures 0.05 m to 100 m; 2000 looks like millimetres, "
-        "units: {length: mm}"
-    ]
-    assert units(1.0, 1e-3) == [
-        "the model measures 0.002 m; a machine measures 0.05 m to 100 m; was it converted from millimetres twice?"
-    ]
 
 
 @pytest.mark.parametrize(
@@ -254,16 +257,16 @@ def test_units_that_look_like_others() -> None:
 def test_no_hint_of_a_unit_that_is_set(factor: float, spacing: float, system: UnitSystem | None, hint: str) -> None:
     """What is proposed is what the file's own number is in another unit than the stated one."""
     (warning,) = units(factor, spacing, system)
-    assert warning.endswith(hint)
+    assert warning.code in ("model-mass-unusual", "model-size-unusual")
+    assert warning.text.endswith(hint)
 
 
 def test_mass_by_labels_counts_translations_alone() -> None:
     labels = ("a ux", "b ux", "b rx")
     mass = np.diag([5.0, 5.0, 1e9])
-    warnings = check(assembly(mass, STIFFNESS, labels=labels))
-    assert warnings == [
-        "the model's mass is 10 kg; a machine has 20 kg to 1e+06 kg; 10 looks like tonnes, units: {mass: t}"
-    ]
+    (finding,) = check(assembly(mass, STIFFNESS, labels=labels))
+    assert finding.code == "model-mass-unusual"
+    assert "the model's mass is 10 kg" in finding.text
     # Where nothing says which way a degree of freedom goes, nothing is said of the mass.
     assert check(assembly(mass, STIFFNESS, labels=("dof 0", "dof 1", "dof 2"))) == []
 
@@ -271,11 +274,12 @@ def test_mass_by_labels_counts_translations_alone() -> None:
 def test_the_lowest_elastic_frequency() -> None:
     assert frequency_warnings(2 * np.pi * 21.0) == []
     (slow,) = frequency_warnings(2 * np.pi * 0.66)
-    assert "the lowest elastic mode is at 0.66 Hz; a machine's is from 1 Hz to 2000 Hz" in slow
-    assert "N/mm beside a mass in kg" in slow
+    assert slow.code == "mode-frequency-unusual"
+    assert "is at 0.66 Hz" in slow.text
+    assert "N/mm beside a mass in kg" in slow.text
     (fast,) = frequency_warnings(2 * np.pi * 2.1e4)
-    assert "2.1e+04 Hz" in fast
-    assert "mass in tonnes beside a stiffness in N/m" in fast
+    assert "2.1e+04 Hz" in fast.text
+    assert "mass in tonnes beside a stiffness in N/m" in fast.text
 
 
 def grid(n: int) -> Assembly:

@@ -133,5 +133,6 @@ def test_the_table_of_modes_is_doubted_once(poses: list[dict[str, float]]) -> No
     wrong = machine.model_copy(update={"pose": {**machine.pose, "Z": 0.4}})
     said = pose_change.table_mismatch(wrong)
     assert said is not None
-    assert "Z 0.4 m" in said
+    assert said.code == "modes-stale"
+    assert "Z 0.4 m" in said.text
     assert len(poses) == 2

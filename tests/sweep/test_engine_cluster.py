@@ -153,9 +153,9 @@ def test_a_late_worker_that_cannot_take_part_is_left_out(
         assert all(outcome.error is None for outcome in found)
         assert len({outcome.run for outcome in found}) == len(found)
         (warning,) = made.warnings
-        assert warning.startswith("worker tcp://")
-        assert "it is left out" in warning
-        assert [record.getMessage() for record in caplog.records if record.name == engine.__name__] == [warning]
+        assert warning.code == "worker-left-out"
+        assert warning.place.startswith("tcp://")
+        assert [record.getMessage() for record in caplog.records if record.name == engine.__name__] == [warning.text]
 
         able.kill()
         with pytest.raises(InputError, match=r"worker tcp://.*: has"):
@@ -196,4 +196,5 @@ def test_a_worker_without_feedsim_is_refused(a_cluster: Cluster) -> None:
 def test_other_packages_are_warned_of() -> None:
     answer = dict(provenance.versions()) | {"numpy": "1.0"}
     (warning,) = provenance.differences({"tcp://a:1": answer, "tcp://b:2": dict(provenance.versions())})
-    assert warning.startswith("tcp://a:1: numpy 1.0 in place of ")
+    assert (warning.code, warning.place) == ("workers-differ", "tcp://a:1")
+    assert "numpy 1.0 in place of " in warning.text

@@ -17,16 +17,17 @@ import pytest
 
 from feedsim.design.sweep.design import Outcome
 from feedsim.design.sweep.study import JOURNAL_NAME, Journal
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 HEAD = {"study": "S", "fingerprint": "abc", "parts": {"plant.fmu": "1", "parameters": "2"}}
 RUNS = 50
+BEWARE = Finding("loop-unstable", "wrong", "beware", "Z", "machine.axes.Z.drive.K_v=4 1/s")
 
 
 def outcome(run: int) -> Outcome:
     if run % 5 == 4:
         return Outcome(run, None, f"error of {run}:\n  ünit", 0.25)
-    return Outcome(run, {"Z.a": (run / 3, "m"), "Z.b": (math.nan, "Hz")}, None, 0.5, ("beware",) * (run % 2))
+    return Outcome(run, {"Z.a": (run / 3, "m"), "Z.b": (math.nan, "Hz")}, None, 0.5, (BEWARE,) * (run % 2))
 
 
 def same(one: Outcome, two: Outcome) -> bool:
@@ -98,7 +99,7 @@ def test_a_file_that_is_no_journal_is_refused_and_kept(tmp_path: Path) -> None:
     assert (tmp_path / JOURNAL_NAME).read_text() == "my notes\n"
 
 
-@pytest.mark.parametrize("content", [b"my notes", b'{"format": 2', b'{"format": 1, "study": "T'])
+@pytest.mark.parametrize("content", [b"my notes", b'{"format": 3', b'{"format": 2, "study": "T'])
 def test_a_file_without_a_line_feed_that_is_no_journal_is_kept(tmp_path: Path, content: bytes) -> None:
     (tmp_path / JOURNAL_NAME).write_bytes(content)
     with pytest.raises(InputError, match="not the journal of a study"):

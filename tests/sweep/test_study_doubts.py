@@ -56,9 +56,10 @@ def test_a_distribution_that_leads_out_of_the_allowed_range(study: Write, entry:
     found = load_study(study(HEAD + f"  W: {{key: machine.axes.Z.friction.W, {entry}}}\n")).warnings
     if told:
         (warning,) = found
-        assert warning.partition(": ")[0].endswith("study.yaml:5")
-        assert told in warning
-        assert "at least 0 rad" in warning
+        assert (warning.code, warning.place) == ("distribution-out-of-range", "W")
+        assert warning.text.partition(": ")[0].endswith("study.yaml:5")
+        assert told in warning.text
+        assert "at least 0 rad" in warning.text
     else:
         assert found == ()
 

@@ -178,13 +178,14 @@ def test_what_sets_the_same_place_twice(study: Write) -> None:
 def test_sobol_that_is_not_balanced_is_warned_of(study: Write) -> None:
     assert not load_study(study(), runs=64).warnings
     (warning,) = load_study(study(), runs=100).warnings
-    assert "64 or 128" in warning
+    assert (warning.code, warning.remedy) == ("sampling-unbalanced", "--runs 64")
 
 
 def test_a_middle_that_contradicts_the_scenario_is_warned_of(study: Write) -> None:
     text = HEAD + "  F_C: {key: machine.axes.Z.friction.F_C, from: 1 N.m, to: 30 N.m}\n"
     (warning,) = load_study(study(text)).warnings
-    assert "static friction is at least Coulomb friction" in warning
+    assert warning.code == "middle-refused"
+    assert "static friction is at least Coulomb friction" in warning.text
 
 
 def test_schema(study: Write, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,7 +16,7 @@ from scipy import stats
 from feedsim.design.sweep.design import Design, Outcome, design
 from feedsim.design.sweep.table import Table
 from feedsim.design.sweep.table import table_of as made
-from feedsim.foundation.errors import WRONG, Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.report import sweep as report
 from feedsim.report.chart.svg import EDGE
 from feedsim.report.formatting import scale
@@ -53,7 +53,7 @@ def table_of(
     figures: dict[str, tuple[str, Any]],
     *,
     failed: Mapping[int, str] | None = None,
-    warned: Mapping[int, str] | None = None,
+    warned: Mapping[int, Finding] | None = None,
     done: int | None = None,
 ) -> Table:
     """A table of the first `done` runs, default all; figures: name -> SI unit and (runs,) values."""
@@ -147,17 +147,22 @@ def test_a_figure_that_some_runs_do_not_have_is_counted(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 40}", SAMPLED)
     values = np.where(np.arange(40) < 3, np.nan, 0.1 + plan.values[:, 0])
     account = Account(table_of(study, plan, {"Z.settling_time": ("s", values)}, failed={39: "no"}), study, plan)
-    assert "Z.settling_time could not be determined in 3 of 39 runs." in account.warnings
+    told = {finding.code: finding for finding in account.warnings}
+    assert told["figure-not-determined"].place == "Z.settling_time"
+    assert "in 3 of 39 runs" in told["figure-not-determined"].text
     assert account.outputs[0].statistics["min"] > 0
 
 
 def test_warnings_of_runs_are_told_once(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 20}", SAMPLED)
-    told = {k: f"residual {k}.5 J" for k in range(5)} | {7: f"{WRONG}axis Z: the position loop is unstable"}
+    told = {k: Finding("exchange-loses-energy", "doubt", f"residual {k}.5 J", "Z") for k in range(5)}
+    told[7] = Finding("loop-unstable", "wrong", "axis Z: the position loop is unstable", "Z")
     account = Account(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, warned=told), study, plan)
-    assert "5 of 20 runs warn: residual 0.5 J" in account.warnings
-    (wrong,) = (each for each in account.warnings if isinstance(each, Wrong))
-    assert wrong == "1 of 20 runs: axis Z: the position loop is unstable"
+    lost, wrong = (finding for finding in account.warnings if finding.place == "Z")
+    assert (lost.code, lost.severity) == ("exchange-loses-energy", "doubt")
+    assert lost.text == "5 of 20 runs warn: residual 0.5 J"
+    assert (wrong.code, wrong.severity) == ("loop-unstable", "wrong")
+    assert wrong.text == "1 of 20 runs: axis Z: the position loop is unstable"
 
 
 def test_too_many_failures_for_indices_leave_rank_correlations(tmp_path: Path) -> None:
@@ -175,7 +180,8 @@ def test_a_part_of_a_study(tmp_path: Path) -> None:
     account = Account(part, study, plan)
     assert account.sensitivities.sobol["XZ.G"].used == 16
     assert account.sensitivities.sobol["XZ.G"].left_out == 0
-    assert "The study is not finished: 83 of 160 runs are done." in account.warnings
+    (unfinished,) = (finding for finding in account.warnings if finding.code == "study-not-finished")
+    assert "83 of 160 runs" in unfinished.text
 
 
 def test_constant_figures_are_told_but_not_drawn(tmp_path: Path) -> None:
@@ -184,7 +190,7 @@ def test_constant_figures_are_told_but_not_drawn(tmp_path: Path) -> None:
     account = Account(table, study, plan)
     whole, single = pictures_of(account)
     assert [each.stem for each in single] == ["distribution-XZ-G", "scatter-XZ-G"]
-    assert "XZ.still: no Sobol indices: the figure is the same in all runs." in account.warnings
+    assert ("sobol-missing", "XZ.still") in [(finding.code, finding.place) for finding in account.warnings]
     assert cells(html(report_of(account, whole, single)), "XZ.still")[2:4] == ["3", "0"]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from feedsim.design.sweep import Design, Outcome, Table, design, read_table, write_table
 from feedsim.design.sweep.table import table_of
-from feedsim.foundation.errors import InputError, OutputError
+from feedsim.foundation.errors import Finding, InputError, OutputError
 from feedsim.scenario.study import load_study
 
 
@@ -27,7 +27,8 @@ def outcomes(runs: int) -> list[Outcome]:
             made.append(Outcome(run, None, 'two,\n "lines"; ü', 0.1))
         else:
             figures = {"Z.b": (run / 3 + 1e-7, "m"), "Z.a": (float("nan") if run % 3 else -0.1, "Hz")}
-            made.append(Outcome(run, figures, None, 0.2, ("one", "two")[: run % 3]))
+            findings = (Finding("loop-unstable", "wrong", "one"), Finding("torque-clipped", "doubt", "two"))
+            made.append(Outcome(run, figures, None, 0.2, findings[: run % 3]))
     return made
 
 
@@ -52,7 +53,8 @@ def test_columns(planned: Design) -> None:
     assert found.figures == ("Z.b", "Z.a")
     assert np.count_nonzero(~found.ok) == 4
     assert found["message"][1] == 'two, "lines"; ü'
-    assert found["warnings"][2] == "one | two"
+    assert found["warnings"][2] == "WRONG: one | two"
+    assert [finding.code for finding in found.findings[2]] == ["loop-unstable", "torque-clipped"]
     assert np.array_equal(found["F_C"], planned.values[:, 0])
     assert set(found["scheme"]) == {"extrapolated", "jacobi"}
     with pytest.raises(InputError, match=r"no column 'Z\.B'; did you mean 'Z\.b'"):
@@ -61,7 +63,7 @@ def test_columns(planned: Design) -> None:
 
 def test_an_outcome_of_a_run_that_is_not_done_is_in_no_row(planned: Design) -> None:
     """It must not fall into the last one."""
-    other = Outcome(9, {"Z.b": (99.0, "m")}, None, 9.0, ("nine",))
+    other = Outcome(9, {"Z.b": (99.0, "m")}, None, 9.0, (Finding("not-settled", "doubt", "nine"),))
     found = table_of(planned, range(4), [*outcomes(4), other], None, {})
     assert equal(found, table_of(planned, range(4), outcomes(4), None, {}))
 

@@ -41,7 +41,7 @@ def test_pitch_and_direction_follow_from_power(tmp_path: Path, pitch: float, sig
         assert record.torque is not None
         assert record.angle is not None
         assert record.torque @ np.gradient(record.angle) > 0
-        assert any("the pitch is" in text and "TORQUE" in text for text in read.provenance.warnings)
+        assert "pitch-by-power" in [finding.code for finding in read.provenance.warnings]
 
 
 def test_a_gap_of_the_counter_is_a_gap_of_the_time(tmp_path: Path) -> None:
@@ -50,7 +50,7 @@ def test_a_gap_of_the_counter_is_a_gap_of_the_time(tmp_path: Path) -> None:
     read = read_records(path, axis="Y")
     assert [len(record.time) for record in read.records] == [600, 400]
     assert read.records[1].time[0] == pytest.approx(1100 * CYCLE)
-    assert any("missing" in text or "gap" in text for text in read.provenance.warnings)
+    assert "rows-missing" in [finding.code for finding in read.provenance.warnings]
 
 
 def test_speeds_that_are_no_slopes_have_no_unit(tmp_path: Path) -> None:
@@ -137,7 +137,8 @@ def test_remarks_ahead_of_the_header_and_old_encodings(tmp_path: Path) -> None:
     assert recording.names == ("time", "x", "n")
     assert recording.units["x"] == "µm"
     assert recording.read(["x"])["x"].tolist() == [0.5, 1, 1.5]
-    assert recording.notes == (f"{path}: the header is taken to be line 4; the lines ahead of it are not read",)
+    (note,) = recording.notes
+    assert (note.code, note.place) == ("header-below-remarks", f"{path}:4")
     assert recording.row(0).endswith("log.csv:5")
     path.write_text(LOG, encoding="utf-8")
     assert read_recording(path).notes == ()

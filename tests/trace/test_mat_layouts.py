@@ -183,7 +183,8 @@ def test_rows_at_events(tmp_path: Path) -> None:
     assert read_series(path).time.tolist() == time.tolist()
     recording = read_recording(path)
     np.testing.assert_array_equal(recording.read(["time"])["time"], T)
-    assert "3 of 43 rows are left out" in recording.notes[0]
+    assert recording.notes[0].code == "rows-left-out"
+    assert "3 of 43 rows" in recording.notes[0].text
     assert len(convert(path, [], tmp_path / "a.csv")) == len(T)
 
 

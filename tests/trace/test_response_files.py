@@ -275,14 +275,14 @@ def test_accelerance_and_its_kin(tmp_path: Path, unit: str, values: np.ndarray |
     rows = "".join(f"{f:.17g},{v.real:.17g},{v.imag:.17g}\n" for f, v in zip(LINES, given, strict=True))
     file = written(tmp_path, f"frequency [Hz],a re [{unit}],a im [{unit}]\n0,1,1\n{rows}")
     found = read_response_csv(file)
-    assert found.notes == (f"{file}: the line at 0 Hz is left out",)
+    assert [(note.code, note.place) for note in found.notes] == [("zero-frequency-left-out", str(file))]
     if values is None:
         with pytest.raises(InputError, match=words):
             found.converted({"a": "m/N"})
         return
     receptance = found.converted({"a": "m/N"})
     np.testing.assert_allclose(receptance["a"], RECEPTANCE, rtol=1e-12)
-    assert words in (receptance.notes[1] if words else "")
+    assert words in (receptance.notes[1].text if words else "")
     assert len(receptance.notes) == 1 + bool(words)
     np.testing.assert_allclose(receptance.converted({"a": "(m/s^2)/N"})["a"], S**2 * RECEPTANCE, rtol=1e-12)
 
@@ -330,7 +330,8 @@ def test_units_by_types_of_a_universal_file(
     found = read_response(file)
     receptance = found.converted(dict.fromkeys(found.names, "m/N"))
     np.testing.assert_allclose(receptance[found.names[0]], RECEPTANCE, rtol=1e-5)  # frequencies are E13.5
-    assert any(words in note for note in receptance.notes)
+    (note,) = (note for note in receptance.notes if words in note.text)
+    assert note.code in ("response-converted", "unit-assumed", "unit-contradicted")
 
 
 # --- what is asked for on the command line -------------------------------------------------------------------------

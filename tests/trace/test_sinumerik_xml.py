@@ -35,7 +35,7 @@ def test_its_time_signals_tell_the_same(tmp_path: Path) -> None:
     np.testing.assert_allclose(values["time"], STEP * np.arange(N), atol=1e-12)
     x, y = (np.array([np.fft.rfft(values[f"axis 1 node {node} run {k}"]) for k in (1, 2)]) for node in (62, 61))
     np.testing.assert_allclose(((y * x.conj()).sum(0) / (np.abs(x) ** 2).sum(0))[1:], system[1:], rtol=1e-9)
-    assert "neither units nor names" in recording.notes[0]
+    assert recording.notes[0].code == "signals-not-named"
 
 
 def trace(tmp_path: Path, rows: str) -> Path:
@@ -56,7 +56,8 @@ def test_a_trace_over_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(values["time"], 0.002 * np.arange(1, 7))
     np.testing.assert_allclose(values["nckServoDataActPos1stEnc64 2"], 1.5 * np.arange(1, 7))
     assert values["nckServoDataActCurr64 2"].tolist() == [1, 1, 3, 3, 5, 5]
-    assert any("nckServoDataActCurr64 2: sampled less often" in note for note in recording.notes)
+    (note,) = (note for note in recording.notes if note.code == "channel-resampled")
+    assert "nckServoDataActCurr64 2" in note.text
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace import Trace
 from feedsim.files.trace.response import FrequencyResponse, quotient_unit
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Coupling, Machine
 from feedsim.simulation.cosim.excite import Measurement, measure, usual_rms
 from feedsim.simulation.nc.excitation import Excitation, binary_sequence, multisine
@@ -227,7 +227,7 @@ class Campaign:
         wall_time: of all measurements [s].
         simulated: time that they took on the machine [s].
         units: per instance, GUID and version of its archive.
-        warnings: a sentence each.
+        warnings: those of the measurements.
     """
 
     plan: Plan
@@ -236,7 +236,7 @@ class Campaign:
     wall_time: float
     simulated: float
     units: Mapping[str, Mapping[str, str]]
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
 
 Progress = Callable[[str, int, int], None]
@@ -259,7 +259,7 @@ def run_campaign(
     units: dict[str, str] = {}
     coherence: dict[str, NDArray[np.float64]] = {}
     instances: dict[str, Mapping[str, str]] = {}
-    frequency, excited, warnings = None, [], []
+    frequency, excited, warnings = None, [], list[Finding]()
     wall_time = simulated = 0.0
     for axis, inject, pairs in _inputs(machine, axes, plan):
         measurements = [

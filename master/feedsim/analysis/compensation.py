@@ -12,7 +12,7 @@ from feedsim.analysis.circularity import Contour, Turn, circularity, contour, qu
 from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.analysis.figures import Array, Figure
 from feedsim.files.trace import Trace
-from feedsim.foundation.errors import InputError, Note, Wrong
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import CircleTest, FrictionParameters, Machine, Recording, Scenario
 from feedsim.simulation.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
 from feedsim.simulation.cosim.friction_law import FrictionLaws
@@ -175,7 +175,7 @@ class Compensation:
         figures: "before.G", "after.glitch_X" ... as of a circle test, "before.dip_X" ..., "X.delay" ...
         table: what errors cost; empty where it was not asked for.
         changed: what the compensation does on changed machines; empty without a table.
-        warnings: what a user should know before believing the result, a sentence each.
+        warnings: what a user should know before believing the result.
     """
 
     task: CircleTask
@@ -190,7 +190,7 @@ class Compensation:
     figures: Mapping[str, Figure]
     table: tuple[Variation, ...]
     changed: tuple[Changed, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
     @property
     def scenario(self) -> Scenario:
@@ -329,7 +329,7 @@ def _reversals(trace: Trace, turn: Turn) -> dict[str, float]:
     }
 
 
-def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
+def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Mapping[str, float]) -> list[Finding]:
     """What the compensation has made worse: wrong is more of G or of a reversal, of other figures it is a doubt.
 
     before, after: as from `_reversals`.
@@ -353,8 +353,14 @@ def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Ma
         if name.rpartition(".")[2] in ("G", "G_ls") or name.startswith(REVERSAL)
     }
     rest = {name: both for name, both in worse.items() if name not in grave}
-    wrongs = [Wrong(f"worse with compensation than without: {_listed(grave)}")] if grave else []
-    return wrongs + ([f"larger with compensation than without: {_listed(rest)}"] if rest else [])
+    result = []
+    if grave:
+        text = f"worse with compensation than without: {_listed(grave)}"
+        result.append(Finding("compensation-worse", "wrong", text, ", ".join(grave)))
+    if rest:
+        text = f"larger with compensation than without: {_listed(rest)}"
+        result.append(Finding("compensation-larger", "doubt", text, ", ".join(rest)))
+    return result
 
 
 def _size(name: str, value: float) -> float:
@@ -374,14 +380,15 @@ def _listed(pairs: Mapping[str, tuple[float, float]]) -> str:
     )
 
 
-def _not_judged(axes: Sequence[str], turn: Turn) -> list[str]:
-    others = [axis for axis in axes if axis not in turn.axes]
-    return [f"axis {', '.join(others)}: compensated, but no figure of the circle judges it"] if others else []
+def _not_judged(axes: Sequence[str], turn: Turn) -> list[Finding]:
+    others = ", ".join(axis for axis in axes if axis not in turn.axes)
+    text = f"axis {others}: compensated, but no figure of the circle judges it"
+    return [Finding("compensation-not-judged", "doubt", text, others)] if others else []
 
 
 def _same_model(
     machine: Machine, used: Mapping[str, FrictionParameters], lags: Mapping[str, Lag], table: Sequence[Variation]
-) -> list[str]:
+) -> list[Finding]:
     """That the compensation knows the machine exactly, as it never does a real one, and what errors would leave."""
     same = [axis for axis, friction in used.items() if friction == machine.axes[axis].friction and axis in lags]
     if not same:
@@ -393,12 +400,12 @@ def _same_model(
             f"an error as in the table leaves G up to {1e6 * worst.quality.G:.3g} um "
             f"({worst.what} {worst.change:+.3g} {worst.unit})"
         )
-    return [
-        Note(
-            f"axis {', '.join(same)}: model and machine have the same friction and delay, so what is left is the least "
-            f"that can be reached, not what a real machine will show; {errors}"
-        )
-    ]
+    return [Finding(
+        "friction-known-exactly", "note",
+        f"axis {', '.join(same)}: model and machine have the same friction and delay, so what is left is the least "
+        f"that can be reached, not what a real machine will show; {errors}",
+        ", ".join(same),
+    )]  # fmt: skip
 
 
 def lags_of(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
@@ -467,10 +474,14 @@ def _feedforward_figures(
     return figures
 
 
-def _doubts(delays: Mapping[str, float]) -> list[str]:
+def _doubts(delays: Mapping[str, float]) -> list[Finding]:
     return [
-        f"axis {axis}: the feedforward looks {-delay * 1e3:.3g} ms ahead of the speed setpoint; a control can do that "
-        "only where it knows its setpoints in advance"
+        Finding(
+            "feedforward-looks-ahead", "doubt",
+            f"axis {axis}: the feedforward looks {-delay * 1e3:.3g} ms ahead of the speed setpoint; a control can do "
+            "that only where it knows its setpoints in advance",
+            axis,
+        )
         for axis, delay in delays.items()
         if delay < 0
-    ]
+    ]  # fmt: skip

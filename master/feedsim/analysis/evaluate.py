@@ -26,7 +26,7 @@ from feedsim.analysis.contour_error import ContourError, contour_error
 from feedsim.analysis.figures import Array, Figure
 from feedsim.analysis.positioning import MIN_REST_TIME, Accuracy, Approach, mounts_share, positioning, readings
 from feedsim.files.trace import Trace, matches
-from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.linear.loops import measuring_error, position_reference
 from feedsim.linear.system import LinearSystem
 from feedsim.motions.circular import Circular
@@ -520,18 +520,21 @@ def contours(result: Result) -> Mapping[str, ContourError]:
     return known
 
 
-def program_notes(program: Program) -> tuple[Note, ...]:
+def program_notes(program: Program) -> tuple[Finding, ...]:
     """What is to be known of the NC programs among the motions."""
     geometries = [segment.geometry for segment in program.segments]
-    return tuple(Note(text) for entry in geometries if isinstance(entry, Programmed) for text in entry.notes)
+    return tuple(note for entry in geometries if isinstance(entry, Programmed) for note in entry.notes)
 
 
-def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Note, ...]:
+def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Finding, ...]:
     """Figures that do not mean what their names say, of this result."""
     notes = []
     for prefix, diagnosis in diagnoses.items():
         own = {name.removeprefix(f"{prefix}."): f for name, f in figures.items() if name.startswith(f"{prefix}.")}
-        notes += [Note(f"{prefix}: {sentence}") for sentence in misleading(diagnosis, own)]
+        notes += [
+            Finding("glitch-misleading", "note", f"{prefix}: {sentence}", prefix)
+            for sentence in misleading(diagnosis, own)
+        ]
     return tuple(notes)
 
 

@@ -17,7 +17,7 @@ from feedsim.analysis.figures import Figure
 from feedsim.analysis.truncation import Truncation
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.files.trace.response_files import read_overlay
-from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.linear.loops import figure_key, response, unit_of
 from feedsim.linear.plant import Floats
 from feedsim.scenario import Machine
@@ -52,7 +52,7 @@ class Responses:
         overlays: curves from elsewhere.
         truncation: the full finite-element model beside what was kept of it; None where it is not known.
         figures: all numbers derived, by name.
-        warnings: what a user should know before believing the curves, a sentence each.
+        warnings: what a user should know before believing the curves.
     """
 
     machine: Machine
@@ -65,7 +65,7 @@ class Responses:
     overlays: tuple[Overlay, ...] = ()
     truncation: Truncation | None = None
     figures: Mapping[str, Figure] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
 
 def highest_frequency(machine: Machine) -> float:
@@ -93,15 +93,14 @@ def closed_form(system: linear.LinearSystem, wanted: Sequence[str], frequency: F
     )
 
 
-def zero_notes(closed: FrequencyResponse) -> list[Note]:
+def zero_notes(closed: FrequencyResponse) -> list[Finding]:
     """Which responses are zero at all frequencies: a machine of rigid axes, for one, has no compliance at the tool."""
-    zero = [name for name in closed.names if not np.any(closed[name])]
-    return (
-        [Note(f"{', '.join(zero)}: zero at all frequencies in this machine; there is nothing to draw")] if zero else []
-    )
+    zero = ", ".join(name for name in closed.names if not np.any(closed[name]))
+    text = f"{zero}: zero at all frequencies in this machine; there is nothing to draw"
+    return [Finding("response-zero", "note", text, zero)] if zero else []
 
 
-def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
+def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[Finding]]:
     """Curves of a file that are to be laid over, and warnings.
 
     text: as feedsim.files.trace.response_files.read_overlay takes it. known: responses that are shown; a file read as a
@@ -119,7 +118,7 @@ def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[
             f"FILE:NAME, such as {text[: at if at > 0 else None]}:{known[0]}; shown are {', '.join(known)}"
         )
     overlays: list[Overlay] = []
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     for name in mine:
         alone = read.select([name])
         wanted = unit_of(name)
@@ -127,7 +126,8 @@ def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[
             alone = alone.converted({name: wanted})
             warnings += alone.notes
         elif wanted != "1":
-            warnings.append(f"--overlay {text}: {name} has no unit in the file; it is taken to be in {wanted}")
+            said = f"--overlay {text}: {name} has no unit in the file; it is taken to be in {wanted}"
+            warnings.append(Finding("unit-assumed", "doubt", said, name))
         overlays.append(Overlay(name, Path(text[: at if at > 0 else None]), alone))
     return overlays, list(dict.fromkeys([*read.notes, *warnings]))
 

@@ -16,14 +16,14 @@ import sys
 from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 from unicodedata import category
 
-from feedsim.foundation.errors import WRONG, InputError, Note, nearest, no_such_file, ranked, severity
+from feedsim.foundation.errors import WRONG, Finding, InputError, nearest, no_such_file, ranked
 from feedsim.jobs.parameters import COMMANDS, Argument, Declaration, Option, Parameter, Watch, declared
 
 GROUPS = {
@@ -442,9 +442,9 @@ class TerminalWatch(Watch):
     def note(self, sentence: str) -> None:
         """What the job will replace."""
         with self._aside():
-            warn([Note(sentence)])
+            warn([Finding("result-replaced", "note", sentence)])
 
-    def warn(self, findings: Iterable[str]) -> None:
+    def warn(self, findings: Iterable[Finding]) -> None:
         """What is the matter with the files that the job begins with."""
         with self._aside():
             warn(findings)
@@ -573,13 +573,13 @@ def painted(text: str, colour: str, stream: Any) -> str:
     return Painted(f"\x1b[{COLOURS[colour]}m{text}\x1b[0m")
 
 
-def warn(warnings: Iterable[str]) -> None:
+def warn(warnings: Iterable[Finding]) -> None:
     """Say on standard error what the user should know before believing the results; what is wrong first."""
-    for name in ranked(warnings):
+    for finding in ranked(warnings):
         kind, colour = {"wrong": (WRONG, "red"), "doubt": ("warning: ", "yellow"), "note": ("note: ", "")}[
-            severity(name)
+            finding.severity
         ]
-        print(painted(f"feedsim: {kind}{name}", colour, sys.stderr), file=sys.stderr)
+        print(painted(f"feedsim: {kind}{finding}", colour, sys.stderr), file=sys.stderr)
 
 
 def finish(result: Any, out: Any, options: Namespace) -> int:
@@ -594,7 +594,7 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         return 0
     quiet = bool(options.quiet or options.json is True)
     said = () if quiet or not isinstance(result, Result) else result.in_lines
-    findings = ranked(text for text in result.findings if text not in said)
+    findings = ranked(finding for finding in result.findings if finding not in said)
     warn(findings)
     code = getattr(result, "exit_code", 0)
     try:
@@ -602,7 +602,7 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
             print(json_of(result, out))
         elif not options.quiet:
             both = sys.stdout is not None and sys.stdout.isatty() and sys.stderr.isatty()  # it stands there already
-            wrong = [WRONG + finding for finding in findings[:1] if severity(finding) == "wrong" and not both]
+            wrong = [finding.marked for finding in findings[:1] if finding.severity == "wrong" and not both]
             for line in (*(painted(text, "red", sys.stdout) for text in wrong), *_lines(result, options.verbose, out)):
                 print(line)
         if sys.stdout is not None:
@@ -611,7 +611,7 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         if not hasattr(result, "exit_code"):
             raise
         sys.stdout = None  # who read has gone, or the disk is full; the verdict still counts
-    return code or int(bool(options.strict) and any(severity(text) == "wrong" for text in result.findings))
+    return code or int(bool(options.strict) and any(finding.severity == "wrong" for finding in result.findings))
 
 
 def _lines(result: Any, verbose: bool, out: Any) -> Iterator[str]:
@@ -659,7 +659,7 @@ def json_of(result: Any, out: Any) -> str:
         name: {"value": figure.value if math.isfinite(figure.value) else None, "unit": figure.unit}
         for name, figure in getattr(result, "figures", {}).items()
     }
-    entries = [{"severity": severity(text), "text": str(text)} for text in ranked(result.findings)]
+    entries = [asdict(finding) for finding in ranked(result.findings)]
     content = {"kind": result.kind, "answer": [*result.answers], "findings": entries, "figures": figures}
     return json.dumps(content | ({"files": [str(out)]} if out is not None else {}), indent=2, ensure_ascii=False)
 

@@ -446,7 +446,7 @@ def _unused(result: Series, reference: Series, tolerances: Tolerances, options: 
     ):
         check_used(what, patterns, names)
     for whose, series in (("result", result), ("reference", reference)):
-        notes += series.notes
+        notes += [str(note) for note in series.notes]
         if series.skipped:
             notes.append(f"columns of text in the {whose} are not compared: {', '.join(series.skipped[:5])}")
     return notes

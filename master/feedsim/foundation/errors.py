@@ -1,4 +1,4 @@
-"""Exception types, and how their messages list many names and the one that was meant.
+"""Exception types, how their messages list many names and the one that was meant, and findings about results.
 
 Messages say what is wrong, where (file:line if there is one), the actual value, what is allowed.
 """
@@ -6,7 +6,9 @@ Messages say what is wrong, where (file:line if there is one), the actual value,
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, get_args
 
 
 class FeedsimError(Exception):
@@ -118,31 +120,49 @@ def no_such_file(path: str | Path, what: str = "file") -> str:
     return f"no such {what}: {path}" + (f"; did you mean {Path(path).parent / near}?" if near else "")
 
 
-# --- What there is to say about a result, by its weight: `Wrong`, then a plain text, which is a doubt, then `Note` ----
-# Findings go through the house as the warnings that they are; whoever shows them takes them by `ranked`.
+# --- What there is to say about a result ------------------------------------------------------------------------------
 
 
-class Wrong(str):
-    """A figure, a file or a verdict is wrong, or worse than none: nobody may read the result without this.
+Severity = Literal["wrong", "doubt", "note"]
 
-    setting: KEY=VALUE, as behind ``--set``, with which it would be right; "": not known.
+
+@dataclass(frozen=True)
+class Finding:
+    """A warning or a note about a result. Printed, it is its text.
+
+    Attributes:
+        code: what kind it is, in the words of the field; codes stay from version to version. All of them, with their
+            meaning: ``foundation/findings.csv``.
+        severity: "wrong": a figure, a file or a verdict is wrong, nobody may read the result without this; "doubt": the
+            result may be another one than it seems; "note": how it is to be read, nothing is the matter.
+        text: the sentence for people.
+        place: file and line, axis, signal or run that it is about; "": none in particular.
+        remedy: KEY=VALUE, as behind ``--set``, or a sentence: with what it would be right; "": not known.
+
+    >>> import feedsim as fs
+    >>> result = fs.check("z_positioning.yaml", set={"machine.axes.Z.drive.K_v": "42 (m/min)/mm"})
+    >>> [(finding.code, finding.severity, finding.place) for finding in result.findings]
+    [('loop-unstable', 'wrong', 'Z')]
     """
 
-    setting = ""
+    code: str
+    severity: Severity
+    text: str
+    place: str = ""
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def marked(self) -> str:
+        """The text, behind a mark where it is wrong: for a console and the table of a study, which have texts alone."""
+        return WRONG * (self.severity == "wrong") + self.text
 
 
-class Note(str):
-    """How a result is to be read; nothing is the matter."""
+WRONG = "WRONG: "
 
 
-WRONG = "WRONG: "  # ahead of what is wrong where a finding is mere text: on a console, in the table of a study
-
-
-def severity(finding: str) -> str:
-    """ "wrong", "doubt" (a text that is no more than that) or "note"."""
-    return {Wrong: "wrong", Note: "note"}.get(type(finding), "doubt")
-
-
-def ranked(findings: Iterable[str]) -> list[str]:
+def ranked(findings: Iterable[Finding]) -> list[Finding]:
     """Each once, the wrong ones first and notes last, else in their order."""
-    return sorted(dict.fromkeys(findings), key=lambda text: ("wrong", "doubt", "note").index(severity(text)))
+    return sorted(dict.fromkeys(findings), key=lambda finding: get_args(Severity).index(finding.severity))

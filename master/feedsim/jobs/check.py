@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from feedsim import analysis
 from feedsim.files.source import is_study
 from feedsim.foundation.arguments import spelt
-from feedsim.foundation.errors import InputError, severity
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, File, MachineChoice, Option, Settings, Watch, job
 from feedsim.jobs.result import announce
 from feedsim.jobs.run import on_machine, opened
@@ -29,15 +29,15 @@ class Checked:
 
     Attributes:
         answers: that it is valid, and what it holds.
-        findings: what a user should know before running it, a sentence each.
+        findings: what a user should know before running it.
     """
 
     answers: Sequence[str]
-    findings: Sequence[str] = ()
+    findings: tuple[Finding, ...] = ()
     kind: ClassVar[str] = "check"
 
     def __repr__(self) -> str:
-        wrong = [finding for finding in self.findings if severity(finding) != "note"]
+        wrong = [finding for finding in self.findings if finding.severity != "note"]
         warned = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
         return "; ".join([*self.answers, *warned])
 
@@ -93,7 +93,7 @@ def check(
     motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
     apart = (
         " as far as no other maker's program has a say"
-        if any(": not checked: " in warning for warning in warnings)
+        if any(warning.code == "unit-not-checked" for warning in warnings)
         else ""
     )
     return Checked([f"{shown}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"], warnings)
@@ -117,9 +117,12 @@ def _study(
     if trial:
         announce(watch, study.base.scenario.machine, fmus, study.base.scenario.coupling)
         tried = _trial(study, planned, fmus)
-        return Checked([head, *tried.answers], [*study.warnings, *tried.findings])
+        return Checked([head, *tried.answers], (*study.warnings, *tried.findings))
     run, warnings, failed = trials.check(study, planned, fmus)
-    refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
+    refused = [
+        Finding("run-refused", "doubt", f"run {other} is refused, run {run} is not: {why}", f"run {other}")
+        for other, why in failed.items()
+    ]
     return Checked([head], (*study.warnings, *refused, *warnings))
 
 
@@ -158,7 +161,10 @@ def _trial(study: Study, planned: Design, fmus: Path | None) -> Checked:
         f"  {which} took {_range(least, most, '{:.2g} s'.format)}; all together about "
         f"{_range(least * planned.runs, most * planned.runs, _duration)} on one core"
     )
-    return Checked(lines, [f"run {run} fails: {why}" for run, why in result.failed.items()])
+    fails = (
+        Finding("run-fails", "doubt", f"run {run} fails: {why}", f"run {run}") for run, why in result.failed.items()
+    )
+    return Checked(lines, tuple(fails))
 
 
 def _range(least: float, most: float, shown: Callable[[float], str]) -> str:

@@ -21,7 +21,7 @@ from feedsim.comparison.tolerance import Tolerances
 from feedsim.files.trace import Series, Trace, as_series, read_series
 from feedsim.foundation import units
 from feedsim.foundation.arguments import Value, amount, spelt
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.outputs import forced, replacing
 from feedsim.jobs.parameters import Argument, Force, Option, job
 from feedsim.jobs.result import Kind, Result
@@ -103,7 +103,11 @@ def result_of(value: Comparisons) -> Result[Comparisons]:
             for variable in pair.those("same", "different")
         )
 
-    findings = [f"{pair.result}: {pair.line}" for pair in pairs if pair.verdict == "unusable"] + page.not_seen(pairs)
+    unusable = (pair for pair in pairs if pair.verdict == "unusable")
+    findings = (
+        *(Finding("comparison-unusable", "doubt", f"{pair.result}: {pair.line}", pair.result) for pair in unusable),
+        *page.not_seen(pairs),
+    )
     answers = [f"{pair.result} against {pair.reference}: {pair.line}" for pair in pairs]
     return Result(
         KIND,

@@ -13,7 +13,7 @@ from feedsim.analysis import Figure, Named
 from feedsim.analysis.side_by_side import Source, aligned, differing, named_apart, read_sources
 from feedsim.design.sweep.bundle import case, scenario_of
 from feedsim.files.columns import Columns, load_columns
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
 from feedsim.jobs.result import Kind, Result, kept
@@ -67,7 +67,7 @@ Laid = TypeVar("Laid", bound=Overlay)
 
 def result_of(
     over: Laid,
-    findings: Sequence[str] | None = None,
+    findings: tuple[Finding, ...] | None = None,
     lines: Callable[[], Sequence[str]] | None = None,
     place: Path | None = None,
 ) -> Result[Laid]:
@@ -76,7 +76,7 @@ def result_of(
     findings: None: those of records; results of feedsim have their own. lines, place: as of `Result`.
     """
     sources = over.sources
-    of_records = [note for source in sources for note in source.recording.notes]
+    of_records = tuple(note for source in sources for note in source.recording.notes)
     return Result(
         KIND,
         over,

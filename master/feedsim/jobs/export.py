@@ -12,7 +12,7 @@ from feedsim.analysis import check
 from feedsim.files.source import is_ssp
 from feedsim.foundation import units
 from feedsim.foundation.arguments import Changes, Pairs, Value, by_name, listed, pairs, settings, spelt
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.outputs import archive_with, begins_with, same
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.machine import positions
@@ -249,7 +249,7 @@ def pack(
         program = nc.plan(plan) if plan is not None and not inputs else None
         if plan is not None:
             _check_loads(plan)
-        findings: tuple[str, ...] = ()
+        findings: tuple[Finding, ...] = ()
         if plan is not None and program is not None:
             findings = judge.check(plan, program, fmus=archives)  # what a run would refuse should not be packed
         else:

@@ -15,7 +15,7 @@ from feedsim.analysis.truncation import Truncation
 from feedsim.files.trace import Array
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.foundation.arguments import Band, Value, between, listed, quantity, settings, spelt
-from feedsim.foundation.errors import FeedsimError, InputError, severity
+from feedsim.foundation.errors import FeedsimError, Finding, InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -40,14 +40,12 @@ from feedsim.structure.pose_change import table_mismatch
 
 REALISATIONS_WITH_FRICTION = 4
 DEFAULT_LOWEST, DEFAULT_HIGHEST = 1.0, 1000.0  # [Hz]; the band where none is given
-ONE_REALISATION = (
+ONE_REALISATION = Finding(
+    "realisations-too-few", "doubt",
     "measured with friction and one realisation: every period is alike, so that the coherence says nothing of what is "
-    "not linear; take more realisations"
-)
-UNSTABLE = (
-    "the control loops are unstable: {} growing solution(s) of the closed system. The figures of loops presume stable "
-    "ones, and nothing was measured"
-)
+    "not linear; take more realisations",
+    "", "take more realisations",
+)  # fmt: skip
 
 
 KIND = Kind("frf", page.FILES)
@@ -256,7 +254,7 @@ def frf(
     overlays, warnings = _overlays(overlay, wanted)
     warnings += doubts
     if machine.mounts is not None:
-        warnings.append(mount_words(machine, deflection))
+        warnings.append(mount_state(machine, deflection))
     inputs = [*(file for _, file in loaded.files), *(overlay.file for overlay in overlays)]
     with kept(out, KIND, watch, inputs, texts, force=force):
         watch.progress("closed form", 0, 1)
@@ -268,8 +266,12 @@ def frf(
         if not doubts and (doubt := table_mismatch(machine)) is not None:
             warnings.append(doubt)
         judged = control_findings(machine, judge(machine, modes))
-        if linear_result.unstable_poles and not any(severity(name) == "wrong" for name in judged):
-            judged.append(UNSTABLE.format(linear_result.unstable_poles))
+        if linear_result.unstable_poles and not any(finding.severity == "wrong" for finding in judged):
+            judged.append(Finding(
+                "closed-loop-unstable", "doubt",
+                f"the control loops are unstable: {linear_result.unstable_poles} growing solution(s) of the closed "
+                "system. The figures of loops presume stable ones, and nothing was measured",
+            ))  # fmt: skip
         warnings += judged
         full = _full_model(machine, watch, warnings) if full_model else None
         campaign = None
@@ -308,7 +310,7 @@ def frf(
     return result
 
 
-def _full_model(machine: Machine, watch: Watch, warnings: list[str]) -> Truncation | None:
+def _full_model(machine: Machine, watch: Watch, warnings: list[Finding]) -> Truncation | None:
     """The machine's structure with all its modes, where a structure is named; adds to the warnings why there is none.
 
     The comparison comes on top of what was asked for: where it cannot be had, the rest is still wanted.
@@ -320,19 +322,21 @@ def _full_model(machine: Machine, watch: Watch, warnings: list[str]) -> Truncati
     try:
         result = truncation.truncation(load_structure(machine.structure), machine.pose)
     except FeedsimError as error:
-        warnings.append(f"no comparison with the full model: {error}")
+        text = f"no comparison with the full model: {error}"
+        warnings.append(Finding("full-model-not-compared", "doubt", text, str(machine.structure)))
     watch.progress("full model", 1, 1)
     return result
 
 
-def mount_words(machine: Machine, deflection: float) -> str:
-    """How the closed form has mounts that are not linear: a sentence."""
+def mount_state(machine: Machine, deflection: float) -> Finding:
+    """How the closed form has mounts that are not linear."""
     assert machine.mounts is not None
     how = (
         f"at {1e6 * deflection:.4g} um of deflection (describing function)" if deflection
         else f"as they are at rest; {spelt('mount_amplitude')} has them at a deflection"
     )  # fmt: skip
-    return f"closed form and margins have the mounts of {machine.mounts.table.name}, which are not linear, {how}"
+    text = f"closed form and margins have the mounts of {machine.mounts.table.name}, which are not linear, {how}"
+    return Finding("mounts-linearised", "doubt", text, machine.mounts.table.name)
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
@@ -364,9 +368,9 @@ def _count(name: str, number: int) -> int:
     return number
 
 
-def _overlays(texts: Sequence[str], known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
+def _overlays(texts: Sequence[str], known: Sequence[str]) -> tuple[list[Overlay], list[Finding]]:
     overlays: list[Overlay] = []
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     for text in texts:
         result, doubts = read_overlays(text, known)
         overlays += result

@@ -20,7 +20,7 @@ from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.source import json_file
 from feedsim.files.trace.trace import MAX_MAGNITUDE
 from feedsim.foundation.arguments import Pairs, Value, amount, given, listed, pairs, settings, spelt
-from feedsim.foundation.errors import InputError, Note, few, nearest
+from feedsim.foundation.errors import Finding, InputError, few, nearest
 from feedsim.foundation.outputs import read_rows
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -456,11 +456,11 @@ def _of_dates(
     }
 
 
-def _series(entries: Sequence[Entry], chosen: Sequence[str]) -> tuple[list[Series], list[str]]:
+def _series(entries: Sequence[Entry], chosen: Sequence[str]) -> tuple[list[Series], list[Finding]]:
     """Every quantity that two dates determine, and what was left out."""
     order = sorted(entries, key=lambda entry: entry.moment or datetime.min)
     names = chosen or list(dict.fromkeys(name for entry in order for name in entry.values))
-    result, findings = [], []
+    result, findings = [], list[Finding]()
     for name in names:
         rows = [(entry, entry.values[name]) for entry in order if name in entry.values]
         good = [(entry, value) for entry, value in rows if value.status == "estimated"]
@@ -472,15 +472,18 @@ def _series(entries: Sequence[Entry], chosen: Sequence[str]) -> tuple[list[Serie
                     "of them out"
                 )
         if good and omitted:
-            findings.append(Note(f"{name}: left out, as not determined by the record: {few(omitted, 6)}"))
+            text = f"{name}: left out, as not determined by the record: {few(omitted, 6)}"
+            findings.append(Finding("parameter-undetermined", "note", text, name))
         if len(good) < 2:
             if good and len(order) > 1:
-                findings.append(Note(f"{name}: determined on {good[0][0].day} alone, so it has no history"))
+                text = f"{name}: determined on {good[0][0].day} alone, so it has no history"
+                findings.append(Finding("history-of-one-date", "note", text, name))
             continue
         conditions = _common([entry for entry, _ in good])
         for key in dict.fromkeys(key for entry, _ in good for key in entry.conditions):
             if key not in conditions:
-                findings.append(Note(f"{key}: some dates lack it, so it is not used"))
+                text = f"{key}: some dates lack it, so it is not used"
+                findings.append(Finding("condition-incomplete", "note", text, key))
         result.append(
             Series(
                 name,
@@ -601,7 +604,7 @@ def _of_machines(entries: Sequence[Entry], chosen: Sequence[str]) -> dict[str, A
         )
     names = chosen or list(dict.fromkeys(name for entry in entries for name in entry.values))
     scatters: list[Scatter] = []
-    findings: list[str] = []
+    findings: list[Finding] = []
     for name in names:
         groups = []
         for owner in owners:
@@ -614,10 +617,12 @@ def _of_machines(entries: Sequence[Entry], chosen: Sequence[str]) -> dict[str, A
                 groups.append((np.array([v.value for v in good]), np.array([v.sigma for v in good])))
         if len(groups) < 2:
             if groups:
-                findings.append(Note(f"{name}: determined of one machine alone, so nothing is known of its scatter"))
+                text = f"{name}: determined of one machine alone, so nothing is known of its scatter"
+                findings.append(Finding("scatter-unknown", "note", text, name))
             continue
         if len(groups) < len(owners):
-            findings.append(Note(f"{name}: determined of {len(groups)} of {len(owners)} machines"))
+            text = f"{name}: determined of {len(groups)} of {len(owners)} machines"
+            findings.append(Finding("scatter-of-some-machines", "note", text, name))
         unit = next(entry.values[name].unit for entry in entries if name in entry.values)
         scatters.append(scatter(name, unit, groups))
     if not scatters:

@@ -49,7 +49,7 @@ def result_of(identified: Identified, inputs: Sequence[Path] = (), place: Path |
         files=partial(page.files_of, identified),
         inputs=inputs,
         lines=lambda: page.terminal_lines(identified, place),
-        in_lines=[text for text in identified.warnings if text not in in_table],
+        in_lines=[finding for finding in identified.warnings if finding not in in_table],
         place=place,
     )
 

@@ -16,7 +16,7 @@ from feedsim.files.columns import load_columns
 from feedsim.files.fields import no_axis
 from feedsim.files.trace import read_recording
 from feedsim.foundation.arguments import Value, amount, given, settings, spelt
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -141,7 +141,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
     asked_for = [*texts, *(f"{name}={text}" for name, text in chosen.items())]
     with kept(out, KIND, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
         watch.progress("reading", 0, 1)
-        stops, notes = [], list[str]()
+        stops, notes = [], list[Finding]()
         for file, jerk in zip(files, each_jerk, strict=True):
             log, said = read_stops(
                 read_recording(file), subject, axes, mapping, prefer=signal or "", accelerometer=sensor, jerk=jerk

@@ -13,7 +13,7 @@ import numpy as np
 
 from feedsim.analysis import Figure, Named
 from feedsim.foundation.arguments import Value, lengths, pairs, quantity, spelt
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.outputs import begins_with
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -353,14 +353,17 @@ def _info(
     if (mounts := table_of(built.assembly, built.solution.shapes)) is not None:
         warnings += damped_twice(built.solution.modes, mounts, mounts.element)
         if loaded is not None and loaded.mounts is None:
-            warnings.append(
+            remedy = f"mounts: {{table: {MOUNTS_FILE}}}"
+            warnings.append(Finding(
+                "mounts-not-named", "doubt",
                 "the structure has mounts that are not linear; runs take their stiffness alone, until the machine file "
-                f"names their table: mounts: {{table: {MOUNTS_FILE}}}"
-            )
+                f"names their table: {remedy}",
+                str(machine), remedy,
+            ))  # fmt: skip
     return info_of_model(described.name, described.note, built, h, friction, warnings)
 
 
-def _stale(described: Described, modes: Modes) -> list[str]:
+def _stale(described: Described, modes: Modes) -> list[Finding]:
     """That the machine's table of modes is another one than its structure gives."""
     machine = described.machine
     if machine is None or described.modes is None:
@@ -368,11 +371,13 @@ def _stale(described: Described, modes: Modes) -> list[str]:
     how = stale(read_modes(described.modes, list(machine.axes)), modes)
     if not how:
         return []
-    return [
+    remedy = "Build it anew (feedsim machine build --force), or name the structure that it belongs to"
+    return [Finding(
+        "modes-stale", "doubt",
         f"{described.modes} is not what {machine.structure} gives at the machine's pose: {how}. Shown is the "
-        "structure; runs take the table. Build it anew (feedsim machine build --force), or name the structure that "
-        "it belongs to"
-    ]
+        f"structure; runs take the table. {remedy}",
+        str(described.modes), remedy,
+    )]  # fmt: skip
 
 
 def _check_complete(structure: Structure, pose: Mapping[str, float]) -> None:

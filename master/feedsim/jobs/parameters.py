@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from feedsim.foundation.arguments import Call, Changes, Pairs, Value, calling, settings
+from feedsim.foundation.errors import Finding
 
 F = TypeVar("F", bound=Callable[..., Any])
 File = str | Path
@@ -476,7 +477,7 @@ class Watch:
     def note(self, sentence: str) -> None:
         """What the job will replace."""
 
-    def warn(self, findings: Iterable[str]) -> None:
+    def warn(self, findings: Iterable[Finding]) -> None:
         """What is the matter with the files that the job begins with."""
 
     def say(self, sentence: str) -> None:

@@ -19,7 +19,7 @@ from feedsim.files.columns import Columns, load_columns
 from feedsim.files.fields import no_axis
 from feedsim.files.trace import Mark, Recording, read_recording, write_csv
 from feedsim.foundation.arguments import Changes, given, listed, settings, spelt
-from feedsim.foundation.errors import InputError, Note, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -137,14 +137,15 @@ class Asked:
             raise InputError.of(f"{self.recording.path}", dict.fromkeys(refused.values()))
         return read, records, refused
 
-    def unread(self, read: Mapping[str, Recorded]) -> list[str]:
+    def unread(self, read: Mapping[str, Recorded]) -> list[Finding]:
         """A note on the columns of the file that none of the axes is read from; those of the axes come first."""
         used = {column for recorded in read.values() for column in recorded.provenance.columns.values()}
         numbers = {name.rpartition("|")[2] for name in used if "|" in name}  # of the axes of a capture
         used |= {f"POWER|{number}" for number in numbers}  # which their pitch is by
         others = [name for name in self.recording.names if name not in used]
         names = sorted(others, key=lambda name: name.rpartition("|")[2] not in numbers)
-        return [Note(f"{self.recording.path}: columns that are not read: {few(names, MOST_NAMED)}")] if names else []
+        text = f"{self.recording.path}: columns that are not read: {few(names, MOST_NAMED)}"
+        return [Finding("columns-not-read", "note", text, str(self.recording.path))] if names else []
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[str, ...]:
@@ -246,7 +247,7 @@ def replay(
         sources = [recorded.provenance for recorded in asked.read.values()]
         results = [finding for comparison in comparisons for finding in comparison.findings]
         settings = {**asked.settings, **({"open_loop": "yes"} if open_loop else {})}
-        findings = dict.fromkeys([*results, *(text for source in sources for text in source.warnings)])
+        findings = dict.fromkeys([*results, *(warning for source in sources for warning in source.warnings)])
         findings |= dict.fromkeys(asked.unread(asked.read))
         done = Replayed(
             comparisons, asked.subject, sources, asked.marks, settings, [*findings], _proposals(own, asked.axes)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.arguments import Call, call, calling
-from feedsim.foundation.errors import InputError, OutputError, severity
+from feedsim.foundation.errors import Finding, InputError, OutputError
 from feedsim.foundation.outputs import check_file, forced, replacing
 from feedsim.foundation.owned import claimed
 from feedsim.jobs.parameters import File, Watch
@@ -133,7 +133,7 @@ class Result(Generic[V]):
         files: a function: name -> content of every file besides report.html, summary.json and figures.
         inputs: files that the result rests on; saving never replaces one of them.
         answers: what the job was asked, answered in sentences.
-        findings: what is to be known before the result is believed: ``Wrong``, plain text (a doubt) or ``Note``.
+        findings: what is to be known before the result is believed.
         rows: what the command prints behind the answers.
         lines: what it prints: answers, what to type, rows, where nothing else is given. all_lines: with --verbose.
         in_lines: findings that these lines have already; the command prints them where it prints no lines.
@@ -155,11 +155,11 @@ class Result(Generic[V]):
     files: Callable[[], Mapping[str, Content]] = dict
     inputs: Late[Sequence[Path]] = Late(lambda _: ())
     answers: Late[Sequence[str]] = Late(lambda self: self.report().answer)
-    findings: Late[Sequence[str]] = Late(lambda self: self.report().warnings)
+    findings: Late[tuple[Finding, ...]] = Late(lambda self: tuple(self.report().warnings))
     rows: Late[Sequence[str]] = Late(lambda _: ())
     lines: Late[Sequence[str]] = Late(lambda self: self._answers_and_rows())
     all_lines: Late[Sequence[str]] = Late(lambda self: self._lines_and_figures())
-    in_lines: Late[Sequence[str]] = Late(lambda _: ())
+    in_lines: Late[Sequence[Finding]] = Late(lambda _: ())
     place: Path | None = None
     _call: Call | None = field(default_factory=call)
 
@@ -263,7 +263,7 @@ class Result(Generic[V]):
         return sorted({name for name in (*super().__dir__(), *dir(self.value)) if not name.startswith("_")})
 
     def __repr__(self) -> str:
-        wrong = [text for text in self.findings if severity(text) != "note"]
+        wrong = [finding for finding in self.findings if finding.severity != "note"]
         said = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
         return "; ".join([f"Result of {self.kind}: {', '.join(self.answers[:1]) or 'no answer'}", *said])
 
@@ -338,7 +338,7 @@ class Made:
     name: str
     content: bytes
     answers: Sequence[str]
-    findings: Sequence[str] = ()
+    findings: tuple[Finding, ...] = ()
     figures: Mapping[str, Figure] = field(default_factory=dict)
     inputs: Sequence[Path] = ()
 

@@ -14,7 +14,7 @@ from feedsim.design.tune import Proposal
 from feedsim.files.source import is_ssp, is_study
 from feedsim.files.trace import Array
 from feedsim.foundation.arguments import Changes, settings, spelt
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -76,7 +76,7 @@ class Opened:
     program: Program
     fmus: Path | None
     changes: list[str]
-    warnings: Callable[[Iterable[str]], tuple[str, ...]] = tuple
+    warnings: Callable[[Iterable[Finding]], tuple[Finding, ...]] = tuple
     named: Callable[[str], str] = str
 
 

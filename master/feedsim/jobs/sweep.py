@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +17,6 @@ from feedsim.design.sweep.study import AllFailed, Progress
 from feedsim.design.sweep.study import run as run_study
 from feedsim.design.sweep.table import RECORD, Format, Table
 from feedsim.foundation.arguments import settings
-from feedsim.foundation.errors import WRONG, Wrong
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -87,8 +86,7 @@ class Swept:
 def result_of(swept: Swept) -> Result[Swept]:
     """A study with its runs: how far figures scatter, what moves them; each figure is a median. nan: no run has it."""
     table, failed = swept.table, int((~swept.ok).sum())
-    wrong = [str(text).removeprefix(WRONG) for text in table["warnings"] if str(text).startswith(WRONG)]
-    first = wrong[0].split(" | ")[0] if wrong else ""
+    wrong = [findings[0] for findings in table.findings.values() if findings[0].severity == "wrong"]
     words = f", {swept.resumed} of them before" if swept.resumed else ""
     words += f", {failed} of them failed (their messages are in the table)" if failed else ""
 
@@ -109,7 +107,10 @@ def result_of(swept: Swept) -> Result[Swept]:
         files=files,
         inputs=inputs_of(swept.study),
         answers=partial(page.answers, swept.account),
-        findings=[Wrong(f"{len(wrong)} of {len(table)} runs, the first: {first}")] if wrong else [],
+        findings=tuple(
+            replace(first, text=f"{len(wrong)} of {len(table)} runs, the first: {' '.join(first.text.split())}")
+            for first in wrong[:1]
+        ),
         lines=lambda: [*page.goal_words(swept.account), f"{swept.study.name}: {len(table)} runs{words}"],
     )
 

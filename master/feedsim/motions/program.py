@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, StrictBool, StrictStr
 
 from feedsim.files.fields import File, Quantity
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Start, whole_cycles
 
 if TYPE_CHECKING:
@@ -203,15 +203,15 @@ class Programmed(Geometry):
         return f"{self.names[self.moves.file[row]]}:{self.moves.line[row]}"
 
     @property
-    def notes(self) -> list[str]:
-        """What the plan has to say, and what the program says that moves no axis: a sentence each."""
-        said = [str(note) for note in self.plan.notes]
+    def notes(self) -> tuple[Finding, ...]:
+        """What the plan has to say, and what the program says that moves no axis."""
         if not self.moves.notes:
-            return said
+            return self.plan.notes
         words = [f"{note.word} ({self.names[note.file]}:{note.line})" for note in self.moves.notes[:MAX_WORDS_NAMED]]
         more = len(self.moves.notes) - MAX_WORDS_NAMED
         words += [f"{more} more"] if more > 0 else []
-        return [*said, f"passed over, for it moves no axis: {', '.join(words)}"]
+        text = f"passed over, for it moves no axis: {', '.join(words)}"
+        return (*self.plan.notes, Finding("words-passed-over", "note", text, self.names[0]))
 
     @cached_property
     def uneven(self) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 
 from feedsim.comparison import Comparison, Curves, Variable, along, percent, seconds
 from feedsim.files.trace.files import is_stream, written_whole
-from feedsim.foundation.errors import OutputError
+from feedsim.foundation.errors import Finding, OutputError
 from feedsim.foundation.outputs import begins_with, check_file
 from feedsim.foundation.owned import claimed
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
@@ -226,7 +226,7 @@ def report_of(comparisons: Sequence[Comparison]) -> Report:
         if one
         else ", ".join(f"{number} {kind}" for kind, number in counts.items() if number),
         answer=_answer(comparisons),
-        warnings=[*([one.problem] if one and one.problem else []), *not_seen(comparisons)],
+        warnings=[*(_problem(one) if one else []), *not_seen(comparisons)],
         tiles=_tiles(comparisons, counts),
         main=list(_alone(one)) if one else [_pairs(comparisons), *_sections(comparisons)],
         footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
@@ -253,7 +253,16 @@ def _answer(comparisons: Sequence[Comparison]) -> list[str]:
     ]
 
 
-def not_seen(comparisons: Sequence[Comparison]) -> list[str]:
+def _problem(one: Comparison) -> list[Finding]:
+    """Why a pair cannot be compared, or what of it was not."""
+    if not one.problem:
+        return []
+    if one.verdict == "unusable":
+        return [Finding("comparison-unusable", "doubt", one.problem, one.result)]
+    return [Finding("comparison-not-covered", "doubt", one.problem, one.result)]
+
+
+def not_seen(comparisons: Sequence[Comparison]) -> list[Finding]:
     """That rows of results were not compared, of which nobody knows whether they are the same."""
     partly = [
         comparison
@@ -261,14 +270,16 @@ def not_seen(comparisons: Sequence[Comparison]) -> list[str]:
         if comparison.same and comparison.coverage is not None and comparison.coverage.share < 1
     ]
     if len(comparisons) == 1:
-        return [
+        texts = [
             f"Compared: {comparison.coverage.text}. The other rows may hold anything."
             for comparison in partly
             if comparison.coverage
         ]
+        return [Finding("rows-not-compared", "doubt", text, comparisons[0].result) for text in texts]
     named = ", ".join(f"{comparison.result} ({comparison.heading})" for comparison in partly[:3])
     more = f" and {len(partly) - 3} more" if len(partly) > 3 else ""
-    return [f"Of {counted(len(partly), 'result')} not all rows are compared: {named}{more}."] if partly else []
+    text = f"Of {counted(len(partly), 'result')} not all rows are compared: {named}{more}."
+    return [Finding("rows-not-compared", "doubt", text)] if partly else []
 
 
 def _sections(comparisons: Sequence[Comparison]) -> Iterator[Section]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from feedsim.analysis import Figure
 from feedsim.foundation.arguments import call
-from feedsim.foundation.errors import InputError, OutputError, ranked, severity
+from feedsim.foundation.errors import Finding, InputError, OutputError, ranked
 from feedsim.report.chart import Chart, Panel
 from feedsim.report.chart.svg import png, standalone, svg
 from feedsim.report.formatting import REMARK, display_unit, minus, shown, typeset
@@ -323,7 +323,7 @@ class Report:
     footer: Text
     provenance: Section | None = None
     answer: Sequence[str] = ()
-    warnings: Sequence[str] = ()
+    warnings: Sequence[Finding] = ()
     notes: Sequence[str] = ()
     tiles: Sequence[Tile] = ()
     lead: Picture | None = None
@@ -358,15 +358,15 @@ class Report:
     @property
     def remarks(self) -> tuple[list[str], list[str]]:
         """Notes of the first screen, one that is short, and the others; notes among the findings are of the latter."""
-        said = [text for kind, text in self.findings if kind == "note"]
+        said = [finding.text for finding in self.findings if finding.severity == "note"]
         notes = list(dict.fromkeys(note for note in self.notes if note))
         short = [note for note in notes[:1] if len(note.split()) <= FINDING_WORDS]
         return short, [*notes[len(short) :], *said]
 
     @property
-    def findings(self) -> list[tuple[str, str]]:
-        """Severity and text of the warnings, the gravest first."""
-        return [(severity(name), str(name)) for name in ranked(self.warnings)]
+    def findings(self) -> list[Finding]:
+        """The warnings, the gravest first."""
+        return ranked(self.warnings)
 
     @property
     def pictures(self) -> list[Picture]:

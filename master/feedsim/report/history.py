@@ -15,6 +15,7 @@ from feedsim.analysis import Figure
 from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, Crossing, Fitted, Scatter, testable
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation import outputs
+from feedsim.foundation.errors import Finding
 from feedsim.report import formatting
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.content import FOLDER, Picture, Report, Section, Step, Table, Text, Tile, code, provenance_section
@@ -120,7 +121,7 @@ class History:
     changes: Sequence[Change] = ()
     limits: Mapping[str, float] = field(default_factory=dict)
     crossings: Mapping[str, Crossing] = field(default_factory=dict)
-    findings: Sequence[str] = ()
+    findings: Sequence[Finding] = ()
     simulated: Sequence[str] = ()
     scenario: str = ""
     settings: Mapping[str, str] = field(default_factory=dict)

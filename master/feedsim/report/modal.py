@@ -15,7 +15,7 @@ from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.modal.rational import MOTOR, AxisModes
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.response_files import write_response
-from feedsim.foundation.errors import Note
+from feedsim.foundation.errors import Finding
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.content import (
     FOLDER,
@@ -100,9 +100,9 @@ class ModesReport:
         return figures
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Finding]:
         """What a user should know."""
-        return [*self.found.warnings, *(Note(text) for text in self.found.notes)]
+        return [*self.found.warnings, *self.found.notes]
 
 
 def files_of(report: ModesReport) -> dict[str, Content]:

@@ -13,6 +13,7 @@ from feedsim.analysis import Figure
 from feedsim.estimation.identify import Estimate
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.replay.mounts import FoundMounts, RingDown, Swing
+from feedsim.foundation.errors import Finding
 from feedsim.foundation.installation import version
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
 from feedsim.report.content import (
@@ -60,7 +61,7 @@ class MountsReport:
     files: Sequence[Path]
     subject: Subject
     settings: Mapping[str, str]
-    read: Sequence[str]
+    read: Sequence[Finding]
 
     @property
     def estimates(self) -> Mapping[str, Estimate]:
@@ -105,7 +106,7 @@ class MountsReport:
         return figures
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Finding]:
         """What a user should know."""
         result = list(self.read)
         for stop in self.mounts.ring_downs:
@@ -113,11 +114,13 @@ class MountsReport:
             white = float(np.median(np.abs(jumps))) / (0.6745 * np.sqrt(6))
             if stop.remaining > MODEL_ERROR * max(white, 0.02 * float(np.std(stop.recorded))):
                 unit = scale(stop.unit, np.array([stop.remaining]))
-                result.append(
+                result.append(Finding(
+                    "machine-not-of-record", "doubt",
                     f"{stop.name}: the simulation leaves {unit.factor * stop.remaining:.2g} {unit.shown_unit} of the "
                     "ring-down (rms), more than its noise: structure, drive or friction of the machine file are not "
-                    "those of the log, and the values make up for it as far as they can"
-                )
+                    "those of the log, and the values make up for it as far as they can",
+                    stop.name,
+                ))  # fmt: skip
         return result
 
 

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -180,8 +181,8 @@ def write_report(
 def _finding_entries(report: Report) -> dict[str, Any]:
     """Entries of summary.json: what there is to say about the result by its severity, and of that the warnings."""
     return {
-        "warnings": [text for severity, text in report.findings if severity != "note"],
-        "findings": [{"severity": severity, "text": text} for severity, text in report.findings],
+        "warnings": [finding.text for finding in report.findings if finding.severity != "note"],
+        "findings": [asdict(finding) for finding in report.findings],
     }
 
 

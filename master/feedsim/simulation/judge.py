@@ -13,7 +13,7 @@ import numpy as np
 
 from feedsim import linear
 from feedsim.foundation import units
-from feedsim.foundation.errors import Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.foundation.owned import cached
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Drive, ForeignUnit, FrictionParameters, Machine, Scenario
@@ -43,17 +43,19 @@ DRIVING, MATTERS = 0.5, 0.05
 FACTOR_OFF, WORK_OFF, FACTOR_SEEN = 0.5, 0.1, 0.3
 
 
-def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[str]:
+def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[Finding]:
     """The drive's integrators start empty: an axis under load sags before it holds."""
     if scenario.motions[0].held >= LOAD_TAKEN_UP:
         return []
     machine, start = scenario.machine, np.array([0.0, scenario.machine.cycles.T_c])
-    sagging = (
-        f"is not carried at the start, the axis sags while the drive takes it up; put a dwell of {LOAD_TAKEN_UP:g} s "
-        "ahead of the first motion"
-    )
+    remedy = f"put a dwell of {LOAD_TAKEN_UP:g} s ahead of the first motion"
+
+    def finding(load: str, place: str) -> Finding:
+        text = f"{load} is not carried at the start, the axis sags while the drive takes it up; {remedy}"
+        return Finding("load-not-carried", "doubt", text, place, remedy)
+
     reported = [
-        f"axis {name}: the constant load of {axis.M_0:g} N.m {sagging}"
+        finding(f"axis {name}: the constant load of {axis.M_0:g} N.m", name)
         for name, axis in machine.axes.items()
         if axis.M_0 != 0
     ]
@@ -62,13 +64,12 @@ def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[str]:
         friction = machine.axes[acting.load.axis_name].friction if torque is not None else None
         # Friction alone holds what is below F_C.
         if torque is not None and isinstance(friction, FrictionParameters) and abs(torque) > friction.F_C:
-            reported.append(
-                f"{acting.place}: the load of {torque:.3g} N.m at the motor of {acting.load.axis_name} {sagging}"
-            )
+            where = f"{acting.place}: the load of {torque:.3g} N.m at the motor of {acting.load.axis_name}"
+            reported.append(finding(where, acting.place))
     return reported
 
 
-def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[str]:
+def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[Finding]:
     """Loads that the drive cannot hold, and such that nothing feels: of another unit or at another place than meant."""
     reported = []
     for acting in loads:
@@ -80,31 +81,40 @@ def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[s
         at_the_motor = "" if acting.load.UNIT == "N.m" else f", {abs(torque):.4g} N.m at the motor of {name}"
         size = f"{acting.place}: the load {acting.load.words} reaches {peak:.4g} {acting.load.UNIT}{at_the_motor}"
         if isinstance(drive, Drive) and abs(torque) > drive.M_max:
-            reported.append(
+            reported.append(Finding(
+                "load-too-large", "doubt",
                 f"{size}, {abs(torque) / drive.M_max:.3g} times the drive's M_max, {drive.M_max:.4g} N.m: the axis "
-                "cannot hold it; are unit, kind and factor right?"
-            )
+                "cannot hold it; are unit, kind and factor right?",
+                acting.place,
+            ))  # fmt: skip
         elif isinstance(friction, FrictionParameters) and abs(torque) < FELT * friction.F_C:
-            reported.append(
+            reported.append(Finding(
+                "load-too-small", "doubt",
                 f"{size}, {abs(torque) / friction.F_C:.2g} of the Coulomb friction F_C, {friction.F_C:.4g} N.m: next "
-                "to nothing feels it; are unit, kind and factor right?"
-            )
+                "to nothing feels it; are unit, kind and factor right?",
+                acting.place,
+            ))  # fmt: skip
     return reported
 
 
-def driving(run: Run) -> list[str]:
+def driving(run: Run) -> list[Finding]:
     """By the energy: a load that drives the machine, where forces of a process resist its motion."""
     friction = float(np.abs([run.coupling[f"{axis}.friction_work"] for axis in run.scenario.machine.axes]).sum())
     return [
-        f"{run.scenario.at('loads', work.load)}: the load {work.words} drives the machine: it has done "
-        f"{work.given:.3g} J of work on it and taken {work.taken:.3g} J from it (friction: {friction:.3g} J). The "
-        "force of a process resists the motion: if this is one, its sign is wrong, and factor: -1 turns it"
+        Finding(
+            "load-drives", "doubt",
+            f"{place}: the load {work.words} drives the machine: it has done {work.given:.3g} J of work on it and "
+            f"taken {work.taken:.3g} J from it (friction: {friction:.3g} J). The force of a process resists the "
+            "motion: if this is one, its sign is wrong, and factor: -1 turns it",
+            place, f"loads.{work.load}.factor={-run.scenario.loads[work.load].factor:g}",
+        )
         for work in run.loads
+        for place in [run.scenario.at("loads", work.load)]
         if work.net > DRIVING * (work.given + work.taken) and work.net > MATTERS * friction
-    ]
+    ]  # fmt: skip
 
 
-def contradicted(run: Run) -> list[str]:
+def contradicted(run: Run) -> list[Finding]:
     """By the energy: loads with which the motor of the run does other work than that of the record."""
     scenario, reported = run.scenario, []
     for work in run.loads:
@@ -119,12 +129,15 @@ def contradicted(run: Run) -> list[str]:
             wrong = "the record shows little or nothing of it: its size, kind or time is wrong"
         else:
             wrong = "its sign is wrong" if factor < 0 else "its size is wrong: unit, kind or factor"
-        reported.append(
-            f"{scenario.at('loads', work.load)}: while the load {work.words} acts, the motor of {load.axis_name} does "
+        place = scenario.at("loads", work.load)
+        reported.append(Finding(
+            "load-contradicts-record", "doubt",
+            f"{place}: while the load {work.words} acts, the motor of {load.axis_name} does "
             f"{drives.run:.3g} J of work in the run and {drives.record:.3g} J in the record (column "
             f"{column!r}); the load does {drives.load:.3g} J on the machine. If the recorded torque's own sign is "
-            f"right, {wrong}; both agree with factor: {factor * load.factor:.3g}"
-        )
+            f"right, {wrong}; both agree with factor: {factor * load.factor:.3g}",
+            place, f"loads.{work.load}.factor={factor * load.factor:.3g}",
+        ))  # fmt: skip
     return reported
 
 
@@ -144,7 +157,7 @@ class PoseUse:
     change: PoseChange
     grid: tuple[GridAxis, ...] = ()
     crossings: Crossings | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
 
 def pose_use(
@@ -159,24 +172,26 @@ def pose_use(
     followed = {axis.axis for axis in grid}
     change = pose_change(machine, {axis: reached for axis, reached in ranges.items() if axis not in followed})
     outside = tuple(
-        sentence for axis in grid if axis.axis in ranges for sentence in left_grid(axis, ranges[axis.axis], machine)
+        finding for axis in grid if axis.axis in ranges for finding in left_grid(axis, ranges[axis.axis], machine)
     )
     doubt = None if grid else table_mismatch(machine)  # a plant that follows has modes of its own
     doubts = () if doubt is None else (doubt,)
     return PoseUse(change, grid, crossings, (*doubts, *outside, *warnings(change)))
 
 
-def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[str]:
+def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[Finding]:
     """The outermost cells reach on without end, but their modes are those of their centres."""
     travel = machine.axes[axis.axis].travel
     first, last = axis.reach
     beyond = max(first - max(reached[0], travel[0]), min(reached[1], travel[1]) - last)
     if beyond <= MIN_POSE_DISTANCE:
         return []
-    return [
+    return [Finding(
+        "pose-grid-left", "doubt",
         f"axis {axis.axis} leaves the plant's grid of poses ({first * 1e3:.6g} mm to {last * 1e3:.6g} mm) by "
-        f"{beyond * 1e3:.4g} mm: the modes there are those of the last cell; pack a wider grid"
-    ]
+        f"{beyond * 1e3:.4g} mm: the modes there are those of the last cell; pack a wider grid",
+        axis.axis, "pack a wider grid",
+    )]  # fmt: skip
 
 
 # --- Whether the exchange between plant and friction is stable: ahead by their parameters, afterwards by the energy ---
@@ -187,47 +202,56 @@ def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) ->
 TRUSTED_SHARE, TRUSTED_ENERGY = 3e-4, 1e-3
 
 
-def exchange_stability(scenario: Scenario, modes: Modes) -> list[str]:
+def exchange_stability(scenario: Scenario, modes: Modes) -> list[Finding]:
     """Explicit exchange needs a friction slope well below 2 J_inf/h."""
     scheme = SCHEMES[scenario.coupling.scheme]
     step = scenario.machine.cycles.T_c / scenario.coupling.steps(scenario.machine)
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     unknown = [name for name, axis in scenario.machine.axes.items() if isinstance(axis.friction, ForeignUnit)]
     if unknown:
-        warnings.append(
+        warnings.append(Finding(
+            "exchange-not-judged", "doubt",
             f"axis {', '.join(unknown)}: how steeply another maker's friction rises with the speed is not known: "
-            f"nothing shows ahead whether scheme {scheme.name} is stable with it, the energy residual of the run does"
-        )
+            f"nothing shows ahead whether scheme {scheme.name} is stable with it, the energy residual of the run does",
+            ", ".join(unknown),
+        ))  # fmt: skip
     for name, axis in scenario.machine.axes.items():
         friction = axis.friction
         if isinstance(friction, ForeignUnit):
             continue
         slope, bound = friction.sigma_1 + friction.sigma_2, 2 * modes.J_inf(name) / step
         if slope > scheme.stable_share * bound:
-            warnings.append(
+            warnings.append(Finding(
+                "exchange-unstable", "doubt",
                 f"axis {name}: sigma_1 + sigma_2 = {slope:.4g} N.m.s/rad is above "
                 f"{scheme.stable_share * bound:.4g}, where scheme {scheme.name} becomes unstable at a reversal "
-                f"({scheme.stable_share:g} of 2 J_inf/h); use more coupling.substeps"
-            )
+                f"({scheme.stable_share:g} of 2 J_inf/h); use more coupling.substeps",
+                name, f"coupling.substeps={2 * scenario.coupling.substeps}",
+            ))  # fmt: skip
     return warnings
 
 
-def energy(run: Run, loops: Sequence[Loop]) -> list[str]:
+def energy(run: Run, loops: Sequence[Loop]) -> list[Finding]:
     """The coupling is blamed where nothing else is known to make an axis chatter."""
     coupling = run.scenario.coupling
     steps = coupling.steps(run.scenario.machine)
     step = run.scenario.machine.cycles.T_c / steps
     if any(loop.growing for loop in loops):
-        why = "that is a consequence of the unstable control loop, and says nothing of the coupling"
+        why, remedy = "that is a consequence of the unstable control loop, and says nothing of the coupling", ""
     else:
+        remedy = f"coupling.substeps={2 * steps}"
         why = f"it is unstable or too coarse, and the result is not to be trusted; try coupling.substeps above {steps}"
     return [
-        f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
-        f"friction work (scheme {coupling.scheme}, exchange step {step * 1e6:.6g} us): {why}"
+        Finding(
+            "exchange-loses-energy", "doubt",
+            f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
+            f"friction work (scheme {coupling.scheme}, exchange step {step * 1e6:.6g} us): {why}",
+            axis, remedy,
+        )
         for axis in run.scenario.machine.axes
         for residual, work in [(run.coupling[f"{axis}.residual_peak"], abs(run.coupling[f"{axis}.friction_work"]))]
         if residual > max(TRUSTED_SHARE * work, TRUSTED_ENERGY)
-    ]
+    ]  # fmt: skip
 
 
 # --- Whether the control loops of a machine are stable, and by what margins -------------------------------------------
@@ -252,13 +276,13 @@ def loops_of(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     return tuple(Loop(**loop) for loop in cached("loops", [described, state.hexdigest()], CODE, find))
 
 
-def control(machine: Machine, loops: Sequence[Loop], program: Program | None = None) -> list[str]:
+def control(machine: Machine, loops: Sequence[Loop], program: Program | None = None) -> list[Finding]:
     """Loops that are unstable or have less than the usual margins, with the gain that would do, and those not judged.
 
     A loop is wrong where it is unstable in a state that the motion brings about: axes that do not move rest. Without a
     program every axis moves.
     """
-    result: list[str] = []
+    result: list[Finding] = []
     for axis, kind in dict.fromkeys((loop.axis, loop.kind) for loop in loops):
         states = [loop for loop in loops if (loop.axis, loop.kind) == (axis, kind)]
         unstable, thin = [loop for loop in states if loop.unstable], [loop for loop in states if loop.thin]
@@ -267,6 +291,7 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
         now = _gain(kind, states[0].gain)
         advised = [loop.advised for loop in unstable or thin]
         nearest = None if None in advised else _gain(kind, min(filter(None, advised)))
+        remedy = f"machine.axes.{axis}.drive.{nearest.replace(' = ', '=')}" if nearest else ""
         usual = f"the usual {_decibels(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} deg"
         better = f"; with {nearest} it has" if nearest else f"; no {GAIN[kind][0]} was found with which it has"
         if not unstable:
@@ -274,7 +299,8 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
                 f"gain {_decibels(loop.gain_margin):.1f} dB, phase {loop.phase_margin:.0f} deg {STATE[loop.state]}"
                 for loop in thin
             )
-            result.append(f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better} {usual}")
+            text = f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better} {usual}"
+            result.append(Finding("loop-margins-thin", "doubt", text, axis, remedy))
             continue
         where = "; ".join(map(_where, states))
         text = (
@@ -282,19 +308,15 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
             "physical; a smaller step does not remove it"
         )
         met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
-        if not met:
-            result.append(text)
-            continue
-        wrong = Wrong(text)
-        if nearest:
-            wrong.setting = f"machine.axes.{axis}.drive.{nearest.replace(' = ', '=')}"
-        result.append(wrong)
+        result.append(Finding("loop-unstable", "wrong" if met else "doubt", text, axis, remedy))
     if unknown := [name for name, axis in machine.axes.items() if isinstance(axis.drive, ForeignUnit)]:
         others = "; the other axes are judged with its motor free" if loops else ""
-        result.append(
+        result.append(Finding(
+            "loop-not-judged", "doubt",
             f"axis {', '.join(unknown)}: whether the loops are stable is not judged, the drive is another maker's"
-            + others
-        )
+            + others,
+            ", ".join(unknown),
+        ))  # fmt: skip
     return result
 
 
@@ -331,7 +353,7 @@ class JudgedRun(Run):
 
     Attributes:
         pose: how far the motion leaves the plant's pose, or how the plant followed it.
-        warnings: a sentence each.
+        warnings: findings about it.
 
     >>> import feedsim as fs
     >>> run: fs.Run = fs.run("z_positioning.yaml").value
@@ -340,7 +362,7 @@ class JudgedRun(Run):
     """
 
     pose: PoseUse
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
 
 def judged(run: Run, *, keep: bool = True) -> JudgedRun:
@@ -356,7 +378,7 @@ def judged(run: Run, *, keep: bool = True) -> JudgedRun:
     loops = loops_of(scenario.machine, modes) if keep else judge(scenario.machine, modes)
     pose = pose_use(scenario.machine, program, run.grid, run.crossings)
     foreseen = _foreseen(scenario, modes, program, loops, run.acting)
-    wrong: tuple[str, ...] = tuple(text for text in foreseen if isinstance(text, Wrong))
+    wrong = tuple(finding for finding in foreseen if finding.severity == "wrong")
     shown = (*energy(run, loops), *_limits(run), *driving(run), *contradicted(run))
     # What an unstable run shows besides follows from that.
     warnings = (
@@ -365,7 +387,7 @@ def judged(run: Run, *, keep: bool = True) -> JudgedRun:
     return JudgedRun(**{field.name: getattr(run, field.name) for field in fields(Run)}, pose=pose, warnings=warnings)
 
 
-def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[str, ...]:
+def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[Finding, ...]:
     """Judge a scenario without a step; return the warnings that can be given before a run.
 
     The shipped units judge their parameters. No other program is executed: of another maker's unit counts what its
@@ -383,15 +405,15 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
 
 def _foreseen(
     scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop], acting: Sequence[Acting]
-) -> tuple[str, ...]:
-    """What the parameters and the loads alone show a user to doubt, a sentence each."""
+) -> tuple[Finding, ...]:
+    """What the parameters and the loads alone show a user to doubt."""
     return (
         *control(scenario.machine, loops, program), *exchange_stability(scenario, modes),
         *unbalanced(scenario, acting), *sizes(scenario.machine, program, acting), *mounts(scenario.machine),
     )  # fmt: skip
 
 
-def mounts(machine: Machine) -> list[str]:
+def mounts(machine: Machine) -> list[Finding]:
     """Damping of mounts that the table of modes has besides."""
     if machine.mounts is None:
         return []
@@ -400,10 +422,13 @@ def mounts(machine: Machine) -> list[str]:
     return damped_twice(modes, table, factored(table, machine.mounts.parameters()))
 
 
-def _limits(run: Run) -> list[str]:
+def _limits(run: Run) -> list[Finding]:
     """Limits at which a drive was while it was recorded."""
     return [
-        f"axis {axis}: {limit.replace('_', ' ')} in {100 * share:.2g} % of the recorded instants"
+        Finding(
+            "torque-clipped" if limit == "torque_limited" else "voltage-clipped", "doubt",
+            f"axis {axis}: {limit.replace('_', ' ')} in {100 * share:.2g} % of the recorded instants", axis,
+        )
         for (axis, _, limit), share in ((name.partition("."), share) for name, share in run.limited.items())
         if share > 0
-    ]
+    ]  # fmt: skip

@@ -13,7 +13,7 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.sparse.csgraph import connected_components
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.parts import FiniteElements, GeometryStructure
 from feedsim.structure.assembly import (
@@ -52,7 +52,7 @@ MINOR = 1e-9
 LANCZOS_STEPS = 60
 
 
-def mass_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
+def mass_faults(assembly: Assembly) -> tuple[list[str], list[Finding]]:
     """Faults and warnings of the mass matrix. Degrees of freedom without mass are fine where stiffness holds them."""
     faults = _indefinite(assembly, assembly.mass, "mass")
     if faults:
@@ -68,13 +68,14 @@ def mass_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
             f"{few(assembly.labels, massless[loose])}: no mass, and no stiffness against moving on their own; give "
             "them a mass, hold them, or leave them out"
         ], []
-    return [], [
+    return [], [Finding(
+        "freedom-massless", "doubt",
         f"{counted(len(massless), 'degree of freedom follows', 'degrees of freedom follow')} statically, without mass: "
-        f"{few(assembly.labels, massless)}"
-    ]
+        f"{few(assembly.labels, massless)}",
+    )]  # fmt: skip
 
 
-def stiffness_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
+def stiffness_faults(assembly: Assembly) -> tuple[list[str], list[Finding]]:
     """Faults and warnings of the stiffness matrix."""
     return _indefinite(assembly, assembly.stiffness, "stiffness"), []
 
@@ -192,7 +193,7 @@ RIGID_EIGENVALUE = (2 * math.pi * 0.1) ** 2
 MOST_RIGID = 7  # more than a free body has
 
 
-def check(assembly: Assembly) -> list[str]:
+def check(assembly: Assembly) -> list[Finding]:
     """Warnings about a model that can be solved.
 
     Raises:
@@ -200,7 +201,7 @@ def check(assembly: Assembly) -> list[str]:
     """
     for faults in (_shapes(assembly), _finite(assembly), _symmetry(assembly)):
         _refuse(assembly, faults)  # what follows needs each of these
-    faults, warnings = _empty(assembly), []
+    faults, warnings = _empty(assembly), list[Finding]()
     _refuse(assembly, faults)
     for more_faults, more_warnings in (mass_faults(assembly), stiffness_faults(assembly), _ports(assembly)):
         faults += more_faults
@@ -302,7 +303,7 @@ def _columns(matrix: object) -> np.ndarray:
     return absolute > 0
 
 
-def _ports(assembly: Assembly) -> tuple[list[str], list[str]]:
+def _ports(assembly: Assembly) -> tuple[list[str], list[Finding]]:
     faults, warnings = [], []
     for axis in assembly.axes:
         for port in (f"n_{axis}", f"x_{axis}"):
@@ -313,7 +314,9 @@ def _ports(assembly: Assembly) -> tuple[list[str], list[str]]:
                 faults.append(f"port {port} excites nothing: all its coefficients are 0")
     idle = [port for port, vector in assembly.ports.items() if port.startswith("tcp_") and not np.any(vector)]
     if idle:
-        warnings.append(f"ports {', '.join(idle)} excite nothing: forces there move nothing, displacements stay 0")
+        ports = ", ".join(idle)
+        text = f"ports {ports} excite nothing: forces there move nothing, displacements stay 0"
+        warnings.append(Finding("port-idle", "doubt", text, ports))
     return faults, warnings
 
 
@@ -325,7 +328,7 @@ MASS_UNITS = {"t": "tonnes", "kg": "kilograms", "g": "grams"}
 LENGTH_UNITS = {"mm": "millimetres", "m": "metres", "cm": "centimetres"}
 
 
-def unit_warnings(assembly: Assembly) -> list[str]:
+def unit_warnings(assembly: Assembly) -> list[Finding]:
     """What looks like another unit than the one that is stated."""
     warnings = []
     masses = translating_mass(assembly)
@@ -333,7 +336,8 @@ def unit_warnings(assembly: Assembly) -> list[str]:
         mass = float(np.max(masses))
         text = f"the model's mass is {mass:.4g} kg; a machine has {LEAST_MASS:g} kg to {MOST_MASS:g} kg"
         stated_mass = assembly.units.mass if assembly.units else ""
-        warnings.append(text + _unit_hint("mass", mass, stated_mass, MASS_UNITS, LEAST_MASS, MOST_MASS))
+        hint = _unit_hint("mass", mass, stated_mass, MASS_UNITS, LEAST_MASS, MOST_MASS)
+        warnings.append(Finding("model-mass-unusual", "doubt", text + hint))
     geometry = assembly.geometry
     if geometry is not None and len(geometry.nodes) > 1:
         size = float(np.max(np.ptp(geometry.nodes, axis=0)))
@@ -343,7 +347,7 @@ def unit_warnings(assembly: Assembly) -> list[str]:
             hint = _unit_hint("length", size, stated, LENGTH_UNITS, LEAST_SIZE, MOST_SIZE)
             if not hint and LEAST_SIZE <= size * 1000 <= MOST_SIZE:
                 hint = "; was it converted from millimetres twice?"
-            warnings.append(text + hint)
+            warnings.append(Finding("model-size-unusual", "doubt", text + hint))
     return warnings
 
 
@@ -359,7 +363,7 @@ def _unit_hint(key: str, value: float, stated: str, names: Mapping[str, str], le
     return fitting[0] if fitting else ""
 
 
-def frequency_warnings(omega: float) -> list[str]:
+def frequency_warnings(omega: float) -> list[Finding]:
     """About the lowest elastic mode's angular frequency [rad/s], once it is known."""
     frequency = omega / (2 * math.pi)
     if LEAST_FREQUENCY <= frequency <= MOST_FREQUENCY:
@@ -370,11 +374,13 @@ def frequency_warnings(omega: float) -> list[str]:
     )
     # Mass in kg beside stiffness in N/mm: too low by the root of 1000; mass in t beside N/m: too high by it.
     if frequency < LEAST_FREQUENCY:
-        return [f"{text}; is the stiffness in N/mm beside a mass in kg, or something held by nearly nothing?"]
-    return [f"{text}; is the mass in tonnes beside a stiffness in N/m?"]
+        why = "is the stiffness in N/mm beside a mass in kg, or something held by nearly nothing?"
+    else:
+        why = "is the mass in tonnes beside a stiffness in N/m?"
+    return [Finding("mode-frequency-unusual", "doubt", f"{text}; {why}")]
 
 
-def _part_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
+def _part_faults(assembly: Assembly) -> tuple[list[str], list[Finding]]:
     """Faults and warnings about parts that neither mass nor stiffness connects to the rest.
 
     The largest part is left to the solution, which counts its rigid modes. A rotor or a slide that nothing drives is a
@@ -432,15 +438,15 @@ def _modes(count: int) -> str:
     )
 
 
-def _grounded_parts(assembly: Assembly, parts: list[Integers], largest: int) -> list[str]:
-    warnings = [
+def _grounded_parts(assembly: Assembly, parts: list[Integers], largest: int) -> list[Finding]:
+    texts = [
         f"a part of {counted(len(members), *DEGREES)} "
         f"({few(assembly.labels, members)}) is connected to the ground alone, not to the {largest} of the largest part"
         for members in parts[:MAX_SHOWN_LABELS]
     ]
     if len(parts) > MAX_SHOWN_LABELS:
-        warnings.append(f"{len(parts) - MAX_SHOWN_LABELS} more parts are connected to the ground alone")
-    return warnings
+        texts.append(f"{len(parts) - MAX_SHOWN_LABELS} more parts are connected to the ground alone")
+    return [Finding("part-on-ground", "doubt", text) for text in texts]
 
 
 def _touched(assembly: Assembly, axis: str, members: Integers) -> bool:
@@ -481,10 +487,10 @@ class Built:
 
     assembly: Assembly
     solution: Solution
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
 
-def assemble(structure: Structure, pose: Mapping[str, float]) -> tuple[Assembly, tuple[str, ...]]:
+def assemble(structure: Structure, pose: Mapping[str, float]) -> tuple[Assembly, tuple[Finding, ...]]:
     """The finite-element model at a pose (axis -> position [m]), and notes on the import.
 
     Matrices were made at one pose: theirs, if they name it, counts for axes that `pose` leaves out.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feedsim.foundation.errors import Finding
 from feedsim.scenario import FrictionParameters
 from feedsim.structure.assembly import Assembly, Floats, translating_mass
 from feedsim.structure.build import Built
@@ -112,7 +113,7 @@ class MachineInfo:
     modes: Modes
     moving: tuple[str, ...]
     built: Built | None
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
     @property
     def solution(self) -> Solution | None:
@@ -132,7 +133,7 @@ def info_of_model(
     built: Built,
     step: float,
     friction: Mapping[str, FrictionParameters] | None = None,
-    warnings: Sequence[str] = (),
+    warnings: Sequence[Finding] = (),
 ) -> MachineInfo:
     """All figures of a machine whose structure was built; `warnings` beside those of the build."""
     assembly, solution = built.assembly, built.solution

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace.cells import named_columns, twice
 from feedsim.files.trace.files import written_whole
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import Floats
 from feedsim.structure.mounts import MountTable, factored, friction_cycle, read_mounts, viscous_cycle
@@ -272,7 +272,7 @@ def with_mounts(modes: Modes, table: MountTable, element: Floats, amplitude: flo
     return Modes(modes.file, frequency, damping, ports)
 
 
-def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[str]:
+def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[Finding]:
     """Modes on the mounts whose damping in the table is more than a frame's, where the mounts bring theirs besides."""
     K_lin, _, F_max, x_2, K_v, c = element.T
     reported = []
@@ -292,11 +292,13 @@ def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[str]:
             )
     if not reported:
         return []
-    return [
+    remedy = "Give these modes the damping of the frame alone (damping.steps of the structure file)"
+    return [Finding(
+        "damping-counted-twice", "doubt",
         f"damping counts twice: the table of modes damps modes on the mounts, and the mounts that are not linear damp "
-        f"them besides: {', '.join(reported)}. Give these modes the damping of the frame alone (damping.steps of the "
-        "structure file)"
-    ]
+        f"them besides: {', '.join(reported)}. {remedy}",
+        "", remedy,
+    )]  # fmt: skip
 
 
 def checked_modes(machine: Machine, amplitude: float = 0.0) -> Modes:

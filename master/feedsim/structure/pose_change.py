@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import FeedsimError, few
+from feedsim.foundation.errors import FeedsimError, Finding, few
 from feedsim.foundation.owned import cached
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import CODE, MAX_SHOWN_LABELS, State, digest_of, state_of
@@ -186,19 +186,22 @@ def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesO
     return ModesOverAxis(frequency[own], moving, tuple(positions), np.array([end.frequency[own] for end in there]))
 
 
-def warnings(change: PoseChange) -> tuple[str, ...]:
-    """A sentence for each axis that moves far enough for the modes to be others."""
-    sentences = []
+def warnings(change: PoseChange) -> tuple[Finding, ...]:
+    """A finding for each axis that moves far enough for the modes to be others."""
+    result = []
     for axis in change.large:
         mode = axis.largest
         assert mode is not None
         moving = mode.moving.partition(",")[0]
-        sentences.append(
+        follow = f"feedsim export --plant ... --poses {axis.axis}=20mm"
+        result.append(Finding(
+            "pose-left", "doubt",
             f"axis {axis.axis} moves {axis.distance * 1e3:.4g} mm away from the pose that the modes belong to; there "
             f"the mode at {mode.frequency:.4g} Hz ({moving}) has changed its frequency by {100 * mode.change:+.2g} %; "
-            f"for a plant that follows: feedsim export --plant ... --poses {axis.axis}=20mm"
-        )
-    return tuple(sentences)
+            f"for a plant that follows: {follow}",
+            axis.axis, follow,
+        ))  # fmt: skip
+    return tuple(result)
 
 
 @dataclass(frozen=True)
@@ -383,8 +386,8 @@ SAME_FREQUENCY = 1e-3
 SAME_SHAPE = 1e-2
 
 
-def table_mismatch(machine: Machine) -> str | None:
-    """A sentence where the table of modes is not that of the machine's pose by its structure; None where it is.
+def table_mismatch(machine: Machine) -> Finding | None:
+    """A finding where the table of modes is not that of the machine's pose by its structure; None where it is.
 
     None as well where it cannot be shown: no structure, matrices (of one pose, and costly to solve), or a structure
     that is faulty, which who needs it will say.
@@ -408,10 +411,13 @@ def table_mismatch(machine: Machine) -> str | None:
         return None
     if not how:
         return None
-    return (
+    build = f"feedsim machine build {machine.structure} --at {_shown(machine.pose, '=')} --out DIR"
+    return Finding(
+        "modes-stale", "doubt",
         f"the table of modes {machine.modes} is not that of the pose {_shown(machine.pose, ' ')}: {how}; build it "
-        f"anew: feedsim machine build {machine.structure} --at {_shown(machine.pose, '=')} --out DIR"
-    )
+        f"anew: {build}",
+        str(machine.modes), build,
+    )  # fmt: skip
 
 
 def _shown(pose: Mapping[str, float], between: str) -> str:

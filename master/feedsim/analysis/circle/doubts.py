@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath, Undone
 from feedsim.analysis.figures import Array
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 # Of a radius and of a feed that are given, the share by which the record may differ: path lag changes the former.
 OFF_RADIUS, OFF_FEED = 0.2, 0.05
@@ -43,10 +43,10 @@ ROUNDING_STEP = 1e-12  # [m]; below it a step is rounding
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """keep: rows of a turn that are no spikes (N,) bool. doubts: sentences."""
+    """keep: rows of a turn that are no spikes (N,) bool. doubts: findings about it."""
 
     keep: NDArray[np.bool_]
-    doubts: tuple[str, ...]
+    doubts: tuple[Finding, ...]
 
 
 def check_radius(where: str, given: float | None, own: float) -> None:
@@ -78,34 +78,38 @@ def _ratio(ratio: float) -> str:
     return f", {larger:.3g} times {'less' if ratio > 1 else 'as much'}"
 
 
-def unusual_radius(radius: float) -> list[str]:
+def unusual_radius(radius: float) -> list[Finding]:
     """That a radius [m] which nobody has given would be usual if the record were in inches, metres or mm."""
 
     def multiple(value: float, of: float) -> bool:
         return value >= of and abs(value / of - round(value / of)) * of < ROUND_TOLERANCE * value
 
     if multiple(25.4 * radius, IN_INCHES) and not multiple(radius, RADIUS_STEP) and radius < 0.02:
-        return [
-            f"the radius is {radius * 1e3:.5g} mm; were the record in inches, it would be {radius * 25.4e3:.5g} mm: "
-            "look at the unit in its header, or give --radius"
-        ]
+        return [_unusual_radius(radius, "inches", radius * 25.4e3)]
     for factor, unit in ((1e3, "m"), (1e-3, "mm")):
         if not LEAST_RADIUS <= radius <= MOST_RADIUS and LEAST_RADIUS <= factor * radius <= MOST_RADIUS:
-            return [
-                f"the radius is {radius * 1e3:.5g} mm; were the record in {unit}, it would be "
-                f"{factor * radius * 1e3:.5g} mm: look at the unit in its header, or give --radius"
-            ]
+            return [_unusual_radius(radius, unit, factor * radius * 1e3)]
     return []
 
 
-def unusual_feed(feed: float) -> list[str]:
+def _unusual_radius(radius: float, unit: str, other: float) -> Finding:
+    """radius [m]; other: in `unit` [mm]."""
+    remedy = "look at the unit in its header, or give --radius"
+    text = f"the radius is {radius * 1e3:.5g} mm; were the record in {unit}, it would be {other:.5g} mm: {remedy}"
+    return Finding("radius-unusual", "doubt", text, "", remedy)
+
+
+def unusual_feed(feed: float) -> list[Finding]:
     """That a feed [m/s] by radius and time would be a usual one if the time were in milliseconds, or in seconds."""
     for factor, unit in ((1e3, "ms"), (1e-3, "s")):
         if not LEAST_FEED <= feed <= MOST_FEED and USUAL_FEEDS[0] <= factor * feed <= USUAL_FEEDS[1]:
-            return [
+            remedy = "look at the unit of the time in the header, or give --feed"
+            return [Finding(
+                "feed-unusual", "doubt",
                 f"the feed is {feed * 6e4:.5g} mm/min, by radius and time; were the time in {unit}, it would be "
-                f"{factor * feed * 6e4:.5g} mm/min: look at the unit of the time in the header, or give --feed"
-            ]
+                f"{factor * feed * 6e4:.5g} mm/min: {remedy}",
+                "", remedy,
+            )]  # fmt: skip
     return []
 
 
@@ -126,10 +130,11 @@ def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: 
     span = float(np.ptp(rest))
     for what, step in steps.items():
         if step > COARSE_STEP_SHARE * span > 0:
-            doubts.append(
+            doubts.append(Finding(
+                "resolution-coarse", "doubt",
                 f"{what} has steps of {step * 1e6:.4g} um, the radial deviation ranges over {span * 1e6:.4g} um: "
-                "nothing smaller than a step can be diagnosed"
-            )
+                "nothing smaller than a step can be diagnosed",
+            ))  # fmt: skip
     return Checked(keep, tuple(doubts))
 
 
@@ -151,26 +156,28 @@ def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
     return alone
 
 
-def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterator[str]:
+def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterator[Finding]:
     rows = np.flatnonzero(~keep)
     if rows.size:
         worst = int(rows[np.argmax(np.abs(deviation[rows] - np.median(deviation)))])
         near = float(np.median(deviation[max(0, worst - OUTLIER_NEIGHBOURS) : worst + OUTLIER_NEIGHBOURS + 1]))
         several = f"{len(rows)} samples stand" if len(rows) > 1 else "one sample stands"
-        yield (
+        yield Finding(
+            "samples-stand-out", "doubt",
             f"{several} out alone, at {_degrees(turned[worst])} deg by {(deviation[worst] - near) * 1e6:.4g} um: a "
-            "fault of the measurement; left out"
-        )
+            "fault of the measurement; left out",
+        )  # fmt: skip
 
 
-def _missing(turned: Array) -> Iterator[str]:
+def _missing(turned: Array) -> Iterator[Finding]:
     steps = np.abs(np.diff(turned))
     usual = float(np.median(steps))
     for row in np.flatnonzero((steps > GAP_STEPS * usual) & (steps > GAP_ANGLE)):
-        yield (
+        yield Finding(
+            "rows-missing", "doubt",
             f"samples are missing from {_degrees(turned[row])} to {_degrees(turned[row + 1])} deg: what happens there "
-            "is not seen, and G may be larger"
-        )
+            "is not seen, and G may be larger",
+        )  # fmt: skip
 
 
 def _step(values: Array) -> float:
@@ -194,29 +201,31 @@ def longest_run(same: NDArray[np.bool_]) -> tuple[int, int]:
     return int(edges[2 * k]), int(lengths[k])
 
 
-def _clipped_position(axis: str, values: Array, other: Array, radius: float, step: float) -> Iterator[str]:
+def _clipped_position(axis: str, values: Array, other: Array, radius: float, step: float) -> Iterator[Finding]:
     for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
         first, length = longest_run(np.abs(values - end) <= ROUNDING_STEP)
         rows = slice(first, first + length)
         moves = np.sqrt(np.maximum(radius**2 - other[rows] ** 2, 0.0))
         if length >= STILL and (gone := float(np.ptp(moves))) > max(MOVED * step, 1e-6):
-            yield (
+            yield Finding(
+                "record-clipped", "doubt",
                 f"{axis} stands at its {word} value for {length} samples, where the circle moves it by "
-                f"{gone * 1e6:.4g} um: the scale, or the range of the file, is at its end"
-            )
+                f"{gone * 1e6:.4g} um: the scale, or the range of the file, is at its end",
+            )  # fmt: skip
 
 
-def _clipped_deviation(values: Array) -> Iterator[str]:
+def _clipped_deviation(values: Array) -> Iterator[Finding]:
     for end, word, inner in ((float(values.max()), "largest", -1), (float(values.min()), "smallest", 1)):
         same = np.abs(values - end) <= ROUNDING_STEP
         _, length = longest_run(same)
         levels, counts = np.unique(values, return_counts=True)
         beside = counts[-6:-1] if inner < 0 else counts[1:6]
         if length >= STILL and len(levels) > 2 * STILL and same.sum() > 5 * np.median(beside):
-            yield (
+            yield Finding(
+                "record-clipped", "doubt",
                 f"the deviation stands at its {word} value of {end * 1e6:.4g} um for {length} samples: the instrument, "
-                "or the range of the file, is at its end"
-            )
+                "or the range of the file, is at its end",
+            )  # fmt: skip
 
 
 def _degrees(angle: float) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +33,7 @@ from feedsim.files.columns import Columns
 from feedsim.files.trace import Recording, read_recording
 from feedsim.files.trace.recording import mapped
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.foundation.units import spelled
 from feedsim.motions.circular import SENSE_WORDS
 
@@ -101,12 +101,12 @@ class Told:
         self._given = {"radius": radius, "feed": feed}
         self._ahead: dict[str, tuple[Path, float]] = {}
         self.notes: list[str] = []
-        self.doubts: list[str] = []
+        self.doubts: list[Finding] = []
 
     def add(self, file: Path, lines: Sequence[str]) -> None:
         """InputError: the file is of another circle than those ahead of it."""
         values, unclear = header_values(lines)
-        self.doubts += [f"{file}: {name}" for name in unclear]
+        self.doubts += [Finding("header-unclear", "doubt", f"{file}: {name}", str(file)) for name in unclear]
         for what, value in values.items():
             if self._given[what] is not None:
                 continue
@@ -173,7 +173,7 @@ class RecordedTurn:
     path: TurnedPath
     begin: float | None
     duration: float | None
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ class RecordedCircle:
     turns: tuple[RecordedTurn, ...]
     centred: bool
     notes: tuple[str, ...]
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Finding, ...] = ()
     day: str = ""
 
 
@@ -207,7 +207,7 @@ def read_circle(
     has.
     """
     notes: list[str] = []
-    doubts: list[str] = []
+    doubts: list[Finding] = []
     turns: list[RecordedTurn] = []
     timed: list[tuple[Path, RecordedTurn, float]] = []
     radii: list[float] = []
@@ -227,9 +227,13 @@ def read_circle(
             recorded_turns, mean = _of_positions(recording, (x, y), axes, centre, radius)
         else:
             recorded_turns, mean = _of_angles(recording, *polar, radius)
-        notes += recording.notes
+        notes += [str(note) for note in recording.notes]
         notes.append(f"{file}: {', '.join(turn.name for turn in recorded_turns)}")
-        doubts += [f"{file}, {turn.name}: {doubt}" for turn in recorded_turns for doubt in turn.doubts]
+        doubts += [
+            replace(doubt, text=f"{file}, {turn.name}: {doubt}", place=f"{file}, {turn.name}")
+            for turn in recorded_turns
+            for doubt in turn.doubts
+        ]
         turns += recorded_turns
         timed += [(file, turn, turn.duration) for turn in recorded_turns if turn.duration is not None]
         radii.append(mean)
@@ -244,7 +248,8 @@ def read_circle(
             f"{files[0]}: has no column of time, and the feed is not known: give it, for example --feed '1000 mm/min'"
         )
     if own is not None and headers.feed is not None and abs(own / headers.feed - 1) > OFF_FEED:
-        doubts.append(f"{files[0]}: its header gives another feed than its time, {own * 6e4:.5g} mm/min, which counts")
+        text = f"{files[0]}: its header gives another feed than its time, {own * 6e4:.5g} mm/min, which counts"
+        doubts.append(Finding("feed-contradicted", "doubt", text, str(files[0])))
     notes, doubts = [*headers.notes, *notes], [*headers.doubts, *doubts]
     if radius is None:
         doubts += unusual_radius(nominal) or (unusual_feed(own) if own is not None and feed is None else [])

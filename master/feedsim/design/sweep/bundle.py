@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from feedsim.design.sweep.provenance import read, units_of
 from feedsim.design.sweep.table import RECORD, read_table, record_of
 from feedsim.files.fields import did_you_mean
 from feedsim.foundation import units
-from feedsim.foundation.errors import WRONG, FeedsimError, InputError, ranked, severity
+from feedsim.foundation.errors import FeedsimError, Finding, InputError, ranked
 from feedsim.foundation.owned import PREFIX, TemporaryFolder
 from feedsim.scenario import Base, Scenario, load
 from feedsim.scenario.study import Parameter, Study, load_study
@@ -162,10 +162,14 @@ class Workplace:
         except Exception as error:
             said = str(error) if isinstance(error, FeedsimError) else f"{type(error).__name__}: {error}"
             return Outcome(task.run, None, self._as_named(said), time.perf_counter() - begun)
-        reported = tuple(self._as_named(WRONG * (severity(name) == "wrong") + name) for name in ranked(warnings))
+        named = self._as_named
+        reported = tuple(
+            replace(finding, text=named(finding.text), place=named(finding.place), remedy=named(finding.remedy))
+            for finding in ranked(warnings)
+        )
         return Outcome(task.run, figures, None, time.perf_counter() - begun, reported)
 
-    def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[str]]:
+    def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[Finding]]:
         scenario = self._base.with_changes(task.changes)
         program = self._program(scenario)
         result = judged(cosim.run(scenario, program=program, fmus=self._fmus), keep=False)

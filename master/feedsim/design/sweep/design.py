@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.foundation.errors import Finding
 from feedsim.scenario import Change
 from feedsim.scenario.study import Distribution, Parameter, Study
 from feedsim.scenario.study.study import changes_of
@@ -53,7 +54,7 @@ class Outcome:
     figures: Mapping[str, tuple[float, str]] | None
     error: str | None = None
     seconds: float = 0.0
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from distributed import WorkerPlugin, get_worker
 from feedsim.design.sweep import provenance, trial
 from feedsim.design.sweep.bundle import Bundle, Workplace
 from feedsim.design.sweep.design import Outcome, Task
-from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.foundation.installation import ask
 from feedsim.simulation.cosim.unpacked import STORE
 
@@ -186,12 +186,12 @@ class Engine(Protocol):
     Attributes:
         workers: processes that make them; 0: this one.
         where: "in this process", "2 local processes", "tcp://..., 8 workers".
-        warnings: sentences for the user; more may come while runs are made.
+        warnings: what a user should know; more may come while runs are made.
     """
 
     workers: int
     where: str
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         """One outcome per task, in the order in which they come; tasks are taken as workers need them.
@@ -248,7 +248,7 @@ class Here:
 
     workers = 0
     where = "this process"
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
     def __init__(self, bundle: Bundle) -> None:
         self._bundle = bundle
@@ -293,11 +293,15 @@ class Crowd:
             raise InputError.of("the workers cannot be used", faults)
         self.workers = len(answers)
         several = sum(threads > 1 for threads in client.nthreads().values())
-        self.warnings = (
-            *provenance.differences(answers),
-            *([f"{several} of {len(answers)} workers have several threads, which take turns: a run needs a process of "
-               "its own; start workers with --nthreads 1"] if several else []),
-        )  # fmt: skip
+        self.warnings = provenance.differences(answers)
+        if several:
+            remedy = "start workers with --nthreads 1"
+            self.warnings += (Finding(
+                "workers-with-threads", "doubt",
+                f"{several} of {len(answers)} workers have several threads, which take turns: a run needs a process of "
+                f"its own; {remedy}",
+                "", remedy,
+            ),)  # fmt: skip
         self._carrier = Carrier(bundle, provenance.versions())
         client.register_plugin(self._carrier)
         client.run(prepare, self._carrier.key)
@@ -317,9 +321,9 @@ class Crowd:
     def refuse(self, worker: str, why: str) -> None:
         """`worker`, an address, gets no more batches. The first one that cannot take part is reported as a warning."""
         if not self.refused:
-            warning = f"{why}; it is left out, as others will be, and the study goes on without it"
-            _log.warning(warning)
-            self.warnings = (*self.warnings, warning)
+            text = f"{why}; it is left out, as others will be, and the study goes on without it"
+            _log.warning(text)
+            self.warnings = (*self.warnings, Finding("worker-left-out", "doubt", text, worker))
         self.refused[worker] = why
 
     def leave(self) -> None:

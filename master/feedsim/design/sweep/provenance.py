@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.design.sweep.design import Design
-from feedsim.foundation.errors import InputError, few, no_such_file
+from feedsim.foundation.errors import Finding, InputError, few, no_such_file
 from feedsim.foundation.installation import version
 from feedsim.scenario import Base, FrictionParameters
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, FRICTION_UNITS
@@ -168,18 +168,22 @@ def fault(address: str, answer: Any, here: Mapping[str, str] | None = None) -> s
     return None
 
 
-def differences(answers: Mapping[str, Mapping[str, str]]) -> list[str]:
-    """Sentences on workers with other versions of what feedsim calculates with: the last digits may differ."""
+def differences(answers: Mapping[str, Mapping[str, str]]) -> tuple[Finding, ...]:
+    """Findings on workers with other versions of what feedsim calculates with: the last digits may differ."""
     here = versions()
     result: dict[str, list[str]] = {}
     for address, answer in answers.items():
         for name in ("Python", "numpy", "scipy", "ruckig", "machine"):
             if answer.get(name) != here[name]:
                 result.setdefault(f"{name} {answer.get(name)} in place of {here[name]}", []).append(address)
-    return [
-        f"{few(addresses, 3)}: {what}; figures from there may differ in the last digits"
+    return tuple(
+        Finding(
+            "workers-differ", "doubt",
+            f"{few(addresses, 3)}: {what}; figures from there may differ in the last digits",
+            few(addresses, 3),
+        )
         for what, addresses in result.items()
-    ]
+    )  # fmt: skip
 
 
 def _canonical(value: Any) -> bytes:

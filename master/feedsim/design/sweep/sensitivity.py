@@ -16,13 +16,14 @@ computes, which refuses any N but powers of two and so what failed runs leave of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.design.sweep.design import Array
+from feedsim.foundation.errors import Finding
 
 if TYPE_CHECKING:
     from feedsim.design.sweep.design import Design
@@ -111,7 +112,7 @@ class Sensitivities:
     parameters: tuple[str, ...]
     sobol: Mapping[str, Indices]
     trends: Mapping[str, Trends]
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
 
 def sensitivities(table: Table, design: Design, seed: int = 0) -> Sensitivities:
@@ -136,22 +137,30 @@ def sensitivities(table: Table, design: Design, seed: int = 0) -> Sensitivities:
     return Sensitivities(names, sobol, result, _warnings(sobol, names))
 
 
-def _warnings(sobol: Mapping[str, Indices], parameters: Sequence[str]) -> tuple[str, ...]:
-    reported: dict[str, list[str]] = {}
+def _warnings(sobol: Mapping[str, Indices], parameters: Sequence[str]) -> tuple[Finding, ...]:
+    reported: dict[Finding, list[str]] = {}
     for name, indices in sobol.items():
         if indices.reason:
-            reported.setdefault(f"no Sobol indices: {indices.reason}", []).append(name)
+            finding = Finding("sobol-missing", "doubt", f"no Sobol indices: {indices.reason}")
+            reported.setdefault(finding, []).append(name)
         elif indices.left_out:
             points = indices.used + indices.left_out
-            what = f"Sobol indices without {indices.left_out} of {points} base points, of which a run has no value"
-            reported.setdefault(what, []).append(name)
+            text = f"Sobol indices without {indices.left_out} of {points} base points, of which a run has no value"
+            reported.setdefault(Finding("sobol-of-a-part", "doubt", text), []).append(name)
         if not indices.reason and indices.used < USEFUL_POINTS:
-            what = f"Sobol indices from {indices.used} base points: they and their intervals can be far off"
-            reported.setdefault(f"{what}; at least {USEFUL_POINTS} make a ranking", []).append(name)
+            text = f"Sobol indices from {indices.used} base points: they and their intervals can be far off"
+            text += f"; at least {USEFUL_POINTS} make a ranking"
+            finding = Finding("sobol-uncertain", "doubt", text, "", f"--runs {USEFUL_POINTS}")
+            reported.setdefault(finding, []).append(name)
         if impossible := [parameters[k] for k in beyond(indices)]:
-            what = f"Sobol indices of {', '.join(impossible)} lie beyond what is possible by more than their intervals"
-            reported.setdefault(f"{what}; take more base points", []).append(name)
-    return tuple(f"{', '.join(names)}: {text}." for text, names in reported.items())
+            text = f"Sobol indices of {', '.join(impossible)} lie beyond what is possible by more than their intervals"
+            remedy = "take more base points"
+            finding = Finding("sobol-impossible", "doubt", f"{text}; {remedy}", "", remedy)
+            reported.setdefault(finding, []).append(name)
+    return tuple(
+        replace(finding, text=f"{', '.join(names)}: {finding}.", place=", ".join(names))
+        for finding, names in reported.items()
+    )
 
 
 def sobol_indices(f_A: Array, f_B: Array, f_AB: Array, *, seed: int = 0) -> Indices:

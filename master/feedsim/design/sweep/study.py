@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import chain
 from math import isfinite
 from pathlib import Path
@@ -25,7 +25,7 @@ from feedsim.design.sweep.engine import Engine, open_engine
 from feedsim.design.sweep.table import RECORD, STEM, Format, Table, chosen, parquet, record_of, table_of, write_table
 from feedsim.files.source import json_value
 from feedsim.files.trace.files import written_whole
-from feedsim.foundation.errors import FeedsimError, InputError, OutputError, SimulationError
+from feedsim.foundation.errors import FeedsimError, Finding, InputError, OutputError, SimulationError
 from feedsim.foundation.owned import Closing, claimed, held
 from feedsim.scenario.study import Study
 from feedsim.simulation.cosim import fmus_directory
@@ -41,7 +41,7 @@ from feedsim.simulation.cosim import fmus_directory
 
 JOURNAL_NAME = "runs.jsonl"
 _EXTENT = "runs"  # key of the lines that say how many
-FORMAT = 1
+FORMAT = 2
 SYNC = 1.0  # seconds after which what was written is on the disk at the latest
 
 
@@ -155,7 +155,7 @@ class Journal(Closing):
         with held():  # a run that is written is counted, too
             self._write({
                 "run": outcome.run, "figures": figures, "error": outcome.error, "seconds": outcome.seconds,
-                "warnings": list(outcome.warnings),
+                "findings": [asdict(finding) for finding in outcome.warnings],
             })  # fmt: skip
             self._count(outcome)
         if time.monotonic() - self._synced >= SYNC:
@@ -248,9 +248,8 @@ def _outcome(content: Any, runs: int) -> Outcome | None:
         figures = content["figures"]
         if figures is not None:
             figures = {str(name): (_number(value), str(unit)) for name, (value, unit) in figures.items()}
-        outcome = Outcome(
-            content["run"], figures, content["error"], float(content["seconds"]), tuple(content["warnings"])
-        )
+        findings = tuple(Finding(**entry) for entry in content["findings"])
+        outcome = Outcome(content["run"], figures, content["error"], float(content["seconds"]), findings)
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
     return outcome if type(outcome.run) is int and 0 <= outcome.run < runs else None
@@ -356,12 +355,13 @@ def run(
                 "ended": ended, "sessions": [*sessions, own] if made or not ended or not sessions else sessions,
                 "nominal": nominal, "place": _place(study, directory, fmus),
                 "workers": where, "processes": processes, **provenance.circumstances(command),
-                "warnings": [*study.warnings, *(made_by.warnings if made_by else ())], **more,
+                "findings": [asdict(finding) for finding in (*study.warnings, *(made_by.warnings if made_by else ()))],
+                **more,
             })  # fmt: skip
 
         def write() -> Table:
             journal.sync()
-            reported = Counter(text for outcome in journal.outcomes() for text in outcome.warnings)
+            reported = Counter(finding.marked for outcome in journal.outcomes() for finding in outcome.warnings)
             table = table_of(planned, journal.done, journal.outcomes(), study.figures, record)
             write_table(table, directory / f"{STEM}.{format}")
             note(provenance.now(), **{"warnings of runs": dict(reported.most_common(20))})

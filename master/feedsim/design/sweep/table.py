@@ -24,7 +24,7 @@ from feedsim.files.source import json_file, json_value
 from feedsim.files.trace import matches
 from feedsim.files.trace.cells import named_columns, twice
 from feedsim.files.trace.files import written_whole
-from feedsim.foundation.errors import InputError, OutputError, no_such_file
+from feedsim.foundation.errors import Finding, InputError, OutputError, no_such_file
 from feedsim.foundation.installation import need
 from feedsim.foundation.outputs import read_rows, write_rows
 from feedsim.scenario.study import Parameter
@@ -52,6 +52,7 @@ class Table:
         parameters, figures: names of their columns.
         runs: number of runs of the study.
         provenance: what the rows come from, plain values.
+        findings: run -> what there is to say of it; none where the table was read from a file.
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -60,6 +61,7 @@ class Table:
     figures: tuple[str, ...]
     runs: int
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    findings: Mapping[int, tuple[Finding, ...]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self.columns:
@@ -122,15 +124,17 @@ def table_of(
     units: dict[str, str] = {}
     first: dict[str, tuple[int, int]] = {}  # figure -> the first run that has it, and where in it
     status, message, warnings = (np.full(rows, text, dtype=object) for text in (OK, "", ""))
-    seconds = np.full(rows, np.nan)
+    seconds, findings = np.full(rows, np.nan), dict[int, tuple[Finding, ...]]()
     for outcome in outcomes:
         row = place[outcome.run]
         if row < 0:  # counts from the end
             continue
         seconds[row] = outcome.seconds
-        warnings[row] = _in_one_line(outcome.warnings)
+        warnings[row] = in_one_line([finding.marked for finding in outcome.warnings])
+        if outcome.warnings:
+            findings[outcome.run] = outcome.warnings
         if outcome.figures is None:
-            status[row], message[row] = FAILED, _in_one_line([outcome.error or "failed"])
+            status[row], message[row] = FAILED, in_one_line([outcome.error or "failed"])
             continue
         for i, (name, (value, unit)) in enumerate(outcome.figures.items()):
             if name not in result:
@@ -154,6 +158,7 @@ def table_of(
         tuple(names),
         design.runs,
         provenance,
+        {run: findings[run] for run in sorted(findings)},
     )
 
 
@@ -174,7 +179,7 @@ def _parameter_column(parameter: Parameter, values: NDArray[np.float64]) -> NDAr
     return labels[values.astype(np.int64)]
 
 
-def _in_one_line(texts: Sequence[str]) -> str:
+def in_one_line(texts: Sequence[str]) -> str:
     """Texts as a cell that is one line."""
     return " | ".join(" ".join(text.split()) for text in texts)
 
@@ -398,13 +403,14 @@ def shape(message: str) -> str:
     return re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", message)
 
 
-def kinds(messages: Iterable[str]) -> dict[str, tuple[str, int]]:
-    """Messages that differ in numbers only as one: its first example and how often it comes."""
-    result: dict[str, tuple[str, int]] = {}
-    for text in messages:
-        first, count = result.get(shape(text), (text, 0))
-        result[shape(text)] = first, count + 1
-    return result
+def kinds(table: Table) -> Iterator[tuple[tuple[Finding, ...], int]]:
+    """Findings of runs, those that differ in numbers only as one: of its first run, and how many runs have them."""
+    result: dict[str, tuple[tuple[Finding, ...], int]] = {}
+    for findings in table.findings.values():
+        alike = shape(in_one_line([finding.marked for finding in findings]))
+        first, count = result.get(alike, (findings, 0))
+        result[alike] = first, count + 1
+    yield from result.values()
 
 
 def levels(values: Array, *, worded: bool = False) -> Array:

@@ -18,7 +18,7 @@ from typing import Any
 from feedsim import analysis
 from feedsim.design.sweep.bundle import Bundle
 from feedsim.design.sweep.design import Design, Outcome
-from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.foundation.owned import TemporaryFolder, held
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import Study
@@ -102,7 +102,7 @@ def trial(study: Study, design: Design, fmus: Path | None = None) -> Trial:
     )
 
 
-def check(study: Study, design: Design, fmus: Path | None = None) -> tuple[int, tuple[str, ...], dict[int, str]]:
+def check(study: Study, design: Design, fmus: Path | None = None) -> tuple[int, tuple[Finding, ...], dict[int, str]]:
     """The first run, from the middle on, that can be made, without a step of it: its number, warnings, and the runs
     that cannot be made, with the reasons.
 

@@ -22,7 +22,7 @@ from feedsim.estimation.identify.parameters import RIGID_AXIS_NAMES
 from feedsim.estimation.identify.plateaus import resolution, white
 from feedsim.estimation.identify.record import Array, Record, runs
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the heap
 CLIPPING_SIGMAS = 4.0  # standard deviations that pass for noise
@@ -61,8 +61,8 @@ def without_clipped(
     J: float | None = None,
     left_out: str = "these rows and the plateaus with them are left out",
     simulated: Sequence[Array] | None = None,
-) -> tuple[tuple[Record, ...], tuple[str, ...]]:
-    """The records with the rows marked at which their torque is cut off, and a sentence for each such record.
+) -> tuple[tuple[Record, ...], tuple[Finding, ...]]:
+    """The records with the rows marked at which their torque is cut off, and a finding for each such record.
 
     J: inertia [kg.m2] for records whose other rows determine none, or roughly only; at most the true one.
     left_out: what the caller does with such rows.
@@ -95,7 +95,7 @@ def without_clipped(
         for record, both, one in zip(records, heaps, needed, strict=True)
         for heap in _proven(record, both, one, CLIPPING_SIGMAS * left, shortest)
     ]
-    result, said = [], []
+    result, said = [], list[Finding]()
     for k, (record, both) in enumerate(zip(records, heaps, strict=True)):
         # What one record shows of a limit holds for all that end at it.
         kept = [heap for heap in both if any(heap.like(other) for other in proven)]
@@ -221,7 +221,7 @@ def _beyond(heap: _Heap, record: Record, needed: _Needed, margin: float, shortes
     return max(beyond(), default=-np.inf) > max(CLIPPED_EXCESS * abs(limit), margin)
 
 
-def _words(record: Record, heaps: Sequence[_Heap], models: Sequence[_Needed], left_out: str) -> str:
+def _words(record: Record, heaps: Sequence[_Heap], models: Sequence[_Needed], left_out: str) -> Finding:
     assert record.clipped is not None
     limits = " and ".join(f"{heap.side * heap.limit:+.4g} N.m" for heap in heaps)
     parts = runs(record.clipped)
@@ -236,8 +236,10 @@ def _words(record: Record, heaps: Sequence[_Heap], models: Sequence[_Needed], le
     ]
     # A heap at the limit of another record need not show any such row itself.
     most = f", where inertia and friction need {np.prod(max(beyond)):+.3g} N.m" if beyond else ""
-    return (
+    remedy = "record with a wider range, or drive more gently"
+    return Finding(
+        "record-clipped", "doubt",
         f"{record.name}: the torque is cut off at {limits}{most}: "
-        f"{share:.2g} % of the rows, at {', '.join(times)}{rest}; {left_out}; record with a "
-        "wider range, or drive more gently"
-    )
+        f"{share:.2g} % of the rows, at {', '.join(times)}{rest}; {left_out}; {remedy}",
+        record.name, remedy,
+    )  # fmt: skip

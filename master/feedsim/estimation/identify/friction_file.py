@@ -24,7 +24,7 @@ from feedsim.files.checked import read_group
 from feedsim.files.fields import Quantity
 from feedsim.foundation import units
 from feedsim.foundation.arguments import amount
-from feedsim.foundation.errors import InputError, OutputError
+from feedsim.foundation.errors import Finding, InputError, OutputError
 from feedsim.scenario import Friction, FrictionParameters, GmsFriction, Subject
 from feedsim.scenario.roles import GMS
 
@@ -73,7 +73,7 @@ class Identified:
         return distinct([source.file for source in self.sources])
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Finding]:
         """Of reading and of identifying, each once."""
         reading = (warning for source in self.sources for warning in source.warnings)
         return list(dict.fromkeys((*reading, *self.found.warnings)))
@@ -301,7 +301,7 @@ def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, An
         matrix = [[round(float(value), 4) for value in row] for row in identification.correlation.matrix]
         content["correlation"] = {"names": list(identification.correlation.names), "matrix": matrix}
     if identified.warnings:
-        content["warnings"] = identified.warnings
+        content["warnings"] = [str(warning) for warning in identified.warnings]
     content["software"] = {name: software[name] for name in ("feedsim", "python", "numpy", "scipy")}
     return content
 
@@ -373,7 +373,6 @@ def _list(dumper: _Dumper, values: list[Any]) -> yaml.SequenceNode:
 
 
 _Dumper.add_representer(str, _text)
-_Dumper.add_multi_representer(str, _text)  # findings carry their severity as a class of text
 _Dumper.add_representer(list, _list)
 
 

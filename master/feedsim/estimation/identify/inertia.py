@@ -21,7 +21,7 @@ from feedsim.estimation.identify.parameters import RIGID_AXIS_NAMES, estimate, t
 from feedsim.estimation.identify.plateaus import white
 from feedsim.estimation.identify.record import Array, Record, runs
 from feedsim.estimation.identify.result import Correlation, Estimate
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 # Length of the Hann window of the low-pass [s]: -6 dB at 1/SHORT_WINDOW. It is doubled, up to LONG_WINDOW, as long as
 # noise of the motion makes up more than the share NOISE_SHARE of the acceleration's variance (that share is what J
@@ -49,7 +49,7 @@ class Inertia:
     rms: float
     rows: int
     window: float
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
     speeds: Array
 
     @property
@@ -162,13 +162,14 @@ def smooth_speed(record: Record) -> Array:
 
 def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     """Ordinary least squares with a covariance for correlated residuals."""
-    names, fixed, said = list(RIGID_AXIS_NAMES), {}, []
+    names, fixed, said = list(RIGID_AXIS_NAMES), {}, list[Finding]()
     columns = np.vstack([stretch.columns for stretch in stretches])
     torque = np.concatenate([stretch.torque for stretch in stretches])
     if np.ptp(columns[:, 2]) == 0:
         names.remove("M_0")
         fixed["M_0"] = "motion in one direction only does not separate it from friction"
-        said.append("motion in one direction only: the constant load is taken for friction")
+        text = "motion in one direction only: the constant load is taken for friction"
+        said.append(Finding("one-direction-only", "doubt", text, "M_0"))
     chosen = [RIGID_AXIS_NAMES.index(name) for name in names]
     scale = np.linalg.norm(columns[:, chosen], axis=0)
     scaled = columns[:, chosen] / np.where(scale > 0, scale, 1.0)
@@ -199,15 +200,19 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
         )
     share = float(values[0] * np.std(columns[:, 0]) / np.sqrt(np.mean(torque**2)))
     if share < LEAST_SHARE:
-        said.append(
+        said.append(Finding(
+            "acceleration-small", "doubt",
             f"accelerating takes {100 * share:.1f} % of the torque only: the inertia may be what the simple friction "
-            "model lacks; record moves that accelerate harder, or give it"
-        )
+            "model lacks; record moves that accelerate harder, or give it",
+            "J", "record moves that accelerate harder, or give it",
+        ))  # fmt: skip
     if sigma[0] > J_WARNED * values[0]:
-        said.append(
+        said.append(Finding(
+            "parameter-uncertain", "doubt",
             f"the inertia is known to {100 * sigma[0] / values[0]:.0f} % only: record moves that accelerate harder, or "
-            "give it"
-        )
+            "give it",
+            "J", "record moves that accelerate harder, or give it",
+        ))  # fmt: skip
     return Inertia(
         estimates,
         Correlation(tuple(names), correlation(covariance)),

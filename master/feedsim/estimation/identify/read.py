@@ -18,7 +18,7 @@ from feedsim.files.columns import Columns, Signal
 from feedsim.files.fields import no_axis
 from feedsim.files.source import digest
 from feedsim.files.trace import Recording, read_recording
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Drive, Machine
 
 # --- Magnitudes that no feed axis has: where a unit of time, length or torque is taken for another --------------------
@@ -192,7 +192,7 @@ MOVING, DIRECTION = 0.05, 0.05
 SPAN = 10e-3  # [s] that the speed is averaged over where only a position was recorded
 
 
-def checked(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[str]:
+def checked(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[Finding]:
     """What is worth a warning. Raises InputError where a sign or a unit is wrong beyond doubt.
 
     axis: its name; empty where nothing determines it.
@@ -202,7 +202,7 @@ def checked(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[s
     yield from _power(where, records)
 
 
-def _speed(where: str, records: Sequence[Record]) -> Iterator[str]:
+def _speed(where: str, records: Sequence[Record]) -> Iterator[Finding]:
     a, b, c = np.sum([_slope(record) for record in records if len(record) > 2] or [(0.0, 0.0, 0.0)], axis=0)
     if not b > 0:
         return
@@ -212,7 +212,8 @@ def _speed(where: str, records: Sequence[Record]) -> Iterator[str]:
     if wrong and abs(a) >= SCALE_CORRELATION * np.sqrt(b * c):
         raise InputError(f"{said} (allowed: {1 / WRONG_SLOPE:.2g} to {WRONG_SLOPE:g}); {_likely(ratio)}")
     if abs(ratio - 1) > SLOPE:
-        yield f"{said}; the sign, unit, pitch or gear of one of the two is wrong"
+        text = f"{said}; the sign, unit, pitch or gear of one of the two is wrong"
+        yield Finding("speed-contradicts-position", "doubt", text, where)
 
 
 def _likely(ratio: float) -> str:
@@ -244,7 +245,7 @@ def _slope(record: Record) -> tuple[float, float, float]:
     return float(np.dot(means, steps)), float(np.dot(steps, steps)), float(np.dot(means, means))
 
 
-def _power(where: str, records: Sequence[Record]) -> Iterator[str]:
+def _power(where: str, records: Sequence[Record]) -> Iterator[Finding]:
     """By the mean power torque * speed of what moves, in all and in either direction."""
     parts = [part for record in records if (part := _moving(record)) is not None]
     if not parts:
@@ -263,10 +264,12 @@ def _power(where: str, records: Sequence[Record]) -> Iterator[str]:
             f"{{column: {column}, sign: -1}}, or that of the motion"
         )
     if _share(net, speed) < -AGAINST:
-        yield (
+        yield Finding(
+            "torque-against-motion", "doubt",
             f"{where}: the torque is against the motion on average (mean power {float(np.mean(net * speed)):.3g} W); "
-            "its sign, or that of the motion, is not right, unless a constant load drives the axis"
-        )
+            "its sign, or that of the motion, is not right, unless a constant load drives the axis",
+            where,
+        )  # fmt: skip
 
 
 def _moving(record: Record) -> tuple[Array, Array] | None:
@@ -335,7 +338,7 @@ class Provenance:
     torque_constant: float | None = None
     inertia: float | None = None
     torque_delay: float | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     day: str = ""
     temperature: float = nan
 
@@ -354,7 +357,7 @@ class _Drive:
 
     pitch: float | None
     torque_constant: float | None
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[Finding, ...] = field(default=())
 
 
 def read_records(
@@ -408,8 +411,8 @@ def read_records(
     )
     check_time(path, records)
     check_slide(path, records, drive.pitch)
-    signs: Iterable[str] = ()
-    unread: Iterable[str] = ()
+    signs: Iterable[Finding] = ()
+    unread: Iterable[Finding] = ()
     if records[0].driven:
         signs = checked(path, records, chosen.axis)
         unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
@@ -452,7 +455,7 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
     own = machine.axes.get(chosen.axis) if machine is not None else None
     pitch = mapping.pitch if mapping is not None else None
     constant = mapping.torque_constant if mapping is not None else None
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     if own is not None and machine is not None:
         if mapping is not None and pitch is not None and abs(pitch - own.pitch) > TYPED_TOLERANCE * own.pitch:
             raise InputError(
@@ -466,15 +469,19 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
             and K_t is not None
             and abs(constant - K_t) > TYPED_TOLERANCE * K_t
         ):
-            warnings.append(
+            warnings.append(Finding(
+                "torque-constant-differs", "doubt",
                 f"{mapping.where('torque_constant')}: {constant:.9g} N.m/A counts, not the {K_t:.9g} N.m/A of axis "
-                f"{chosen.axis} of machine {machine.name}"
-            )
+                f"{chosen.axis} of machine {machine.name}",
+                mapping.where("torque_constant"),
+            ))  # fmt: skip
         if chosen.pitch is not None and abs(chosen.pitch - own.pitch) > PITCH_MISMATCH * own.pitch:
-            warnings.append(
+            warnings.append(Finding(
+                "pitch-differs", "doubt",
                 f"{recording.path}: the record gives a pitch of {1e3 * chosen.pitch:.4g} mm; axis {chosen.axis} of "
-                f"machine {machine.name} has {1e3 * own.pitch:.9g} mm, which counts"
-            )
+                f"machine {machine.name} has {1e3 * own.pitch:.9g} mm, which counts",
+                chosen.axis,
+            ))  # fmt: skip
         pitch, constant = own.pitch if pitch is None else pitch, K_t if constant is None else constant
     pitch = chosen.pitch if pitch is None else pitch
     for role, channel in chosen.channels.items():
@@ -489,10 +496,12 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
                 "torque_constant: 2 N.m/A in the mapping, or a machine with that axis" + _which(chosen, machine)
             )
         if channel.rms and (mapping is None or mapping.torque_constant is None):
-            warnings.append(
+            warnings.append(Finding(
+                "current-effective-value", "doubt",
                 f"{recording.header}: {channel.column!r} is an effective value; the machine's torque constant of "
-                f"{constant:.9g} N.m/A must count for it (for a peak value it is smaller by the square root of 2)"
-            )
+                f"{constant:.9g} N.m/A must count for it (for a peak value it is smaller by the square root of 2)",
+                recording.header,
+            ))  # fmt: skip
     if mapping is not None and mapping.mass is not None and pitch is None:
         raise InputError(f"{mapping.where('mass')}: the pitch is needed with it; give pitch: 20 mm, or an inertia")
     return _Drive(pitch, constant, tuple(warnings))
@@ -510,7 +519,7 @@ def _which(chosen: Chosen, machine: Machine | None) -> str:
 
 def _unread_load(
     recording: Recording, chosen: Chosen, drive: _Drive, records: Sequence[Record], pieces: Sequence[slice]
-) -> Iterator[str]:
+) -> Iterator[Finding]:
     """Columns whose names speak of a disturbance, while no load is read, and without which less is left of the torque.
 
     A torque may hold the disturbance already; to subtract it then makes things worse.
@@ -535,11 +544,13 @@ def _unread_load(
         if best > SMALLER * remaining[0]:
             continue
         given = (f", unit: {unit}" if unit else "") + ("" if best == remaining[1] else ", sign: -1")
-        yield (
+        remedy = f"load: {{column: {name}{given}}}"
+        yield Finding(
+            "load-not-read", "doubt",
             f"{recording.header}: {name!r} may be a known load, and is not read. With it a rigid axis with simple "
-            f"friction leaves {best:.3g} in place of {remaining[0]:.3g} N.m of the torque (rms); mapping: load: "
-            f"{{column: {name}{given}}}"
-        )
+            f"friction leaves {best:.3g} in place of {remaining[0]:.3g} N.m of the torque (rms); mapping: {remedy}",
+            recording.header, remedy,
+        )  # fmt: skip
 
 
 def _residual(records: Sequence[Record], loads: Sequence[Array]) -> float:
@@ -571,7 +582,7 @@ def _provenance(
     chosen: Chosen,
     columns: Mapping[str, str],
     drive: _Drive,
-    warnings: tuple[str, ...],
+    warnings: tuple[Finding, ...],
     day: str,
 ) -> Provenance:
     inertia = mapping.inertia if mapping is not None else None

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ class Piece:
     time: Array
 
 
-def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ...], tuple[str, ...]]:
+def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ...], tuple[Finding, ...]]:
     """Split at gaps and even out jitter.
 
     time: (N,) [s]; row: where a row of that index stands, for messages.
@@ -177,7 +177,7 @@ def _uneven(time: Array, at: int, usual: float, mean: float, row: Callable[[int]
     )
 
 
-def _gaps(time: Array, breaks: list[int], usual: float, dropped: list[int], row: Callable[[int], str]) -> list[str]:
+def _gaps(time: Array, breaks: list[int], usual: float, dropped: list[int], row: Callable[[int], str]) -> list[Finding]:
     if not breaks:
         return []
     first = breaks[0]
@@ -187,14 +187,15 @@ def _gaps(time: Array, breaks: list[int], usual: float, dropped: list[int], row:
         + (f", and at {len(breaks) - 1} more place{'s'[: len(breaks) > 2]}" if len(breaks) > 1 else "")
         + f" (about {missing} in all); the pieces are taken as records of their own"
     )
+    result = [Finding("rows-missing", "doubt", text, row(first + 1))]
     if not dropped:
-        return [text]
+        return result
     left_out = (
         f"{len(dropped)} fragment{'s'[: len(dropped) > 1]} of fewer than {MIN_ROWS_BETWEEN_GAPS} rows beside gaps "
         "left out "
         f"({sum(dropped)} row{'s'[: sum(dropped) > 1]})"
     )
-    return [text, left_out]
+    return [*result, Finding("rows-left-out", "doubt", left_out, row(first + 1))]
 
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

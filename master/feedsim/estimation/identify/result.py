@@ -11,6 +11,7 @@ import numpy as np
 
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.least_squares import ANY_VALUE, determined, half_width, reason
+from feedsim.foundation.errors import Finding
 
 Status = Literal["estimated", "held", "given", "undetermined"]
 
@@ -104,7 +105,7 @@ class Stationary:
     range: tuple[float, float]
     rms: float
     worst_curve: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +156,7 @@ class Dynamic:
     rms: float
     without_delay: Mapping[str, float] = field(default_factory=dict)
     advice: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +226,7 @@ class Identification:
     correlation: Correlation
     stationary: Stationary | None
     dynamic: Dynamic | None
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
     advice: tuple[str, ...]
     seconds: Mapping[str, float]
     rigid: Mapping[str, Estimate] = field(default_factory=dict)

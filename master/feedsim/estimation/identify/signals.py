@@ -10,7 +10,7 @@ from typing import Literal
 from feedsim.files.columns import DIMENSIONS, DRIVING, Columns, Signal, resulting, target_of
 from feedsim.files.trace import Recording
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.units import is_rms, known_unit
 
 # --- Names that drive traces give their signals, and which signal of an axis each of them is --------------------------
@@ -187,7 +187,7 @@ class Chosen:
     axis: str
     channels: Mapping[str, Channel]
     interval: float | None
-    notes: tuple[str, ...]
+    notes: tuple[Finding, ...]
     pitch: float | None = None
     why: str = ""
 
@@ -255,7 +255,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
         if len(own) > 1:
             raise InputError(f"{recording.header}: the axes {', '.join(own)} are in the file; which one is meant?")
         axis = next(iter(own))
-    notes: list[str] = []
+    notes: list[Finding] = []
     if recording.axes:
         recording, axis_notes = _of_capture(recording, axis)
         notes += axis_notes
@@ -268,7 +268,8 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
     driving = [role for role in DRIVING if role in names]
     for role in driving[1:]:
         unused = names.pop(role)
-        notes.append(Note(f"{recording.path}: {unused!r} is not used; the {driving[0]} {names[driving[0]]!r} is"))
+        text = f"{recording.path}: {unused!r} is not used; the {driving[0]} {names[driving[0]]!r} is"
+        notes.append(Finding("column-not-used", "note", text, str(recording.path)))
     missing = [] if driving or not driven else ["torque or current"]
     missing += [] if "position" in names or "speed" in names else ["position or speed"]
     if missing:
@@ -292,7 +293,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
             if role in DRIVING and len(recording.axes) == 1 and recording.axes[0].why:
                 problem = f"{recording.header}: {recording.axes[0].why}"
             if role in OF_CONTROL:
-                notes.append(f"{problem}; it is not read")
+                notes.append(Finding("column-not-read", "doubt", f"{problem}; it is not read", recording.header))
             else:
                 faults.append(problem)
     if faults:
@@ -301,7 +302,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
     return Chosen(axis, channels, None, tuple(notes), None if pitch is None else 1e-3 * pitch, why)
 
 
-def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
+def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[Finding]]:
     """The signals of an axis of a capture, and what was found of it. InputError: which axis is meant is not clear."""
     there = ", ".join(f"{axis.name} (|{axis.number})" for axis in recording.axes)
     meant = (
@@ -312,24 +313,26 @@ def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
         raise InputError(f"{recording.header}: {problem}; there is {there}")
     result = meant[0]
     where = f"{recording.path}: axis {result.name} (|{result.number})"
-    doubts = [f"{where}: {doubt}" for doubt in result.doubts]
+    doubts = [Finding("capture-faulty", "doubt", f"{where}: {doubt}", where) for doubt in result.doubts]
     if result.pitch is None:
-        return recording.of_axis(result), [
-            *doubts,
+        text = (
             f"{where}: POWER does not give the pitch, nor whether TORQUE and CURRENT count in the position's "
-            f"direction: they are taken to. {result.why[:1].upper()}{result.why[1:]}",
-        ]
+            f"direction: they are taken to. {result.why[:1].upper()}{result.why[1:]}"
+        )
+        return recording.of_axis(result), [*doubts, Finding("pitch-not-recorded", "doubt", text, where)]
     if result.rotary:
         raise InputError(f"{where}: turns by 360 deg with its motor; rotary axes are not identified here")
     against = "against" if result.sign < 0 else "in"
     return recording.of_axis(result), [
         *doubts,
-        Note(
+        Finding(
+            "pitch-by-power", "note",
             f"{where}: by POWER = TORQUE times the motor's speed the pitch is {result.pitch:.6g} mm, and TORQUE and "
             f"CURRENT count {against} the position's direction; positions are taken as {result.length}, as the file "
-            "has no units"
+            "has no units",
+            where,
         ),
-    ]
+    ]  # fmt: skip
 
 
 def _aliases(recording: Recording, axis: str, axes: tuple[str, ...]) -> dict[str, str]:

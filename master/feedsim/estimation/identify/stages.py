@@ -39,7 +39,7 @@ from feedsim.estimation.identify.stribeck import FEW_SPEEDS, Points, stationary
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.parameter import Prior
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Friction, FrictionParameters, Machine
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
 from feedsim.structure import Modes
@@ -301,11 +301,11 @@ class _Run:
         law: FrictionLaw,
         options: Options,
         progress: Progress,
-        said: Sequence[str] = (),
+        said: Sequence[Finding] = (),
     ) -> None:
         self.records, self.law, self.options, self.progress = records, law, options, progress
         self.seconds: dict[str, float] = {}
-        self.warnings: list[str] = list(said)
+        self.warnings: list[Finding] = list(said)
         self.advice: list[str] = []
         self.reasons: dict[int, str] = {}  # stage -> why it is absent
         self.prior = True  # whether stage 1 enters stage 2
@@ -343,8 +343,10 @@ class _Run:
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
         if first is not None and prior:
             # Nor is what stage 1 could not determine, but stage 2 does.
-            reported = [f"{name} is not estimated" for name, value in estimates.items() if value.status == "estimated"]
-            self.warnings += [text for text in first.warnings if not text.startswith(tuple(reported))]
+            known = [name for name, value in estimates.items() if value.status == "estimated"]
+            self.warnings += [
+                finding for finding in first.warnings if finding.code != "parameter-held" or finding.place not in known
+            ]
         self.warnings += second.warnings if second is not None else ()
         self.advice += second.advice if second is not None else ()
         return Identification(
@@ -375,7 +377,9 @@ class _Run:
         if not reason:
             return estimates, True
         reason = f"the fit went astray: it says {reason}"
-        self.warnings.insert(0, f"no parameter is offered as estimated: {reason}; look at signs, units and known load")
+        remedy = "look at signs, units and known load"
+        text = f"no parameter is offered as estimated: {reason}; {remedy}"
+        self.warnings.insert(0, Finding("fit-astray", "doubt", text, "", remedy))
         line = {name: entry.value for name, entry in rigid.estimates.items()}
         line |= {"F_S": line["F_C"], "F_log": 0.0, "asymmetry": 0.0, "sigma_0": line["F_C"] / USUAL_DEFLECTION}
         line |= {"sigma_1": line["sigma_0"] * USUAL_RELAXATION, "W": NO_EFFECT["W"], "gamma": NO_EFFECT["gamma"]}
@@ -420,7 +424,7 @@ class _Run:
             return stage if self.options.fleet is None else with_fleet(stage, self.options.fleet)
         except InputError as error:
             self.reasons[1] = str(error)
-            self.warnings.append(f"no Stribeck curve: {error}")
+            self.warnings.append(Finding("stribeck-curve-missing", "doubt", f"no Stribeck curve: {error}"))
             return None
         finally:
             self.progress("stage 1: Stribeck curve", 1, 1)
@@ -462,7 +466,7 @@ class _Run:
             if first is None:
                 raise
             self.reasons[2] = str(error)
-            self.warnings.append(f"no pre-sliding parameters: {error}")
+            self.warnings.append(Finding("pre-sliding-missing", "doubt", f"no pre-sliding parameters: {error}"))
             return None
 
     def _rigid(self, records: Sequence[Record]) -> Inertia | None:
@@ -475,7 +479,7 @@ class _Run:
         finally:
             self.progress("inertia", 1, 1)
         if self.options.J is None:
-            self.warnings += [text for text in result.warnings if text not in self.warnings]
+            self.warnings += [finding for finding in result.warnings if finding not in self.warnings]
         return result
 
     def _compare(self, rigid: Inertia | None) -> None:
@@ -491,11 +495,13 @@ class _Run:
         far = abs(away) > max(INERTIA_MISMATCH * given.value, INERTIA_SIGMAS * rigid.J.sigma)
         if far and self._slides():
             check_inertia(given, rigid.J)
-            self.warnings.append(
+            remedy = "check the inertia, the torque constant and the pitch, or let it be estimated"
+            self.warnings.append(Finding(
+                "inertia-contradicted", "doubt",
                 f"the inertia is given as {given.value:.4g} kg.m2, accelerating parts of the records say "
-                f"{rigid.J.value:.4g} +- {NORMAL_95 * rigid.J.sigma:.2g} kg.m2: check the inertia, the torque constant "
-                "and the pitch, or let it be estimated"
-            )
+                f"{rigid.J.value:.4g} +- {NORMAL_95 * rigid.J.sigma:.2g} kg.m2: {remedy}",
+                "J", remedy,
+            ))  # fmt: skip
 
     def _held(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
         """What of `names` is held at which value, besides the usual ones, and what is freed."""

@@ -33,7 +33,7 @@ from feedsim.estimation.identify.record import Array
 from feedsim.estimation.identify.result import Correlation, Plateau, Stationary, Status
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.estimation.parameter import Parameter
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 # --- What plateaus cannot determine: parameters that are held for it, and warnings with their reason ------------------
 
@@ -162,49 +162,59 @@ def unanswered(points: Points, fit: Fit, values: dict[str, float]) -> dict[str, 
     return {name: "the torque at these speeds does not depend on it" for name in fit.silent}
 
 
-def warnings(points: Points, fit: Fit, matrix: Array, names: Sequence[str], I_P: float | None) -> list[str]:
+def warnings(points: Points, fit: Fit, matrix: Array, names: Sequence[str], I_P: float | None) -> list[Finding]:
     """About plateaus and the fit that stands. matrix: correlation of `names` (the parameters as they are reported)."""
-    said: list[str] = []
+    said: list[Finding] = []
     slowest = float(points.speeds[0])
     if I_P is not None and slowest * I_P > SLOW_ENOUGH:
-        said.append(
+        said.append(Finding(
+            "lowest-speed-high", "doubt",
             f"the lowest speed is {slowest * I_P * 60e3:.3g} mm/min, above 50 mm/min: F_S and v_s rest on what lies "
-            "below; drive plateaus from 10 mm/min on"
-        )
+            "below; drive plateaus from 10 mm/min on",
+            "F_S, v_s", "drive plateaus from 10 mm/min on",
+        ))  # fmt: skip
     if len(points.speeds) < FEW_SPEEDS:
-        said.append(
+        said.append(Finding(
+            "speeds-few", "doubt",
             f"{len(points.speeds)} speed(s), fewer than {FEW_SPEEDS}: the shape of the curve between them is not "
-            "checked; drive 12 speeds in equal ratios"
-        )
+            "checked; drive 12 speeds in equal ratios",
+            "", "drive 12 speeds in equal ratios",
+        ))  # fmt: skip
     if not points.both:
-        said.append(
+        said.append(Finding(
+            "one-direction-only", "doubt",
             "plateaus in one direction only: the constant load M_0 and an asymmetry are taken for friction; drive "
-            "both directions"
-        )
+            "both directions",
+            "M_0, asymmetry", "drive both directions",
+        ))  # fmt: skip
     sigma = fit.sigma
     if "v_s" in sigma and sigma["v_s"] > V_S_WARNED * fit["v_s"]:
-        said.append(
-            f"v_s is known to {100 * sigma['v_s'] / fit['v_s']:.0f} % only: add plateaus about "
-            f"{_speed(fit['v_s'], I_P)}, or make them longer"
-        )
+        remedy = f"add plateaus about {_speed(fit['v_s'], I_P)}, or make them longer"
+        text = f"v_s is known to {100 * sigma['v_s'] / fit['v_s']:.0f} % only: {remedy}"
+        said.append(Finding("parameter-uncertain", "doubt", text, "v_s", remedy))
     if "F_log" in sigma and sigma["F_log"] > max(0.3 * fit["F_log"], 0.02 * float(np.max(np.abs(points.torque)))):
-        said.append(
+        said.append(Finding(
+            "parameter-uncertain", "doubt",
             f"F_log ({fit['F_log']:.3g} -+ {sigma['F_log']:.2g} N.m) is hardly separated from sigma_2 and F_C: add "
-            "speeds from well below to well above v_log; the curve itself may be good"
-        )
+            "speeds from well below to well above v_log; the curve itself may be good",
+            "F_log", "add speeds from well below to well above v_log",
+        ))  # fmt: skip
     for name in fit.at_bound:
         shown = "F_S - F_C" if name == EXCESS else name
-        said.append(f"{shown} sits at its bound {fit[name]:.4g}: the model's shape does not fit, or it is not there")
+        text = f"{shown} sits at its bound {fit[name]:.4g}: the model's shape does not fit, or it is not there"
+        said.append(Finding("parameter-at-bound", "doubt", text, shown))
     for row, first in enumerate(names):
         for column in range(row):
             pair = {first, names[column]}
             # M_0 and asymmetry go together by their definition; whether they are separated is looked at on its own.
             if abs(matrix[row, column]) > LIKE and pair != {"M_0", "asymmetry"}:
-                said.append(
+                said.append(Finding(
+                    "parameters-correlated", "doubt",
                     f"{names[column]} and {first} are correlated by {matrix[row, column]:+.3f}: the data determine "
                     "their combination, not each of them; the curve is not worse for it. Add speeds, or "
-                    "hold one of them"
-                )
+                    "hold one of them",
+                    f"{names[column]}, {first}", "Add speeds, or hold one of them",
+                ))  # fmt: skip
     return said
 
 
@@ -236,7 +246,7 @@ def warming(age: Array) -> Array:
     return np.asarray((np.outer(later, later) + np.outer(age, age) + np.minimum(age[:, None], age[None, :])) / 3)
 
 
-def hides(drifts: float, sigma_2: float) -> tuple[str, ...]:
+def hides(drifts: float, sigma_2: float) -> tuple[Finding, ...]:
     """A warning where warming that the speeds do not show leaves sigma_2 open.
 
     drifts: the part of its standard deviation [N.m.s/rad] by warming. The interval itself is that of all records
@@ -244,11 +254,14 @@ def hides(drifts: float, sigma_2: float) -> tuple[str, ...]:
     """
     if not drifts > WORTH_A_WORD * sigma_2:
         return ()
-    return (
+    remedy = "drive the fastest speed first and last, or warm the axis up before"
+    return (Finding(
+        "warming-not-separated", "doubt",
         "no fast speed is driven both early and late: viscous friction that falls as the axis warms up is not "
         f"separated from the shape of the curve; the plateaus alone leave +-{100 * NORMAL_95 * drifts / sigma_2:.2g} "
-        "% of sigma_2 open by that; drive the fastest speed first and last, or warm the axis up before",
-    )
+        f"% of sigma_2 open by that; {remedy}",
+        "sigma_2", remedy,
+    ),)  # fmt: skip
 
 
 def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
@@ -268,10 +281,10 @@ def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
 
 def repeated(
     plateaus: Sequence[Plateau], values: Mapping[str, float], names: Sequence[str]
-) -> tuple[Array, tuple[str, ...]]:
-    """(P,) variance of `names` by friction that was another when a speed came back, and a sentence about it."""
+) -> tuple[Array, tuple[Finding, ...]]:
+    """(P,) variance of `names` by friction that was another when a speed came back, and a finding about it."""
     variance, worst = np.zeros(len(names)), 0.0
-    said: tuple[str, ...] = ()
+    said: tuple[Finding, ...] = ()
     for k, m in repeats(plateaus):
         first, last = plateaus[k], plateaus[m]
         n = np.array([first.speed, last.speed])
@@ -287,11 +300,13 @@ def repeated(
         if abs(change) / friction > worst:
             worst = abs(change) / friction
             way = "fell" if change * first.speed < 0 else "rose"
-            said = (
+            said = (Finding(
+                "friction-drifts", "doubt",
                 f"friction at {size:.3g} rad/s {way} by {100 * worst:.2g} % between {first.begin:.4g} s "
                 f"({first.record}) and {last.begin:.4g} s ({last.record}): it drifts, as with temperature; the "
                 "parameters are a mean, and their intervals hold the drift; warm the axis up and record again",
-            )
+                first.record, "warm the axis up and record again",
+            ),)  # fmt: skip
     return variance, said
 
 
@@ -344,7 +359,7 @@ def stationary(
     problem = _Problem(points, fixed, seed)
     result, reasons, extra = problem.solve()
     usual = [name for name in DEFAULT_SHAPES if name in fixed and name not in asked]
-    better = _better(problem, result, reasons, usual) if extra > 0 else ""
+    better = _better(problem, result, reasons, usual) if extra > 0 else ("", "")
     return _conclude(tuple(plateaus), points, problem, result, reasons, extra, better, I_P)
 
 
@@ -509,8 +524,9 @@ def _guess(points: Points) -> dict[str, float]:
     }
 
 
-def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: Sequence[str]) -> str:
-    """What estimating one of the values held by default would gain, for the warning of scatter; "": nothing clear.
+def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: Sequence[str]) -> tuple[str, str]:
+    """What estimating one of the values held by default would gain, for the warning of scatter, and the option for it;
+    "": nothing clear.
 
     It counts where the plateaus are met to their noise then, or the sum of squares more than halves, and the drop is
     none that one more parameter brings in noise (F test: the noise's size is in doubt here).
@@ -518,9 +534,9 @@ def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: S
     count, moved = len(problem.points.speed), list(result.names)
     freedom = count - len(moved) - 1
     if freedom < 1:
-        return ""
+        return "", ""
     before = 2 * problem.fit(moved, reasons, 0.0, STARTS, result).cost
-    gains: list[tuple[float, str]] = []
+    gains: list[tuple[float, str, str]] = []
     for name in usual:
         if SHAPED[name] not in moved:
             continue
@@ -538,8 +554,8 @@ def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: S
             if fits
             else f"the sum of squares falls to {100 * after / before:.2g} %"
         )
-        gains.append((after, f"; with {name} free ({freed[name]:.3g}) {gain}: --free {name}"))
-    return min(gains)[1] if gains else ""
+        gains.append((after, f"; with {name} free ({freed[name]:.3g}) {gain}: --free {name}", f"--free {name}"))
+    return min(gains)[1:] if gains else ("", "")
 
 
 def _conclude(
@@ -549,7 +565,7 @@ def _conclude(
     result: Fit,
     reasons: Mapping[str, str],
     extra: float,
-    better: str,
+    better: tuple[str, str],
     I_P: float | None,
 ) -> Stationary:
     """Everything that is reported."""
@@ -568,17 +584,21 @@ def _conclude(
         reason = reported.get(name, "" if status == "estimated" else "held at a given or usual value")
         estimates[name] = estimate(name, values[name], float(sigma.get(name, nan)), status, reason)
     said = warnings(points, result, correlation(covariance - warmed), names, I_P)
-    said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in reported.items()]
+    for name, reason in reported.items():
+        text = f"{name} is not estimated but held at {values[name]:.4g}: {reason}"
+        said.append(Finding("parameter-held", "doubt", text, name))
     said += drifts
     if "sigma_2" in sigma:
         at = names.index("sigma_2")
         said += hides(float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
     if extra > 0:
-        said.append(
+        said.append(Finding(
+            "plateaus-scatter", "doubt",
             f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "
             "that depends on position or temperature, or a shape the model has not); the confidence intervals hold it"
-            + better
-        )
+            + better[0],
+            "", better[1],
+        ))  # fmt: skip
     speeds = np.geomspace(points.speeds[0], points.speeds[-1], SPEEDS) if len(points.speeds) > 1 else points.speeds
     away = points.torque - torque(values, points.speed)
     return Stationary(

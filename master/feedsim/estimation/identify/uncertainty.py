@@ -15,6 +15,7 @@ from feedsim.estimation.identify.result import Stationary, Status
 from feedsim.estimation.identify.search import Search, Solution
 from feedsim.estimation.least_squares import ANY_VALUE, determined, half_width, reason, shows
 from feedsim.estimation.parameter import Prior
+from feedsim.foundation.errors import Finding
 
 # Of the record's RMS torque, and of the inertia: what the model itself is not better than (interpolation between the
 # samples, modes of the structure). Without it the quietest move of a record without noise would count for all.
@@ -98,35 +99,39 @@ def _matters(honest: Uncertainty, name: str) -> bool:
     return honest.solution.sigma(inner(name)) > value
 
 
-def limits(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
+def limits(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[Finding, ...]:
     """What of the records, other than the noise of the torque, limits what is determined: a warning each."""
     return (*_rough(honest, names, fine), *_at_odds(honest, names))
 
 
-def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
+def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[Finding, ...]:
     """A warning where the recorded motion, not the torque, limits what is determined."""
     reported = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
     rough = [name for name in reported if np.hypot(1, honest.motion[name] / honest.torque[name]) > MOTION_NOISE_RATIO]
     if not rough:
         return ()
     sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})
-    return (
+    return (Finding(
+        "motion-too-coarse", "doubt",
         f"noise or steps of the recorded {' and '.join(sources)} limit {', '.join(rough)}, more than the torque's; "
         "the intervals include that as far as repeated noise and more smoothing show it, and may be too narrow: a "
         "recorded motor speed, or a position in finer steps, determines them better",
-    )
+        ", ".join(rough), "a recorded motor speed, or a position in finer steps, determines them better",
+    ),)  # fmt: skip
 
 
-def _at_odds(honest: Uncertainty, names: Sequence[str]) -> tuple[str, ...]:
+def _at_odds(honest: Uncertainty, names: Sequence[str]) -> tuple[Finding, ...]:
     """A warning where parts of the records ask for different values."""
     odd = [name for name in names if honest.at_odds[inner(name)] > AT_ODDS and _matters(honest, name)]
     if not odd:
         return ()
-    return (
+    return (Finding(
+        "records-contradict", "doubt",
         f"stretches of the records contradict each other, or stage 1, about {', '.join(odd)} by more than noise "
         "explains: friction that drifts with temperature or depends on the position, a torque that is clipped, or a "
         "motion that is too coarse; the intervals hold it",
-    )
+        ", ".join(odd),
+    ),)  # fmt: skip
 
 
 def motion_covariance(
@@ -348,24 +353,29 @@ def _reversals(model: RecordTorque) -> list[int]:
     return indexes
 
 
-def extrapolated(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[str, ...]:
+def extrapolated(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[Finding, ...]:
     """A warning where sines alone determine the friction over speed."""
     if prior is not None or not has_sines(fine):
         return ()
     top = max(float(np.max(np.abs(model.moved(0.0)[1]))) for model in fine)
     shown = f"{top:.3g} rad/s" if I_P is None else f"{60e3 * top * I_P:.3g} mm/min"
-    return (
+    return (Finding(
+        "curve-extrapolated", "doubt",
         f"the records of sines determine the friction up to {shown}, their highest speed: above it is extrapolated and "
         "not to be relied on; strokes at constant speed determine the curve",
-    )
+        "", "strokes at constant speed determine the curve",
+    ),)  # fmt: skip
 
 
-def doubts(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[str, ...]:
-    """What is undetermined and why, a sentence per reason; what stage 1 hands on it has said itself."""
+def doubts(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[Finding, ...]:
+    """What is undetermined and why, a finding per reason; what stage 1 hands on it has said itself."""
     names: dict[str, list[str]] = {}
     for name, (status, why) in fixed.items():
         before = prior.estimates.get(name) if prior is not None else None
         handed_on = before is not None and (before.status, before.reason) == (status, why)
         if status == "undetermined" and why and not handed_on and not why.startswith(GOES_WITH):
             names.setdefault(why, []).append(name)
-    return tuple(f"{' and '.join(name)}: {why}" for why, name in names.items())
+    return tuple(
+        Finding("parameter-undetermined", "doubt", f"{' and '.join(name)}: {why}", ", ".join(name))
+        for why, name in names.items()
+    )

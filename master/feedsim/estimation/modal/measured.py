@@ -21,7 +21,7 @@ from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.response_files import read_response
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 # Units of a channel -> how often it is differentiated in time to be an acceleration.
 OUTPUTS = {"rad": 2, "m": 2, "rad/s": 1, "m/s": 1, "rad/s^2": 0, "m/s^2": 0}
@@ -66,7 +66,7 @@ class Measured:
     input_unit: str
     linear: Mapping[str, bool]
     method: str
-    notes: Sequence[str] = field(default_factory=tuple)
+    notes: Sequence[Finding] = field(default_factory=tuple)
 
     def between(self, low: float, high: float) -> Measured:
         """Lines from `low` to `high` [Hz]."""

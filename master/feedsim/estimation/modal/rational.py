@@ -25,7 +25,7 @@ from scipy.optimize import least_squares, minimize_scalar
 from feedsim.estimation.modal.measured import Measured
 from feedsim.files.trace.response import Complexes
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.structure.modes import TOOL_PORTS, Modes
 
 Lines = NDArray[np.int64]
@@ -455,8 +455,8 @@ class AxisModes:
     scatter: Mapping[str, tuple[float, float]]
     dips: tuple[tuple[float, float, float], ...]
     peaks: tuple[tuple[float, float, float], ...]
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
+    warnings: tuple[Finding, ...]
+    notes: tuple[Finding, ...]
 
     @property
     def ratios(self) -> tuple[float, float, float] | None:
@@ -542,32 +542,41 @@ def _within(logarithm: Complexes) -> tuple[float, float]:
     return decibel, degrees
 
 
-def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[list[str], list[str]]:
+def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[list[Finding], list[Finding]]:
     """Warnings and notes: senses, units, delays."""
-    warnings: list[str] = []
-    notes = list(measured.notes) + [f"axis {axis}: {why}" for why in fit.refused]
+    warnings: list[Finding] = []
+    # Notes of the file count as notes here, whatever they weigh elsewhere.
+    notes = [replace(note, severity="note") for note in measured.notes]
+    notes += [Finding("mode-left-out", "note", f"axis {axis}: {why}", axis) for why in fit.refused]
     for mode, why in fit.implausible(measured.frequency):  # of a number that was given
-        warnings.append(f"axis {axis}: the mode of {mode.frequency:.4g} Hz is doubtful: {why}")
+        text = f"axis {axis}: the mode of {mode.frequency:.4g} Hz is doubtful: {why}"
+        warnings.append(Finding("mode-doubtful", "doubt", text, axis))
     if fit.rigid[MOTOR] < 0:
-        notes.append(f"axis {axis}: the motor counts against its torque; its sign is turned")
+        text = f"axis {axis}: the motor counts against its torque; its sign is turned"
+        notes.append(Finding("sign-turned", "note", text, axis))
     if SCALE in fit.rigid and fit.rigid[SCALE] * fit.rigid[MOTOR] < 0:
-        notes.append(f"axis {axis}: motor and scale count against each other; the scale's sign is turned")
+        text = f"axis {axis}: motor and scale count against each other; the scale's sign is turned"
+        notes.append(Finding("sign-turned", "note", text, axis))
     if measured.input_unit == "N.m":
         J, own = 1 / abs(fit.rigid[MOTOR]), modes.J_tot(axis)
         if abs(J / own - 1) > OFF:
-            warnings.append(
+            warnings.append(Finding(
+                "inertia-contradicted", "doubt",
                 f"axis {axis}: the response has an inertia of {J:.4g} kg.m2, the machine one of {own:.4g} kg.m2; the "
-                "modes are written relative to the machine's"
-            )
+                "modes are written relative to the machine's",
+                axis,
+            ))  # fmt: skip
     if SCALE in fit.rigid:
         lead = abs(fit.rigid[SCALE] / fit.rigid[MOTOR])
         usual = abs(_lead(modes, axis)) if measured.linear[SCALE] else 1.0
         if abs(lead / usual - 1) > OFF:
             unit = "m/rad" if measured.linear[SCALE] else "rad/rad"
-            warnings.append(
+            warnings.append(Finding(
+                "scale-factor-unexpected", "doubt",
                 f"axis {axis}: the scale moves by {lead:.4g} {unit} of the motor at low frequencies, where "
-                f"{usual:.4g} {unit} are expected: its unit, or a gear"
-            )
+                f"{usual:.4g} {unit} are expected: its unit, or a gear",
+                axis,
+            ))  # fmt: skip
     return warnings, notes
 
 

@@ -31,7 +31,7 @@ from feedsim.files.columns import Columns
 from feedsim.files.trace import Mark, Recording, read_recording
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import Closing
 from feedsim.motions.profile import speed_change
 from feedsim.scenario import Coupling, Friction, Machine
@@ -222,8 +222,8 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
 
 def unclipped(
     each: AxisRecord, left_out: str, J: float | None = None, simulated: Array | None = None
-) -> tuple[AxisRecord, tuple[str, ...]]:
-    """The record with the rows marked at which its torque is cut off, and sentences on them.
+) -> tuple[AxisRecord, tuple[Finding, ...]]:
+    """The record with the rows marked at which its torque is cut off, and findings on them.
 
     left_out: what becomes of these rows. J: inertia [kg.m2], where it is known. simulated: (N,) torque [N.m] of the
     machine on this motion, where there is one.
@@ -231,7 +231,9 @@ def unclipped(
     if not each.record.driven:
         return each, ()
     (record,), said = without_clipped([each.record], J, left_out, None if simulated is None else [simulated])
-    return replace(each, record=record), tuple(f"axis {each.axis}: {text}" for text in said)
+    return replace(each, record=record), tuple(
+        replace(finding, text=f"axis {each.axis}: {finding}", place=each.axis) for finding in said
+    )
 
 
 def _begins_in_motion(record: Record) -> bool:

@@ -21,7 +21,7 @@ from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, per_row_of
 from feedsim.estimation.replay.drive import implausible
 from feedsim.estimation.replay.moving_lines import Line, in_words, lines_in_motion, same_line, without_outside
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import InputError, Note, Wrong
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Drive, Machine
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 from feedsim.structure import checked_modes
@@ -67,7 +67,7 @@ class Comparison:
         limit: torque that the simulated drive cannot exceed [N.m]; limited: share of its rows at that limit.
         open_loop: whether the recorded torque drives the axis, in place of a drive.
         outside: lines of the record that come from outside the axis, at rest. moving_lines: others while it moves.
-        clipped: sentences on torque that the record cuts off: its rows count in no figure of the torque.
+        clipped: findings on torque that the record cuts off: its rows count in no figure of the torque.
         preloaded: whether the run begins with the torque at rest of the record.
     """
 
@@ -83,20 +83,23 @@ class Comparison:
     open_loop: bool = False
     outside: Sequence[Line] = ()
     moving_lines: Sequence[Line] = ()
-    clipped: Sequence[str] = ()
+    clipped: Sequence[Finding] = ()
     preloaded: bool = False
 
     @property
-    def findings(self) -> list[str]:
+    def findings(self) -> list[Finding]:
         """Why the replay may say nothing of the record, and what is left that is not the axis' own."""
-        result: list[str] = [] if self.open_loop else [Wrong(text) for text in implausible(self.each)]
+        unlikely = [] if self.open_loop else implausible(self.each)
+        result = [Finding("record-implausible", "wrong", text, self.axis) for text in unlikely]
         torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
         recorded = float(np.max(np.abs(torque), initial=0.0))
         if self.limited and not NEAR_TORQUE_LIMIT * self.limit < recorded < self.limit / NEAR_TORQUE_LIMIT:
-            result.append(Wrong(
+            result.append(Finding(
+                "torque-limit-differs", "wrong",
                 f"axis {self.axis}: the simulated drive is at its torque limit, M_max = {self.limit:.4g} N.m, in "
                 f"{100 * self.limited:.2g} % of the rows, and that of the record is not; give the limit that the "
-                f"drive has (axes.{self.axis}.drive.M_max)"
+                f"drive has (axes.{self.axis}.drive.M_max)",
+                self.axis,
             ))  # fmt: skip
         moving = self.each.moving
         off, way = rms(self.channels["position"].error[moving]), float(np.ptp(self.each.setpoint[self.each.rows]))
@@ -106,15 +109,18 @@ class Comparison:
                 if off > self.lag
                 else f"than {100 * MAX_WAY_SHARE:.0f} % of the way of {1e3 * way:.4g} mm"
             )
-            result.append(Wrong(
+            result.append(Finding(
+                "machine-not-of-record", "wrong",
                 f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) {beside}: this is "
-                "not the machine of the record"
+                "not the machine of the record",
+                self.axis,
             ))  # fmt: skip
         result += self.clipped
         if self.outside:
-            result.append(Note(in_words(self.axis, self.outside)))
+            result.append(Finding("lines-from-outside", "note", in_words(self.axis, self.outside), self.axis))
         if self.moving_lines:
-            result.append(Note(in_words(self.axis, self.moving_lines, moving=True)))
+            text = in_words(self.axis, self.moving_lines, moving=True)
+            result.append(Finding("lines-while-moving", "note", text, self.axis))
         return result
 
     @property
@@ -253,7 +259,7 @@ def compared(
     x_a = simulated["x_a"][::per_row]
     channels = {"position": Channel(axis_record.position, x_a, "m", "position")}
     delay = None
-    clipped: tuple[str, ...] = ()
+    clipped: tuple[Finding, ...] = ()
     if record.driven:
         delay, torque = _delayed(axis_record, simulated["M_a"], per_row)
         axis_record, clipped = unclipped(axis_record, "the torque of these rows counts in no figure", simulated=torque)

@@ -55,7 +55,7 @@ from feedsim.estimation.replay.machine_files import (
 from feedsim.estimation.replay.moving_lines import DIES_AWAY, Line, detrended, without_outside
 from feedsim.estimation.replay.tuning import decision, with_either
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.foundation.parallel import in_parallel
 from feedsim.scenario import Friction, Machine, load_machine
@@ -209,10 +209,17 @@ def _shapes(D: Array, e: Array) -> list[tuple[float, float] | None]:
 
 
 OF_MACHINE = "of the machine"
-TIED = (
-    "axis {}: the torque lies at {:.4g} N.m to the last digit in {:.2g} % of the rows, where the range of the record "
-    "or the drive ends; these rows are left out of the fit. Record with a wider range, or drive more gently"
-)
+
+
+def _tied(axis: str, limit: float, share: float) -> Finding:
+    """That the torque of so many rows [1] is the largest one [N.m] to the last digit."""
+    remedy = "Record with a wider range, or drive more gently"
+    return Finding(
+        "record-clipped", "doubt",
+        f"axis {axis}: the torque lies at {limit:.4g} N.m to the last digit in {100 * share:.2g} % of the rows, where "
+        f"the range of the record or the drive ends; these rows are left out of the fit. {remedy}",
+        axis, remedy,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +228,7 @@ class DrivesFound:
 
     drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
     machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis. outside: axis -> lines
-    from outside the axis, which were taken out of what was fitted. clipped: sentences on torque that is cut off.
+    from outside the axis, which were taken out of what was fitted. clipped: findings on torque that is cut off.
     limits: axis -> acceleration, jerk and speed of its setpoints, where they have moves from rest to rest.
     undecided_cycle: whether the record speaks for no cycle of the position loop, and nobody has given one. refused:
     axis -> why it has no drive.
@@ -231,7 +238,7 @@ class DrivesFound:
     comparisons: Sequence[Comparison]
     files: Mapping[str, str]
     outside: Mapping[str, Sequence[Line]] = field(default_factory=dict)
-    clipped: Sequence[str] = ()
+    clipped: Sequence[Finding] = ()
     undecided_cycle: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, AxisLimits] = field(default_factory=dict)
@@ -271,7 +278,7 @@ def identify_drives(
     fitted, outside = {}, {}
     begins: dict[str, Begin | None] = {}
     limits_of_setpoints: dict[str, AxisLimits] = {}
-    clipped: list[str] = []
+    clipped: list[Finding] = []
     refusals = dict(refused or {})
     for axis, each in records.items():
         with _refusing(axis, refusals):
@@ -282,7 +289,7 @@ def identify_drives(
                 marked, share = tied_at_limit(whole.record)
                 whole = replace(whole, record=marked)
                 if share and not said:
-                    said = (TIED.format(axis, float(np.max(np.abs(marked.torque))), 100 * share),)
+                    said = (_tied(axis, float(np.max(np.abs(marked.torque))), share),)
             own, lines = without_outside(whole, J)
             begins[axis] = _begin(own) if machine is None else None
             fitted[axis], outside[axis] = own, lines

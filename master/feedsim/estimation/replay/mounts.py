@@ -38,7 +38,7 @@ from feedsim.files.columns import Columns
 from feedsim.files.trace import Recording
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
-from feedsim.foundation.errors import FeedsimError, InputError
+from feedsim.foundation.errors import FeedsimError, Finding, InputError
 from feedsim.scenario import Machine, Subject
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation.cosim import Follower
@@ -181,7 +181,7 @@ def read_stops(
     prefer: str = "",
     accelerometer: Accelerometer | None = None,
     jerk: float | None = None,
-) -> tuple[StopLog, Sequence[str]]:
+) -> tuple[StopLog, Sequence[Finding]]:
     """A record of stops, and what a user should know of it.
 
     axis: that moves; None: that of the mapping, or the only one. prefer: "position" or "speed" where both are recorded.

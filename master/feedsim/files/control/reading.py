@@ -15,7 +15,7 @@ from pathlib import Path
 
 from feedsim.files.control.archive import Archive, Entry, scalar
 from feedsim.files.control.names import Judged, Name, absent, depends, judged, shown, table
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 # --- What values of feed axes usually are: a value far outside is read in a wrong unit, more often than it is true ----
 
@@ -73,7 +73,7 @@ class View:
         assume: Mapping[str, str],
     ) -> None:  # fmt: skip
         self.axis, self.archives, self.assume = axis, archives, assume
-        self.notes: list[str] = []
+        self.notes: list[Finding] = []
         self._called = _called(archives, theirs)
         self.known = self._called & {entry.axis for archive in archives for entry in archive.entries if entry.axis}
         known = [place for archive in archives for place in archive.places]
@@ -98,16 +98,20 @@ class View:
                  if _holds_parameters(archive, place)}  # fmt: skip
         named = [place for place, name in every.items() if theirs.upper() in (name.upper(), place.upper())]
         if len(named) == 1:
-            self.notes.append(f"{self.axis}: parameters of the drive are those of {named[0]}, which has its name")
+            text = f"{self.axis}: parameters of the drive are those of {named[0]}, which has its name"
+            self.notes.append(Finding("drive-by-name", "note", text, self.axis))
             return tuple(named)
         if len(every) == 1 and len(axes) == 1:
             return tuple(every)
         if every:
             shown_ = _listed([f"{place}{f' ({name})' if name else ''}" for place, name in every.items()])
-            self.notes.append(
+            remedy = f"--drives {self.axis}={next(iter(every))}"
+            self.notes.append(Finding(
+                "drive-not-known", "note",
                 f"{self.axis}: which drive is that of the axis is not known, so no parameter of a drive is taken; the "
-                f"files have {shown_}: name it, --drives {self.axis}={next(iter(every))}"
-            )
+                f"files have {shown_}: name it, {remedy}",
+                self.axis, remedy,
+            ))  # fmt: skip
         return ()
 
     def entries(self, *keys: str) -> list[tuple[Archive, Entry]]:
@@ -335,8 +339,8 @@ class Reading:
     axes: Mapping[str, str]
     taken: list[Taken] = field(default_factory=list)
     refused: list[Refused] = field(default_factory=list)
-    doubts: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    doubts: list[Finding] = field(default_factory=list)
+    notes: list[Finding] = field(default_factory=list)
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
@@ -392,14 +396,15 @@ def read(
     return reading
 
 
-def _unusual(taken: Taken) -> str:
-    """A sentence on a value far outside of what feed axes have; "" of any other."""
+def _unusual(taken: Taken) -> Finding | None:
+    """A finding on a value far outside of what feed axes have; None of any other."""
     usual = usual_ranges().get(taken.parameter)
     if usual is None or taken.condition or isinstance(taken.value, bool | str) or usual.holds(taken.value):
-        return ""
+        return None
     said = f"{taken.name.number} {taken.name.name} = {taken.text[:40]} ({taken.where}) is {taken.value:.4g}"
     axis = f"{taken.axis}: " if taken.axis else ""
-    return f"{axis}{said} {usual.unit}, usual is {usual.low:g} to {usual.high:g} {usual.unit}: check the unit"
+    text = f"{axis}{said} {usual.unit}, usual is {usual.low:g} to {usual.high:g} {usual.unit}: check the unit"
+    return Finding("value-unusual", "doubt", text, taken.where, "check the unit")
 
 
 def _asked(rows: Sequence[Name]) -> list[str]:
@@ -454,24 +459,26 @@ def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) ->
         return
     reading.taken.append(Taken(view.axis, name, value, entry, archive))
     if sought.note:
-        reading.notes.append(f"{view.axis}: {name.number}: {sought.note}")
+        text = f"{view.axis}: {name.number}: {sought.note}"
+        reading.notes.append(Finding("value-chosen", "note", text, view.axis))
     if programs := view.set_by_programs(name.key):
         lines = ", ".join(f"{own.program} ({its.name}:{own.line})" for its, own in programs[:3])
-        reading.notes.append(f"{view.axis}: {name.number} {name.name} is also set by programs when they run: {lines}")
-    reading.doubts += [
-        f"{view.axis}: {name.number} {name.name} is taken, but {text}: it holds for a part of the range alone"
-        for text in said.doubts
-    ]
+        text = f"{view.axis}: {name.number} {name.name} is also set by programs when they run: {lines}"
+        reading.notes.append(Finding("value-set-by-programs", "note", text, view.axis))
+    for doubt in said.doubts:
+        text = f"{view.axis}: {name.number} {name.name} is taken, but {doubt}: it holds for a part of the range alone"
+        reading.doubts.append(Finding("value-of-a-part", "doubt", text, view.axis))
     others = {comparable(entry.text) for _, entry in sought.entries if (entry.index or 0) != 0}
     if name.number.startswith("MD") and others - {comparable(entry.text)}:
-        reading.notes.append(
+        reading.notes.append(Finding(
+            "value-differs-between-sets", "note",
             f"{view.axis}: {name.number} {name.name} has other values in other elements (parameter sets, encoders); "
-            "element 0 is taken"
-        )
+            "element 0 is taken",
+            view.axis,
+        ))  # fmt: skip
     elif others - {comparable(entry.text)} and name.number != "p115":
-        reading.doubts.append(
-            f"{view.axis}: {name.number} {name.name} differs between data sets; that of index 0 is taken"
-        )
+        text = f"{view.axis}: {name.number} {name.name} differs between data sets; that of index 0 is taken"
+        reading.doubts.append(Finding("value-differs-between-sets", "doubt", text, view.axis))
 
 
 def _case(reading: Reading, view: View, name: Name) -> None:

@@ -17,7 +17,7 @@ from feedsim.files.control.archive import Archive, Entry, scalar
 from feedsim.files.control.formats import opened
 from feedsim.files.control.names import Name, names_of, shown, tied
 from feedsim.files.control.reading import Reading, Taken, Value, View, read
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 
 # Values this close are the same [relative]: a text of ten digits and its value in SI.
 TEXT_TOLERANCE = 1e-9
@@ -50,7 +50,7 @@ class Written:
     contents: dict[str, bytes] = field(default_factory=dict)
     changes: list[Change] = field(default_factory=list)
     same: list[Taken] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    notes: list[Finding] = field(default_factory=list)
     reading: Reading | None = None
 
 

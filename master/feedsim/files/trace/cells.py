@@ -25,7 +25,7 @@ import numpy as np
 from feedsim.files.source import content
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recorded, suggest
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.foundation.units import NUMBER, known_unit, spelled
 
 # --- Time stamps -> seconds since the first one: dates as loggers and gateways write them, times of day,
@@ -422,7 +422,7 @@ class Table:
     numbers: Array | None = None
     remarks: tuple[str, ...] = ()
     dates: Mapping[int, Stamps | InputError] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     @property
     def head(self) -> str:
@@ -536,9 +536,9 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
     if len(used) < 2:
         raise InputError(f"{where}: {len(used)} columns have a name; at least two are needed, the time among them")
     ahead = f"{path}: the header is taken to be line {layout.header_line}; the lines ahead of it are not read"
-    notes = [ahead] if layout.remarks else []
+    notes = [Finding("header-below-remarks", "doubt", ahead, where)] if layout.remarks else []
     notes += [
-        f"{path}: column {i + 1} has no name; it is not used"
+        Finding("column-without-name", "doubt", f"{path}: column {i + 1} has no name; it is not used", where)
         for i, name in enumerate(names)
         if not name and (read is not None or any(columns[i]))
     ]
@@ -618,7 +618,8 @@ def _dated(table: Table) -> Table:
         for i, read in dates.items():
             assert isinstance(read, Stamps)
             table.numbers[:, i] = read.seconds
-    notes = (*table.notes, *(read.note for read in dates.values() if isinstance(read, Stamps)))
+    clocks = (read.note for read in dates.values() if isinstance(read, Stamps))
+    notes = (*table.notes, *(Finding("time-by-stamps", "doubt", clock, table.where) for clock in clocks))
     return replace(table, units=tuple(header_units), dates=dates, notes=notes)
 
 

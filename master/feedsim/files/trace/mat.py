@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from feedsim.files import source
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.installation import need
 from feedsim.foundation.units import known_unit, spelled
 
@@ -581,7 +581,7 @@ class MatColumns:
     scalars: dict[str, float] = field(default_factory=dict)
     spellings: dict[str, str] = field(default_factory=dict)
     others: dict[str, str] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    notes: list[Finding] = field(default_factory=list)
 
     def add(self, name: str, values: Numbers, unit: str = "", written: str = "") -> None:
         """A column. written: as MATLAB calls it, where that is not its name."""
@@ -810,4 +810,5 @@ def _time_of_rows(path: Path, result: MatColumns, content: Mapping[str, Value]) 
         result.columns.clear()
         result.add(TIME, columns.pop(first), "s", first)
         result.columns |= columns
-        result.notes.append(f"{path}: {first} is taken to be the time in s, as Simulink's To File writes it")
+        text = f"{path}: {first} is taken to be the time in s, as Simulink's To File writes it"
+        result.notes.append(Finding("time-assumed", "doubt", text, str(path)))

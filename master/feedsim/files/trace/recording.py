@@ -26,7 +26,7 @@ from feedsim.files.trace.response_files import UNIVERSAL, read_signals_uff
 from feedsim.files.trace.scopes import read_scope
 from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.foundation.units import spelled
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Recording:
     scalars: Mapping[str, float] = field(default_factory=dict)
     axes: tuple[CaptureAxis, ...] = ()
     marks: tuple[capture.Mark, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     remarks: tuple[str, ...] = ()
     unread: Mapping[str, str] = field(default_factory=dict)
     _table: Table | None = None  # of a CSV file
@@ -233,7 +233,8 @@ def _read_mat(path: Path) -> Recording:
     if len(time) > 1 and bool(np.any(again := np.diff(time) == 0)) and mat.units["time"]:
         rows = np.append(~again, True)
         count = int(again.sum())
-        notes = (*notes, f"{path}: {count} of {len(time)} rows are left out: of rows at one instant the last counts")
+        text = f"{path}: {count} of {len(time)} rows are left out: of rows at one instant the last counts"
+        notes = (*notes, Finding("rows-left-out", "doubt", text, str(path)))
     return Recording(
         path, tuple(mat.columns), mat.units, mat.scalars, notes=notes, unread=mat.others,
         _columns=mat.columns, _spellings=mat.spellings, _rows=rows,
@@ -292,7 +293,8 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
             known[name.format(mapping.axis)] = unit
     if "time" in columns:
         known["time"] = "s"
-    note = f"{recording.path}: columns by {', '.join(str(mapping.file or 'a mapping') for mapping in mappings)}"
+    text = f"{recording.path}: columns by {', '.join(str(mapping.file or 'a mapping') for mapping in mappings)}"
+    note = Finding("columns-mapped", "doubt", text, str(recording.path))
     return Recording(
         recording.path, tuple(columns), known, notes=(*recording.notes, note), remarks=recording.remarks,
         _columns=columns,

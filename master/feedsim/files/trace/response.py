@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedsim.files.trace.trace import Array, Columns, check_name, check_unit, matching
 from feedsim.foundation import units as quantities
-from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.errors import Finding, InputError
 
 Complexes = NDArray[np.complex128]
 
@@ -48,7 +48,7 @@ class FrequencyResponse(Columns[Complexes]):
     columns: Mapping[str, Complexes]
     units: Mapping[str, str] = field(default_factory=dict)
     coherence: Mapping[str, Array] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     kind = "frequency response"
 
     def __repr__(self) -> str:
@@ -137,7 +137,8 @@ class FrequencyResponse(Columns[Complexes]):
                 values = 1 / values
             columns[name] = values * way.factor / (2j * math.pi * self.frequency) ** way.order
             if words := way.words():
-                notes.append(Note(f"{name} is in {given}: {words} to be in {wanted}"))
+                text = f"{name} is in {given}: {words} to be in {wanted}"
+                notes.append(Finding("response-converted", "note", text, name))
         return FrequencyResponse(self.frequency, columns, {**self.units, **units}, self.coherence, tuple(notes))
 
 
@@ -182,9 +183,10 @@ def _way(given: str, wanted: str) -> _Way:
     raise problems[0]
 
 
-def without_zero(path: Path, frequency: Array) -> tuple[str, ...]:
+def without_zero(path: Path, frequency: Array) -> tuple[Finding, ...]:
     """The note on a first line at 0 Hz, which no response has; none where there is no such line."""
-    return (Note(f"{path}: the line at 0 Hz is left out"),) if frequency.size and frequency[0] == 0 else ()
+    note = Finding("zero-frequency-left-out", "note", f"{path}: the line at 0 Hz is left out", str(path))
+    return (note,) if frequency.size and frequency[0] == 0 else ()
 
 
 def quotient_unit(output: str, input: str) -> str:

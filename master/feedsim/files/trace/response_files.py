@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from feedsim.files.trace.response import Complexes, FrequencyResponse, quotient_
 from feedsim.files.trace.sinumerik_xml import SUFFIX, read_response_xml
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, Note, no_such_file
+from feedsim.foundation.errors import Finding, InputError, no_such_file
 from feedsim.foundation.installation import need
 
 # --- Frequency responses from universal files, dataset 58 (the only room that knows pyuff) ----------------------------
@@ -96,7 +96,7 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
         over, under = (_Axis.of(entry, axis, end) for axis, end in (("ordinate", "rsp"), ("orddenom", "ref")))
         columns[name] = np.asarray(entry["data"], dtype=np.complex128)[kept] * (over.factor / under.factor)
         unit_texts[name] = quotient_unit(over.unit, under.unit)
-        notes += [Note(f"{path}: function {name!r}: {words}") for axis in (over, under) for words in axis.notes]
+        notes += [_of_function(path, name, note) for axis in (over, under) for note in axis.notes]
         if other := coherences.get(name):
             _check_same(path, f"coherence of {name}", _frequencies(path, name, other), frequency)
             coherence[name] = np.clip(np.real(other["data"])[kept], 0, 1)
@@ -106,7 +106,7 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
         raise InputError(f"{path}: {error}") from None
 
 
-def read_signals_uff(path: Path) -> tuple[dict[str, Floats], dict[str, str], tuple[str, ...]]:
+def read_signals_uff(path: Path) -> tuple[dict[str, Floats], dict[str, str], tuple[Finding, ...]]:
     """Time responses of a universal file: name -> (N,), with the time as "time"; name -> unit; notes.
 
     Functions are called by node and direction, "12:+Z". Units are those of frequency responses.
@@ -118,7 +118,7 @@ def read_signals_uff(path: Path) -> tuple[dict[str, Floats], dict[str, str], tup
     if not responses:
         raise InputError(f"{path}: no time response (dataset 58, function type 1)")
     time = np.asarray(responses[0]["x"], dtype=np.float64)
-    columns, unit_texts, notes = {"time": time}, {"time": "s"}, list[str]()
+    columns, unit_texts, notes = {"time": time}, {"time": "s"}, list[Finding]()
     for entry in responses:
         name, axis, x = _point(entry, "rsp"), _Axis.of(entry, "ordinate", "rsp"), np.asarray(entry["x"])
         if x.shape != time.shape or not np.allclose(x, time, rtol=FREQUENCY_TOLERANCE, atol=0):
@@ -127,7 +127,7 @@ def read_signals_uff(path: Path) -> tuple[dict[str, Floats], dict[str, str], tup
             raise InputError(f"{path}: two time responses are called {name!r}")
         columns[name] = np.real(np.asarray(entry["data"])).astype(np.float64) * axis.factor
         unit_texts[name] = axis.unit
-        notes += [Note(f"{path}: function {name!r}: {words}") for words in axis.notes]
+        notes += [_of_function(path, name, note) for note in axis.notes]
     if not all(np.all(np.isfinite(values)) for values in columns.values()):
         raise InputError(f"{path}: a value is not finite")
     return columns, unit_texts, tuple(notes)
@@ -139,7 +139,7 @@ class _Axis:
 
     unit: str
     factor: float = 1.0
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     @classmethod
     def of(cls, function: Mapping[str, Any], axis: str, end: str) -> _Axis:
@@ -152,10 +152,16 @@ class _Axis:
             return cls(label, notes=_contradiction(label, kind, unit))
         length, force = function["unit_factors"]
         scale = {"N": force, "N.m": force * length}.get(unit, 1.0 if turns else length)
-        return cls(unit, 1 / scale, (f"no label of its unit; {unit} by its type, {TYPE_NAMES[kind]}",))
+        text = f"no label of its unit; {unit} by its type, {TYPE_NAMES[kind]}"
+        return cls(unit, 1 / scale, (Finding("unit-assumed", "note", text),))
 
 
-def _contradiction(label: str, kind: int, unit: str) -> tuple[str, ...]:
+def _of_function(path: Path, name: str, note: Finding) -> Finding:
+    """A note on an axis, said of its function in the file."""
+    return replace(note, text=f"{path}: function {name!r}: {note}", place=str(path))
+
+
+def _contradiction(label: str, kind: int, unit: str) -> tuple[Finding, ...]:
     """The note on a label whose unit is not of the axis' type; g is that of an acceleration."""
     try:
         same = units.unit(label).dimension == units.unit(unit).dimension
@@ -163,7 +169,8 @@ def _contradiction(label: str, kind: int, unit: str) -> tuple[str, ...]:
         return ()
     if same or (kind == ACCELERATION and label in ("g", "G")):
         return ()
-    return (f"its label says {label}, its type {TYPE_NAMES[kind]}; the label counts",)
+    text = f"its label says {label}, its type {TYPE_NAMES[kind]}; the label counts"
+    return (Finding("unit-contradicted", "note", text),)
 
 
 def _unit_factors(path: Path, sets: Sequence[Mapping[str, Any]]) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from feedsim.files import source
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.foundation.units import known_unit, spelled
 
 MAX_CHANNELS = 1000
@@ -50,7 +50,7 @@ class Signals:
 
     columns: Mapping[str, Array]
     units: Mapping[str, str]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
 
 def read_scope(path: Path) -> Signals | None:
@@ -173,7 +173,7 @@ def _grouped(
     titles = dict(zip(order, unique(channels[k] for k in order), strict=True))
     times = [clock.since(base) for clock, _ in groups]
     time, slower = _one_time(path, base.since(base), times, [titles[min(own)] for _, own in groups])
-    columns, units, notes, unknown, scaled = {"time": time}, {"time": "s"}, [], [], []
+    columns, units, notes, unknown, scaled = {"time": time}, {"time": "s"}, list[Finding](), [], []
     resampled: list[str] = []
     interpolated: list[str] = []
     for instants, keeps, (_, values) in zip(times, slower, groups, strict=True):
@@ -194,18 +194,27 @@ def _grouped(
             factor = _cell(header, "ScaleFactor", k).replace(",", ".")
             scaled += [name] if factor not in ("", "1", "1.0") else []
     if time.size < base.instants.size or any(instants[0] < time[0] - MAX_CLOCK_DIFFERENCE for instants in times):
-        notes.append(
+        notes.append(Finding(
+            "rows-left-out", "doubt",
             f"{path}: its channels begin or end at different times; read are {time[0]:.6g} to {time[-1]:.6g} s, where "
-            f"all are recorded, counted from the first value of {titles[min(channels_of_base)]}"
-        )
-    for names, words in (
-        (silent, "has no value"),
-        (resampled, "has another sampling time: its values are kept until its next one"),
-        (interpolated, "is sampled at other instants: its values are interpolated"),
-        (unknown, "is in a unit that is not known"),
-        (scaled, "has a scale factor; the file does not say whether its values are scaled"),
-    ):
-        notes += [f"{path}: {few(names, 4)} {words}"] if names else []
+            f"all are recorded, counted from the first value of {titles[min(channels_of_base)]}",
+            str(path),
+        ))  # fmt: skip
+
+    def said(names: Sequence[str], words: str) -> str:
+        return f"{path}: {few(names, 4)} {words}"
+
+    rarer = "has another sampling time: its values are kept until its next one"
+    between = "is sampled at other instants: its values are interpolated"
+    unclear = "has a scale factor; the file does not say whether its values are scaled"
+    findings = (
+        (silent, Finding("channel-empty", "doubt", said(silent, "has no value"))),
+        (resampled, Finding("channel-resampled", "doubt", said(resampled, rarer))),
+        (interpolated, Finding("channel-resampled", "doubt", said(interpolated, between))),
+        (unknown, Finding("unit-unknown", "doubt", said(unknown, "is in a unit that is not known"))),
+        (scaled, Finding("scale-unclear", "doubt", said(scaled, unclear))),
+    )
+    notes += [replace(finding, place=str(path)) for names, finding in findings if names]
     return Signals(columns, units, tuple(notes))
 
 
@@ -300,13 +309,14 @@ def _halscope(path: Path, text: str) -> Signals:
             f"{path}:1: {first[:80]!r}; a sampling period in ns is expected, of up to {MAX_PERIOD_DIGITS} digits"
         )
     rows = [(k, line) for k, line in enumerate(lines, 2) if line.strip() and not line.startswith("#")]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     if result[1]:
         labels, values = _table(path, rows)
     else:
         labels, values = _labelled(path, [(k, line.split()) for k, line in rows])
         values = values[:-1]  # halscope writes one sample more than it has recorded
-        notes = (f"{path}: halscope writes one sample more than it has recorded: the last one is left out",)
+        text = f"{path}: halscope writes one sample more than it has recorded: the last one is left out"
+        notes = (Finding("rows-left-out", "doubt", text, str(path)),)
     if len(values) < 2:
         raise InputError(f"{path}: {len(rows)} rows of samples; at least 3 are needed")
     table = np.array(values, dtype=np.float64)

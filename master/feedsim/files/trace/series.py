@@ -29,7 +29,7 @@ from feedsim.files.trace.mat import MAT, named, read_columns
 from feedsim.files.trace.recording import of_control
 from feedsim.files.trace.trace import Array, TimeColumns, Trace
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
 _UNIT_BEHIND = re.compile(r"(.*?[^\s])\s*\[([^\[\]]*)\]")
@@ -64,7 +64,7 @@ class Series(TimeColumns):
     units: Mapping[str, str] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
     broken: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         self._settle()

@@ -21,7 +21,7 @@ from feedsim.files import source
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.scopes import Signals, unique
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.foundation.units import known_unit, spelled
 
 SUFFIX = ".xml"
@@ -100,13 +100,14 @@ def _trace(path: Path, root: ElementTree.Element, frame: ElementTree.Element) ->
     notes = []
     known = np.isfinite(table)
     if empty := [title for title, rows_of in zip(titles, known.T, strict=True) if not rows_of.any()]:
-        notes.append(f"{path}: {few(empty, 4)}: no value is recorded")
+        notes.append(Finding("channel-empty", "doubt", f"{path}: {few(empty, 4)}: no value is recorded", str(path)))
     whole = [k for k in range(len(titles)) if known[:, k].any()]
     first = max(int(np.argmax(known[:, k])) for k in whole) if whole else 0
     if not whole or first > len(rows) - 2:
         raise InputError(f"{path}: its signals have no rows in common")
     if slow := [titles[k] for k in whole if not known[first:, k].all()]:
-        notes.append(f"{path}: {few(slow, 4)}: sampled less often; values are kept until the next one")
+        text = f"{path}: {few(slow, 4)}: sampled less often; values are kept until the next one"
+        notes.append(Finding("channel-resampled", "doubt", text, str(path)))
     columns, result = {"time": time[first:]}, {"time": "s"}
     for k in whole:
         last = np.maximum.accumulate(np.where(known[:, k], np.arange(len(rows)), 0))
@@ -114,7 +115,8 @@ def _trace(path: Path, root: ElementTree.Element, frame: ElementTree.Element) ->
         unit = units[k]
         result[titles[k]] = spelled(unit) if unit and known_unit(unit) else ""
         if unit and not result[titles[k]]:
-            notes.append(f"{path}: {titles[k]} is in {unit!r}, a unit that is not known")
+            text = f"{path}: {titles[k]} is in {unit!r}, a unit that is not known"
+            notes.append(Finding("unit-unknown", "doubt", text, str(path)))
     return Signals(columns, result, tuple(notes))
 
 
@@ -194,7 +196,8 @@ def _time_signals(path: Path, root: ElementTree.Element) -> Signals:
             columns[f"{title} run {k}"] = values
     if time is None or time.size < 2:
         raise InputError(f"{path}: {root.tag} holds no time signals; its spectra are read as a frequency response")
-    note = f"{path}: neither units nor names of the signals are in the file; nodes are the control's numbers of them"
+    text = f"{path}: neither units nor names of the signals are in the file; nodes are the control's numbers of them"
+    note = Finding("signals-not-named", "doubt", text, str(path))
     return Signals({"time": time} | columns, {"time": "s"} | dict.fromkeys(columns, ""), (note,))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedsim.foundation import installation
-from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.installation import fmus_directory, mend, shipped
 from feedsim.motions.part_program import Moves
 
@@ -219,7 +219,7 @@ class PlannedPath:
     end_time: Floats
     acts: NDArray[np.int8]
     axis: NDArray[np.int8]
-    notes: tuple[Note, ...]
+    notes: tuple[Finding, ...]
     _planner: int = field(repr=False)
     _program: Program = field(repr=False)
     _lock: Lock = field(default_factory=Lock, repr=False)
@@ -331,7 +331,7 @@ def plan_moves(moves: Moves, limits: Limits, progress: Callable[[int, int], None
     return planned
 
 
-def _fast_feeds(moves: Moves, speed: Floats) -> list[Note]:
+def _fast_feeds(moves: Moves, speed: Floats) -> list[Finding]:
     """Programmed speeds that no axis reaches, nor all of them together."""
     fastest = float(np.linalg.norm(speed))
     above = np.flatnonzero(np.nan_to_num(moves.feed) > fastest)
@@ -339,17 +339,23 @@ def _fast_feeds(moves: Moves, speed: Floats) -> list[Note]:
         return []
     row = above[0]
     more = f", as in {len(above) - 1} other rows" if len(above) > 1 else ""
-    return [Note(
-        f"{moves.files[moves.file[row]]}:{moves.line[row]}: F {moves.feed[row] * 6e4:.6g} mm/min is above what the "
-        f"axes reach together, {fastest * 6e4:.6g} mm/min{more}; their limits hold"
+    place = f"{moves.files[moves.file[row]]}:{moves.line[row]}"
+    return [Finding(
+        "feed-out-of-reach", "note",
+        f"{place}: F {moves.feed[row] * 6e4:.6g} mm/min is above what the "
+        f"axes reach together, {fastest * 6e4:.6g} mm/min{more}; their limits hold",
+        place,
     )]  # fmt: skip
 
 
-def _slow_roundings(saved: Floats, corners: int) -> list[Note]:
+def _slow_roundings(saved: Floats, corners: int) -> list[Finding]:
     """Stretches whose corners take longer than stops would."""
     if not corners:
         return []
-    return [Note(
+    remedy = "G60 or a larger tolerance is faster there"
+    return [Finding(
+        "corners-slower-than-stops", "note",
         f"{corners} rounded corners take longer than exact stops: {saved[0]:.4g} s in place of {saved[1]:.4g} s. "
-        "G60 or a larger tolerance is faster there"
+        f"{remedy}",
+        "", remedy,
     )]  # fmt: skip

@@ -11,7 +11,7 @@ from feedsim.files.control import Name
 from feedsim.files.control.archive import Archive
 from feedsim.files.control.writing import Written
 from feedsim.foundation import outputs
-from feedsim.foundation.errors import Note
+from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import counted, minus, plain_unit
 from feedsim.report.provenance import hashed, inputs_part
@@ -75,9 +75,9 @@ def figures_of(written: Written) -> dict[str, Figure]:
     }
 
 
-def findings(written: Written) -> list[str]:
+def findings(written: Written) -> list[Finding]:
     """Values to type, and what was not touched."""
-    result: list[str] = []
+    result: list[Finding] = []
     typed = [change for change in written.changes if not change.written]
     if typed:
         shown = "; ".join(
@@ -85,8 +85,9 @@ def findings(written: Written) -> list[str]:
             for change in typed[:MOST_NAMED]
         )
         more = f"; and {len(typed) - MOST_NAMED} more on the sheet" if len(typed) > MOST_NAMED else ""
-        result.append(f"{counted(len(typed), 'value')} not written: {shown}{more}")
-    return [*result, *(Note(text) for text in written.notes)]
+        text = f"{counted(len(typed), 'value')} not written: {shown}{more}"
+        result.append(Finding("values-to-type", "doubt", text))
+    return [*result, *written.notes]
 
 
 def answers(written: Written, axes: Mapping[str, str]) -> list[str]:

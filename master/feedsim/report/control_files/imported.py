@@ -12,7 +12,7 @@ from feedsim.analysis import Figure
 from feedsim.files.control.archive import Archive
 from feedsim.files.control.reading import Reading, Refused, Taken
 from feedsim.foundation import outputs
-from feedsim.foundation.errors import Note
+from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.control_files.exported import sources_section
 from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
@@ -48,35 +48,40 @@ def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) ->
     }
 
 
-def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[str]:
+def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[Finding]:
     """What is to be known before the machine file is used."""
-    result: list[str] = []
+    result: list[Finding] = []
     if not made.values:
         whose = "the draft is empty" if made.base is None else "the machine file is as it was"
-        result.append(f"no value was taken; {whose}")
+        result.append(Finding("no-value-taken", "doubt", f"no value was taken; {whose}"))
     result += reading.doubts
     open_ones = doubtful(reading, made)
     if open_ones:
         shown = "; ".join(_named(open_one) for open_one in open_ones[:MOST_NAMED])
         more = f"; and {len(open_ones) - MOST_NAMED} more in the report" if len(open_ones) > MOST_NAMED else ""
-        result.append(f"{counted(len(open_ones), 'value')} not taken: {shown}{more}")
+        text = f"{counted(len(open_ones), 'value')} not taken: {shown}{more}"
+        result.append(Finding("values-not-taken", "doubt", text))
     if made.missing:
-        result.append(
+        first_key = made.missing[0].partition(":")[0]
+        result.append(Finding(
+            "machine-file-draft", "doubt",
             f"the machine file is a draft: {counted(len(made.missing), 'key')} missing, the first "
-            f"{made.missing[0].partition(':')[0]}; the head of the file has them all"
-        )
+            f"{first_key}; the head of the file has them all",
+            first_key,
+        ))  # fmt: skip
     for archive in archives:
         if archive.odd:
             first = archive.odd[0]
-            result.append(
-                Note(
-                    f"{archive.name}: {counted(archive.odd_count, 'line')} not understood, the first in line "
-                    f"{first.line}: {first.reason}"
-                )
-            )
+            result.append(Finding(
+                "lines-not-understood", "note",
+                f"{archive.name}: {counted(archive.odd_count, 'line')} not understood, the first in line "
+                f"{first.line}: {first.reason}",
+                f"{archive.name}:{first.line}",
+            ))  # fmt: skip
         if archive.container:
-            result.append(Note(f"{archive.name} is a container with binary parts: only lines that are whole were read"))
-    return [*result, *(Note(text) for text in reading.notes)]
+            text = f"{archive.name} is a container with binary parts: only lines that are whole were read"
+            result.append(Finding("binary-parts-not-read", "note", text, archive.name))
+    return [*result, *reading.notes]
 
 
 def answers(reading: Reading, made: Imported) -> list[str]:

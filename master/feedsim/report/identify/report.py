@@ -416,7 +416,10 @@ def _stage_1(identification: Identification) -> Section | None:
         )
     ]
     if stage.warnings:
-        parts += [Paragraph("Its own doubts, which are none about the values above:"), _bullets(stage.warnings)]
+        parts += [
+            Paragraph("Its own doubts, which are none about the values above:"),
+            _bullets([str(warning) for warning in stage.warnings]),
+        ]
     return Section("Stage 1", parts, "stage-1")
 
 

@@ -16,6 +16,7 @@ from feedsim.estimation.identify.friction_file import FRICTION_FILE
 from feedsim.estimation.identify.read import recording_day, recording_temperature
 from feedsim.estimation.identify.result import Balance, Estimate, Identification
 from feedsim.files.trace.files import quoted, shortest
+from feedsim.foundation.errors import Finding
 from feedsim.report.formatting import Array, counted
 from feedsim.report.identify import stribeck_plots as quantities
 from feedsim.report.identify.stribeck_plots import MM_PER_MIN
@@ -109,16 +110,18 @@ def table_lines(identified: Identified) -> list[str]:
     return lines
 
 
-def terminal_warnings(identified: Identified) -> list[str]:
+def terminal_warnings(identified: Identified) -> list[Finding]:
     """Warnings without those that say no more than the reason of a parameter, which the table holds."""
     estimates = [estimate for estimate in identified.found.estimates.values() if estimate.reason]
-    return [text for text in identified.warnings if not any(_repeats(text, estimate) for estimate in estimates)]
+    return [
+        finding for finding in identified.warnings if not any(_repeats(finding, estimate) for estimate in estimates)
+    ]
 
 
-def _repeats(text: str, estimate: Estimate) -> bool:
-    """Whether a text is "F_S and v_s: reason" or "F_S is not estimated but held at 2: reason"."""
-    head = text.removesuffix(f": {estimate.reason}")
-    return head != text and head.split(" ")[0] == estimate.name
+def _repeats(finding: Finding, estimate: Estimate) -> bool:
+    """Whether a finding says of a parameter, as the first one, what is the reason of its estimate."""
+    names = finding.place.split(", ") if finding.code in ("parameter-held", "parameter-undetermined") else ()
+    return estimate.name in names[:1] and finding.text.endswith(f": {estimate.reason}")
 
 
 def headline(identified: Identified) -> str:
@@ -196,7 +199,7 @@ def _curve(identification: Identification) -> dict[str, Any] | None:
         "worst_plateau": quantity(stage.worst_curve, "1", meaning="largest relative deviation"),
         "rms": quantity(stage.rms, "N.m", meaning="residual of the plateaus"),
         "used": identification.prior,
-        "warnings": list(stage.warnings),
+        "warnings": [str(warning) for warning in stage.warnings],
         "plateaus": len(stage.plateaus),
         "distinct_speeds": quantities.speeds_of(stage),
         "speeds": {"value": list(stage.range), "unit": "rad/s"},

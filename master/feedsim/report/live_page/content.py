@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.installation import checkout
 from feedsim.foundation.units import Variable
 from feedsim.linear.judgement import judge
@@ -374,11 +374,11 @@ def described(machine: Machine, program: Program, resources: Path) -> dict[str, 
     }  # fmt: skip
 
 
-def sentences(machine: Machine, program: Program, resources: Path) -> list[str]:
+def pose_findings(machine: Machine, program: Program, resources: Path) -> list[Finding]:
     """What a run says of the positions that the program reaches: the page says it in place of it."""
     grid = {axis.axis: axis for axis in _grid(machine, resources)}
     ranges = {axis: program.reached(axis) for axis in program.x_s}
-    outside = [name for axis in grid if axis in ranges for name in left_grid(grid[axis], ranges[axis], machine)]
+    outside = [finding for axis in grid if axis in ranges for finding in left_grid(grid[axis], ranges[axis], machine)]
     return [*outside, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
 
 
@@ -523,7 +523,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
     modes = checked_modes(machine)
     said = {
         *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
-        *sentences(machine, program, resources),
+        *pose_findings(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
     scheme, step = SCHEMES[coupling.scheme], machine.cycles.T_c / coupling.steps(machine)

@@ -155,7 +155,7 @@ def _notes(run: JudgedRun, contents: Content) -> Iterable[str]:
     if contents.left_out:
         yield "Not in this page: " + "; ".join(contents.left_out) + "."
     if run.warnings:
-        yield "As written, a run warns: " + "; ".join(run.warnings) + "."
+        yield "As written, a run warns: " + "; ".join(map(str, run.warnings)) + "."
 
 
 def _groups(knobs: Sequence[Mapping[str, Any]]) -> Iterable[str]:

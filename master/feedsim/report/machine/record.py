@@ -45,7 +45,7 @@ def record(info: MachineInfo, files: Sequence[tuple[str, Path]]) -> dict[str, An
         "format": FORMAT,
         "name": info.name,
         "note": info.note,
-        "warnings": list(info.warnings),
+        "warnings": [str(warning) for warning in info.warnings],
         "pose": {axis: {"value": position, "unit": "m"} for axis, position in info.pose.items()},
         "step": {"value": info.step, "unit": "s"},
         "total_mass": quantity(info.total_mass, "kg"),

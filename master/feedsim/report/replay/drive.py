@@ -22,7 +22,7 @@ from feedsim.estimation.replay.tuning import ERROR_RATE, OtherCycle, decision
 from feedsim.files.control import names_of
 from feedsim.files.trace import Mark
 from feedsim.foundation.arguments import spelt
-from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert
 from feedsim.report.changes import asked, control_section
 from feedsim.report.content import (
@@ -180,7 +180,7 @@ class DriveReport:
     name: str
     settings: Mapping[str, str]
     marks: Sequence[Mark]
-    unread: Sequence[str] = ()  # notes on columns
+    unread: Sequence[Finding] = ()  # notes on columns
 
     @property
     def exit_code(self) -> int:
@@ -204,46 +204,55 @@ class DriveReport:
         return [note for note in dict.fromkeys((*reported, *(source.note for source in self.sources))) if note]
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Finding]:
         """What a user should know."""
-        reported: dict[str, None] = dict.fromkeys(
-            Wrong(f"axis {axis} has no drive: {reason}") for axis, reason in self.found.refused.items()
-        )
-        reported |= dict.fromkeys(text for source in self.sources for text in source.warnings)
-        reported |= dict.fromkeys(self.unread)
-        reported |= dict.fromkeys(self.found.clipped)
+        result = [
+            Finding("drive-not-identified", "wrong", f"axis {axis} has no drive: {reason}", axis)
+            for axis, reason in self.found.refused.items()
+        ]
+        result += [warning for source in self.sources for warning in source.warnings]
+        result += [*self.unread, *self.found.clipped]
         for axis, lines in self.found.outside.items():
             if lines:
-                reported[Note(f"{in_words(axis, lines)}; it was taken out of what was fitted")] = None
+                text = f"{in_words(axis, lines)}; it was taken out of what was fitted"
+                result.append(Finding("lines-from-outside", "note", text, axis))
         for comparison in self.comparisons:
             if comparison.moving_lines:
-                reported[Note(in_words(comparison.axis, comparison.moving_lines, moving=True))] = None
+                text = in_words(comparison.axis, comparison.moving_lines, moving=True)
+                result.append(Finding("lines-while-moving", "note", text, comparison.axis))
         for axis, one in self.found.drives.items():
             open_ones = [name for name, estimate in one.estimates.items() if estimate.status == "undetermined"]
             if open_ones:
-                reported[Note(f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit "
-                          "together with the rest, and may be others")] = None  # fmt: skip
+                result.append(Finding(
+                    "parameter-undetermined", "note",
+                    f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit "
+                    "together with the rest, and may be others",
+                    ", ".join(f"{axis}.{name}" for name in open_ones),
+                ))  # fmt: skip
             if one.other is not None:
-                reported[_position_cycle(axis, one, one.other, self.found.undecided_cycle)] = None
-        return list(reported)
+                result.append(_position_cycle(axis, one, one.other, self.found.undecided_cycle))
+        return list(dict.fromkeys(result))
 
 
-def _position_cycle(axis: str, one: DriveFound, other: OtherCycle, undecided: bool) -> str:
+def _position_cycle(axis: str, one: DriveFound, other: OtherCycle, undecided: bool) -> Finding:
     """What the record of an axis says of the cycle of the position loop."""
     own, option = 1e3 * one.machine.cycles.T_pos, spelt("position_cycle")
     cycles = f"position cycles of {own:g} ms (taken) and {1e3 * other.cycle:g} ms ({option})"
     decided = 0 if undecided else decision([other])
     if decided > 0:
-        return f"axis {axis}: of {cycles} the record speaks for the latter"
+        text = f"axis {axis}: of {cycles} the record speaks for the latter"
+        return Finding("position-cycle-contradicted", "doubt", text, axis)
     if decided < 0:
-        return Note(f"axis {axis}: of {cycles} the record speaks for the former")
+        text = f"axis {axis}: of {cycles} the record speaks for the former"
+        return Finding("position-cycle-confirmed", "note", text, axis)
     if not undecided:  # a cycle was given
-        return Note(f"axis {axis}: {cycles} fit alike")
+        return Finding("position-cycle-open", "note", f"axis {axis}: {cycles} fit alike", axis)
     short, long = sorted((own, 1e3 * other.cycle))
-    return Note(
-        f"axis {axis}: {cycles} fit alike. Give {option} {short:g}ms if the drive closes the position loop (DSC), or "
-        f"{option} {long:g}ms if the control does"
+    remedy = (
+        f"Give {option} {short:g}ms if the drive closes the position loop (DSC), or {option} {long:g}ms if the "
+        "control does"
     )
+    return Finding("position-cycle-open", "note", f"axis {axis}: {cycles} fit alike. {remedy}", axis, remedy)
 
 
 def files_of(axes: Sequence[str]) -> list[str]:

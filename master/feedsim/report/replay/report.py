@@ -16,6 +16,7 @@ from feedsim.estimation.identify import Provenance
 from feedsim.estimation.identify.read import recording_day
 from feedsim.estimation.replay.compare import TO_RPM, Comparison
 from feedsim.files.trace import Mark, Trace
+from feedsim.foundation.errors import Finding
 from feedsim.report.changes import change_lines, changes_part, changes_section, control_section
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
 from feedsim.report.content import (
@@ -173,7 +174,7 @@ class Replayed:
     sources: Sequence[Provenance]
     marks: Sequence[Mark]
     settings: Mapping[str, str]
-    warnings: Sequence[str]
+    warnings: Sequence[Finding]
     proposals: Sequence[Proposal] = ()
 
     @property

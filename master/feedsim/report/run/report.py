@@ -27,7 +27,7 @@ from feedsim.analysis.circle import worth_telling
 from feedsim.design.tune import Proposal, of_run
 from feedsim.design.tune.proposals import rings
 from feedsim.files.trace import Trace
-from feedsim.foundation.errors import severity
+from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import show
 from feedsim.report import content
 from feedsim.report.changes import action, change_words, changes_section, control_section
@@ -112,7 +112,7 @@ def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequen
     if scenario.file.suffix == ".ssp":
         return None
     if wrong := wrong_ones(run):
-        setting = getattr(wrong[0], "setting", "")
+        setting = wrong[0].remedy if wrong[0].code == "loop-unstable" else ""
         stable = {"scenario": scenario.file, "set": [*scenario.overrides, setting], "out": f"{FOLDER}_stable"}
         return Step("Run it with a gain that is stable", "run", stable) if setting else None
     first = next(iter(proposals), None)
@@ -148,9 +148,9 @@ def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequen
     return Step("See how each axis answers", "frf", {"subject": scenario.file})
 
 
-def wrong_ones(run: JudgedRun) -> list[str]:
+def wrong_ones(run: JudgedRun) -> list[Finding]:
     """Findings with which nobody may read figures of the run."""
-    return [text for text in run.warnings if severity(text) == "wrong"]
+    return [finding for finding in run.warnings if finding.severity == "wrong"]
 
 
 def travels(trace: Trace) -> dict[str, float]:

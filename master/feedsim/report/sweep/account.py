@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.design.sweep.sensitivity import CONFIDENCE, Indices, Sensitivities, Trends, sensitivities
-from feedsim.design.sweep.table import Failure, Where, failures, kinds, levels
-from feedsim.foundation.errors import WRONG, Wrong
+from feedsim.design.sweep.table import Failure, Where, failures, in_one_line, kinds, levels
+from feedsim.foundation.errors import Finding
 from feedsim.report.formatting import Array, Scale, number, scale
 from feedsim.report.provenance import InputFile, finite, hashed, inputs_part
 
@@ -211,24 +211,26 @@ class Account:
         return self.busy / (self.processes * self.wall_time) if known else None  # type: ignore[operator]
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Finding, ...]:
         """Of the study, of the runs (with their number), and of what the statistics leave out."""
-        result = [*self.study.warnings, *(str(entry) for entry in self.record.get("warnings", ()))]
+        result = [*self.study.warnings, *(Finding(**entry) for entry in self.record.get("findings", ()))]
         if self.table.partial:
-            result.append(f"The study is not finished: {len(self.table)} of {self.design.runs} runs are done.")
+            text = f"The study is not finished: {len(self.table)} of {self.design.runs} runs are done."
+            result.append(Finding("study-not-finished", "doubt", text))
         if self.failed:
-            result.append(
-                f"{self.failed} of {len(self.table)} runs failed and have no figures; statistics are of the others."
-            )
+            text = f"{self.failed} of {len(self.table)} runs failed and have no figures; statistics are of the others."
+            result.append(Finding("runs-failed", "doubt", text))
         for output in self.outputs:
             missing = int((self.ok & ~np.isfinite(output.values)).sum())
             if missing:
-                result.append(f"{output.name} could not be determined in {missing} of {int(self.ok.sum())} runs.")
-        reported = kinds(str(text) for text in self.table["warnings"] if text)
-        for example, count in reported.values():
-            head = f"{count} of {len(self.table)} runs"
-            wrong = example.startswith(WRONG)
-            result.append(Wrong(f"{head}: {example[len(WRONG) :]}") if wrong else f"{head} warn: {example}")
+                text = f"{output.name} could not be determined in {missing} of {int(self.ok.sum())} runs."
+                result.append(Finding("figure-not-determined", "doubt", text, output.name))
+        for findings, count in kinds(self.table):
+            gravest, *others = findings
+            wrong = gravest.severity == "wrong"
+            example = in_one_line([gravest.text, *(finding.marked for finding in others)])
+            text = f"{count} of {len(self.table)} runs{'' if wrong else ' warn'}: {example}"
+            result.append(replace(gravest, severity="wrong" if wrong else "doubt", text=text))
         return tuple(dict.fromkeys([*result, *self.sensitivities.warnings]))
 
     @cached_property

@@ -16,7 +16,7 @@ from feedsim.estimation.replay.machine_files import drive_file, drive_text
 from feedsim.files.control import Name, names_of
 from feedsim.foundation import outputs
 from feedsim.foundation.arguments import spelt
-from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
 from feedsim.report.changes import asked
@@ -74,7 +74,7 @@ def share_text(tuned: Tuned) -> str:
     return f"{100 * share_of(tuned.drawn.count):.0f} %"
 
 
-def drawn_findings(tuned: Tuned) -> list[str]:
+def drawn_findings(tuned: Tuned) -> list[Finding]:
     """What draws of the machine lack: margins, and motions that get worse."""
     drawn, limits = tuned.drawn, tuned.limits
     if drawn is None:
@@ -84,12 +84,15 @@ def drawn_findings(tuned: Tuned) -> list[str]:
         least = (
             f"{decibels(min(margins.gain for margins in thin))} and {min(margins.phase for margins in thin):.3g} deg"
         )
-        result.append(
+        result.append(Finding(
+            "margins-thin-in-draws", "doubt",
             f"in {len(thin)} of {drawn.count} draws of the machine a margin is below {limits.gain_margin:g} dB or "
-            f"{limits.phase_margin:g} deg; the least are {least}"
-        )
+            f"{limits.phase_margin:g} deg; the least are {least}",
+            tuned.axis,
+        ))  # fmt: skip
     if bad := [case for case in drawn.cases if case.worse]:
-        result.append(f"in {len(bad)} of {drawn.count} draws of the machine a motion gets worse than before")
+        text = f"in {len(bad)} of {drawn.count} draws of the machine a motion gets worse than before"
+        result.append(Finding("tuning-worse-in-draws", "doubt", text, tuned.axis))
     return result
 
 
@@ -273,39 +276,47 @@ def worse(tuned: Tuned, *, effects: bool = False) -> list[str]:
     ]
 
 
-def findings(tuned: Tuned) -> list[str]:
+def findings(tuned: Tuned) -> list[Finding]:
     """What is to be known before the values are typed."""
-    found: list[str] = []
+    found: list[Finding] = []
     if bad := worse(tuned):
-        found.append(Wrong(f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"))
+        text = f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"
+        found.append(Finding("tuning-worse", "wrong", text, tuned.axis))
     if bad := worse(tuned, effects=True):
-        found.append(f"worse than before where the machine has other effects: {'; '.join(bad)}")
+        text = f"worse than before where the machine has other effects: {'; '.join(bad)}"
+        found.append(Finding("tuning-worse-with-effects", "doubt", text, tuned.axis))
     found += present_misses(tuned)
     found += drawn_findings(tuned)
     if not tuned.elastic:
-        found.append(RIGID_WARNING if tuned.changes else Note(RIGID_WARNING))
+        remedy = "feedsim identify modes"
+        found.append(Finding("machine-rigid", "doubt" if tuned.changes else "note", RIGID_WARNING, tuned.axis, remedy))
     drive = tuned.machine.shipped_drive(tuned.axis, "a report")
     if tuned.changes and (getattr(drive, "friction_pulse", None) or getattr(drive, "friction_table", None)):
-        found.append(f"{tuned.axis}: {COMPENSATED}")
+        text = f"{tuned.axis}: {COMPENSATED}"
+        found.append(Finding("compensation-stale", "doubt", text, tuned.axis, "feedsim tune compensation"))
     if tuned.changes:
-        found.append(Note(CHECK))
+        found.append(Finding("values-to-check", "note", CHECK, tuned.axis))
     return found
 
 
-def present_misses(tuned: Tuned) -> list[str]:
-    """A sentence for each margin that the present drive lacks, with the loop that has it."""
+def present_misses(tuned: Tuned) -> list[Finding]:
+    """A finding for each margin that the present drive lacks, with the loop that has it."""
     limits, before, axis = tuned.limits, tuned.before, tuned.axis
     if not math.isfinite(before.phase) and before.phase < 0:
-        return [f"{axis}: the present drive is {before.phase_of}."]
+        return [Finding("present-drive-unstable", "doubt", f"{axis}: the present drive is {before.phase_of}.", axis)]
     return [
-        f"{axis}: the {name} margin of the present drive is {shown}; {limit:g} {unit} are required "
-        f"({spelt(f'{name}_margin')}). {_capital(loop)}."
+        Finding(
+            "present-margins-thin", "doubt",
+            f"{axis}: the {name} margin of the present drive is {shown}; {limit:g} {unit} are required "
+            f"({spelt(f'{name}_margin')}). {_capital(loop)}.",
+            axis,
+        )
         for name, value, shown, limit, unit, loop in (
             ("gain", before.gain, decibels(before.gain), limits.gain_margin, "dB", before.gain_of),
             ("phase", before.phase, f"{before.phase:.3g} deg", limits.phase_margin, "deg", before.phase_of),
         )
         if value < limit
-    ]
+    ]  # fmt: skip
 
 
 def _capital(text: str) -> str:

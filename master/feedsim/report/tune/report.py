@@ -15,7 +15,7 @@ from feedsim.design.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors,
 from feedsim.design.uncertainty import interval, share_of
 from feedsim.files.control import Name, names_of
 from feedsim.foundation import outputs
-from feedsim.foundation.errors import Note, Wrong
+from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
@@ -85,38 +85,40 @@ def drawn_intervals(judged: Judged) -> dict[str, tuple[float, float]]:
     return {name: tuple(map(float, interval(values))) for name, values in result.items()}  # type: ignore[misc]
 
 
-def findings(judged: Judged) -> list[str]:
+def findings(judged: Judged) -> list[Finding]:
     """What is to be known before the values are typed."""
-    worse = [
+    worse = ", ".join(
         f"{axis} on {pair.text}: {1e6 * before:.3g} -> {1e6 * after:.3g} um"
         for axis, pair, before, after in judged.worse
-    ]
-    result: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
+    )
+    text = f"worse with compensation than without: {worse}"
+    result = [Finding("compensation-worse", "wrong", text)] if worse else []
     figures = figures_of(judged)
     for effect, errors in judged.changed.items():
         if (judged.reduction(errors) < 1 - NEVER_WORSE).any():
             most = -figures[f"{effect.name}.worst"].value
-            result.append(f"with {effect.words} a circle gets worse than without compensation, by {most:.0f} %")
+            text = f"with {effect.words} a circle gets worse than without compensation, by {most:.0f} %"
+            result.append(Finding("compensation-worse-with-effects", "doubt", text))
     if judged.drawn is not None:
         worst = 100 * np.array([judged.reduction(errors).min() for errors in judged.drawn])
         bad = int((worst < 100 * (1 - NEVER_WORSE)).sum())
         if bad:
-            result.append(
-                f"in {bad} of {len(worst)} draws of the machine a circle gets worse than without compensation"
-            )
+            text = f"in {bad} of {len(worst)} draws of the machine a circle gets worse than without compensation"
+            result.append(Finding("compensation-worse-in-draws", "doubt", text))
     if others := judged.beyond_friction:
         axis, pair, free, before = others[0]
         more = f" (and {len(others) - 1} more)" if len(others) > 1 else ""
-        result.append(
+        result.append(Finding(
+            "error-not-of-friction", "doubt",
             f"{axis} on {pair.text}{more}: {1e6 * free:.3g} of {1e6 * before:.3g} um at the reversals are there "
-            "without friction, too: the drives make them, and no friction compensation takes them off"
-        )
+            "without friction, too: the drives make them, and no friction compensation takes them off",
+            axis,
+        ))  # fmt: skip
     if judged.found.kind == "model":
-        result.append(
-            Note("the compensation has the friction of the machine itself; a real one is never known so well")
-        )
+        text = "the compensation has the friction of the machine itself; a real one is never known so well"
+        result.append(Finding("friction-known-exactly", "note", text))
     else:
-        result.append(Note(LIMITS_UNKNOWN))
+        result.append(Finding("control-details-unknown", "note", LIMITS_UNKNOWN))
     return result
 
 

@@ -13,7 +13,7 @@ from feedsim.files import checked
 from feedsim.files.checked import check, describe, dotted, fetch, in_order, read_group
 from feedsim.files.fields import did_you_mean
 from feedsim.files.source import Source, at
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.motions import Circle, MeasuredSetpoints
 from feedsim.scenario.base import Base
 from feedsim.scenario.load import Setting
@@ -45,7 +45,7 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
     base = _base(source, overrides, faults)
     parameters: dict[str, Parameter] = {}
     files: list[Path] = [*base.files] if base is not None else []
-    notes: list[str] = []
+    notes: list[Finding] = []
     if base is not None and entry is not None:
         reader = Reader(source, base, entry.sampling.method == "grid")
         for name, given in entry.parameters.items():
@@ -108,12 +108,13 @@ def _meant(base: Base, settings: Sequence[Setting]) -> list[str]:
     return texts
 
 
-def _middle(base: Base, parameters: tuple[Parameter, ...]) -> list[str]:
+def _middle(base: Base, parameters: tuple[Parameter, ...]) -> list[Finding]:
     """A warning where the scenario cannot be loaded with a value from the middle of every parameter."""
     try:
         base.with_changes(changes_of(parameters, [parameter.middle for parameter in parameters]))
     except InputError as error:
-        return [f"with every parameter at its middle the scenario is refused: {'; '.join(error.problems)}"]
+        text = f"with every parameter at its middle the scenario is refused: {'; '.join(error.problems)}"
+        return [Finding("middle-refused", "doubt", text)]
     return []
 
 
@@ -143,9 +144,9 @@ def _overlaps(source: Source, reader: Reader) -> list[str]:
 
 def _sampling(
     source: Source, entry: StudyFile, parameters: dict[str, Parameter], runs: int | None
-) -> tuple[Sampling, list[str], list[str]]:
+) -> tuple[Sampling, list[str], list[Finding]]:
     """How the runs are spread; what is wrong with it; what a user should know."""
-    given, faults, warnings = entry.sampling, list[str](), list[str]()
+    given, faults, warnings = entry.sampling, list[str](), list[Finding]()
     grid = given.method == "grid"
 
     def fault(key: str, message: str) -> None:
@@ -180,9 +181,10 @@ def _sampling(
         faults.append(f"--runs {number}: at most {MOST_RUNS}")
     elif given.method == "sobol" and not power:
         near = 1 << (number.bit_length() - 1)
-        warnings.append(
+        text = (
             f"sampling.runs: {number} is no power of two; a Sobol sequence is balanced with {near} or {2 * near} runs"
         )
+        warnings.append(Finding("sampling-unbalanced", "doubt", text, "sampling.runs", f"--runs {near}"))
     seed = SEED if given.seed is None else given.seed
     return Sampling(given.method, number, seed), faults, warnings
 

@@ -17,7 +17,7 @@ from feedsim.files.checked import describe, dotted, quantity_of, reading
 from feedsim.files.fields import Quantity
 from feedsim.files.source import Mark, Place, Source, at
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.base import Base, Change, data_files
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.study.file import Kind, ParameterEntry
@@ -177,7 +177,7 @@ class Reader:
         """`source`: the study's tree; `base`: its scenario; `grid`: whether the runs are a grid."""
         self.source, self.base, self.grid = source, base, grid
         self.faults: list[str] = []
-        self.warnings: list[str] = []
+        self.warnings: list[Finding] = []
         self.files: list[Path] = []
         self.targets: dict[str, list[Target]] = {}
         self.factors: set[str] = set()  # names of parameters that multiply
@@ -370,14 +370,14 @@ class Reader:
         low, high = sorted((max(quantity.minimum, quantity.above) / times, quantity.maximum / times))
         share = outside(distribution, low, high)
         if share >= RARE:
-            self.warnings.append(
-                describe(
-                    self.source,
-                    self._at(name),
-                    f"{100 * share:.2g} % of the distribution are outside the allowed range of {dotted(target.place)}, "
-                    f"{quantity.range}; such runs fail. Cut it with from and to",
-                )
+            remedy = "Cut it with from and to"
+            text = describe(
+                self.source,
+                self._at(name),
+                f"{100 * share:.2g} % of the distribution are outside the allowed range of {dotted(target.place)}, "
+                f"{quantity.range}; such runs fail. {remedy}",
             )
+            self.warnings.append(Finding("distribution-out-of-range", "doubt", text, name, remedy))
 
     def _check_one(self, name: str, key: Place, target: Target, value: float, times: float, written: str) -> None:
         quantity = target.quantity

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.files.source import Source, parse
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.base import Base, Change
 from feedsim.scenario.study.file import Kind, Method
 
@@ -135,7 +135,7 @@ class Study:
         goal: "smallest" or "largest", and the figure. explain: a figure; "" where none is asked about.
         files: files of data that runs may read, each once.
         overrides: what was set from outside, as KEY=VALUE.
-        warnings: what a user should know before the runs are made, a sentence each.
+        warnings: what a user should know before the runs are made.
     """
 
     name: str
@@ -150,7 +150,7 @@ class Study:
     explain: str = ""
     files: tuple[Path, ...] = ()
     overrides: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     written: Mapping[str, Any] = field(default_factory=dict)  # the file as it stands, to be shown
 
     @property

@@ -21,7 +21,7 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import Closing, held
 from feedsim.simulation.cosim import unpacked
 from feedsim.simulation.cosim.unpacked import STORE, Content, check_there
@@ -295,16 +295,18 @@ class Archive(Closing):
             STORE.give_back(content)
 
     @property
-    def warnings(self) -> list[str]:
-        """What a user should know of it, a sentence each."""
+    def warnings(self) -> list[Finding]:
+        """What a user should know of it."""
         if not self.problems:
             return []
         listed = "; ".join(problem.strip()[:MAX_PROBLEM] for problem in self.problems[:MAX_PROBLEMS])
         more = len(self.problems) - MAX_PROBLEMS
-        return [
+        return [Finding(
+            "unit-description-invalid", "doubt",
             f"{self.path.name}: its modelDescription.xml is not what FMI 2.0 demands, and was read as well as it can "
-            f"be: {listed}{f'; {more} more like these' if more > 0 else ''}"
-        ]
+            f"be: {listed}{f'; {more} more like these' if more > 0 else ''}",
+            self.path.name,
+        )]  # fmt: skip
 
     def unknown_unit(self, name: str) -> str | None:
         """Unit of variable `name` where neither the archive defines it nor its name is one that is known here."""

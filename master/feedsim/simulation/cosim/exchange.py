@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation import installation
-from feedsim.foundation.errors import InputError, Note
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.installation import fmus_directory, mend
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
@@ -72,7 +72,7 @@ def library(folder: Path) -> Native | str:
     return loaded
 
 
-def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Note, ...]]:
+def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Finding, ...]]:
     """The native loop in the first of `folders` that has one; without one, unless it is not wanted, what that costs.
 
     wanted: None: where there is one that fits; False: Python is to work.
@@ -90,7 +90,8 @@ def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[No
     why = f"{'; '.join(dict.fromkeys(reasons))}; {mend('the native loop')}"
     if wanted:
         raise InputError(f"{', '.join(map(str, folders))}: no native cycle loop that fits this version: {why}")
-    return None, (Note(f"the cycle loop ran in Python, some 30 times slower than the native one, same bits: {why}"),)
+    text = f"the cycle loop ran in Python, some 30 times slower than the native one, same bits: {why}"
+    return None, (Finding("native-loop-missing", "note", text, "", mend("the native loop")),)
 
 
 def _address(array: NDArray[Any]) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 
 from feedsim.files.trace import Trace
 from feedsim.files.trace.trace import suggest
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.installation import fmus_directory
 from feedsim.motions.kind import Peaks
 from feedsim.motions.profile import speed_change
@@ -64,7 +64,7 @@ class Measurement:
             with one period.
         wall_time: duration of the cycle loop [s].
         units: per instance, GUID and version of its archive.
-        warnings: what a user should know before believing the result, a sentence each.
+        warnings: what a user should know before believing the result.
     """
 
     trace: Trace
@@ -75,7 +75,7 @@ class Measurement:
     unsettled: float
     wall_time: float
     units: Mapping[str, Mapping[str, str]]
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
 
 def measure(
@@ -351,22 +351,28 @@ def _line(values: Floats) -> Floats:
     return np.asarray(values.mean() + t * (values @ t) / (t @ t))
 
 
-def _doubts(trace: Trace, axis: str, friction: bool, speed: float | None, unsettled: float) -> list[str]:
+def _doubts(trace: Trace, axis: str, friction: bool, speed: float | None, unsettled: float) -> list[Finding]:
     doubts = []
     if friction and not speed:
-        doubts.append(
+        doubts.append(Finding(
+            "axis-held-by-friction", "doubt",
             f"axis {axis} stands still with friction on: its bristles hold it like a spring, and n/M reads far too low "
-            "at low frequencies; give an offset speed, or leave friction out"
-        )
+            "at low frequencies; give an offset speed, or leave friction out",
+            axis, "give an offset speed, or leave friction out",
+        ))  # fmt: skip
     if friction and speed and np.any(trace[f"{axis}.n_a"] * speed <= 0):
         slowest = float(np.min(trace[f"{axis}.n_a"] * np.sign(speed)))
-        doubts.append(
+        doubts.append(Finding(
+            "axis-reverses", "doubt",
             f"axis {axis} reverses under the excitation, down to {slowest:.3g} rad/s "
-            f"at an offset speed of {abs(speed):.4g} rad/s: friction is not linear there; take less, or move faster"
-        )
+            f"at an offset speed of {abs(speed):.4g} rad/s: friction is not linear there; take less, or move faster",
+            axis, "take less, or move faster",
+        ))  # fmt: skip
     if unsettled > PERIOD_TOLERANCE:
-        doubts.append(
+        doubts.append(Finding(
+            "not-settled", "doubt",
             f"the last two periods differ by {100 * unsettled:.2g} % of the signal: the response has not settled, or "
-            "is not periodic; let more periods settle"
-        )
+            "is not periodic; let more periods settle",
+            axis, "let more periods settle",
+        ))  # fmt: skip
     return doubts

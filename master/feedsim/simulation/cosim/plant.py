@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import FeedsimError, InputError
+from feedsim.foundation.errors import FeedsimError, Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.scenario import Machine
 from feedsim.simulation.cosim.archive import Archive
@@ -149,8 +149,8 @@ def _check_own(archive: Archive, machine: Machine) -> None:
         )
 
 
-def plant_modes(machine: Machine, amplitude: float = 0.0) -> tuple[Modes, list[str]]:
-    """Modes at the machine's pose, and what a user should know of them, a sentence each.
+def plant_modes(machine: Machine, amplitude: float = 0.0) -> tuple[Modes, list[Finding]]:
+    """Modes at the machine's pose, and what a user should know of them.
 
     A plant that follows its axes has at the start the modes of the cell in which the pose lies, which are those of the
     cell's centre. Any other plant has the machine's table. amplitude: of mounts that are not linear [m]; 0: at rest.
@@ -164,11 +164,12 @@ def plant_modes(machine: Machine, amplitude: float = 0.0) -> tuple[Modes, list[s
     try:
         with_grid = _of_cell(machine)
     except FeedsimError as error:  # who simulates meets it again; the closed form can do without the archive
-        return table, [f"the closed form has the modes of {machine.modes.name}, not those of the plant: {error}"]
+        text = f"the closed form has the modes of {machine.modes.name}, not those of the plant: {error}"
+        return table, [Finding("modes-not-of-plant", "doubt", text, machine.modes.name)]
     return (with_transmissions(machine, with_grid[0]), with_grid[1]) if with_grid else (table, [])
 
 
-def _of_cell(machine: Machine) -> tuple[Modes, list[str]] | None:
+def _of_cell(machine: Machine) -> tuple[Modes, list[Finding]] | None:
     from feedsim.structure.poses import read_cell  # whose room solves structures, which few runs do
 
     assert machine.plant is not None
@@ -179,7 +180,8 @@ def _of_cell(machine: Machine) -> tuple[Modes, list[str]] | None:
         modes, centre = read_cell(file, axes_of(archive), machine.pose)
     about = ", ".join(f"{axis} {units.show(position, 'm')}" for axis, position in centre.items())
     at = ", ".join(f"{axis} {units.show(machine.pose[axis], 'm')}" for axis in centre)
-    return modes, [
+    return modes, [Finding(
+        "modes-of-one-cell", "doubt",
         f"the plant follows the pose: the modes are those of the archive's cell about {about}; pose: {at}. Where "
-        "an axis moves out of that cell, the closed form does not follow it"
-    ]
+        "an axis moves out of that cell, the closed form does not follow it",
+    )]  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 
 from feedsim.files.fields import did_you_mean
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import Finding, InputError, few
 from feedsim.scenario import ForeignUnit, Machine
 from feedsim.scenario.axis_units import Parameter
 from feedsim.scenario.roles import BOOLEAN, DRIVE, Role, Signal
@@ -29,7 +29,7 @@ class RoleUnit:
         signals: signal -> variable that stands for it, with its unit converted. Of the shipped unit every variable
             stands for itself.
         parameters: start values by the archive's names, in the archive's units.
-        warnings: what a user should know of it, a sentence each.
+        warnings: what a user should know of it.
     """
 
     role: Role
@@ -38,7 +38,7 @@ class RoleUnit:
     signals: Mapping[str, Alias]
     parameters: Mapping[str, Parameter]
     foreign: bool = False
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
     @property
     def takes_slopes(self) -> bool:
@@ -89,7 +89,7 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
             signals, and every parameter that is none, cannot be set or is out of range.
     """
     problems: list[str] = []
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     where, key = f"axis {axis}: {role.name} {archive.path.name}", f"machine.axes.{axis}.{role.name}"
     signals: dict[str, Alias] = {}
     taken: dict[str, str] = {}
@@ -111,7 +111,8 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
             + (f", not {written!r}, which it does not define" if (written := archive.unknown_unit(signals[name].name))
                else "") + ")" for name in bare
         )  # fmt: skip
-        warnings.append(f"{where}: modelDescription.xml gives no unit for {listed}: taken to be in SI units")
+        text = f"{where}: modelDescription.xml gives no unit for {listed}: taken to be in SI units"
+        warnings.append(Finding("variable-without-unit", "doubt", text, axis))
     parameters: dict[str, Parameter] = {}
     for name, given in unit.parameters.items():
         try:
@@ -129,12 +130,12 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
         kept = ", ".join(
             f"{entry.name} ({entry.start if entry.start is not None else 'no start value'})" for entry in remaining
         )
-        warnings.append(f"{where}: nothing drives {kept}: inputs that no signal is given to keep their start values")
+        text = f"{where}: nothing drives {kept}: inputs that no signal is given to keep their start values"
+        warnings.append(Finding("input-not-driven", "doubt", text, axis))
     flags = [signal.name for signal in role.outputs if signal.unit == BOOLEAN and signal.name not in signals]
     if flags:
-        warnings.append(
-            f"{where}: no variable stands for {' or '.join(flags)}: whether it is at such a limit is not known"
-        )
+        text = f"{where}: no variable stands for {' or '.join(flags)}: whether it is at such a limit is not known"
+        warnings.append(Finding("limit-not-reported", "doubt", text, axis))
     return RoleUnit(role, axis, archive, signals, parameters, True, tuple(warnings))
 
 

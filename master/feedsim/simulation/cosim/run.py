@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.files.trace import Table, Trace, least_and_largest, release, stretches
-from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.foundation.installation import fmus_directory
 from feedsim.foundation.owned import Closing
 from feedsim.scenario import Coupling, Drive, Level, Logging, Machine, Scenario
@@ -279,7 +279,7 @@ class Run:
         wall_time: duration of the cycle loop [s], without what a `sink` has taken. cpu_time: of this thread in it.
         native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
-        notes: what the units and their exchange say of themselves, a sentence each.
+        notes: what the units and their exchange say of themselves.
         executor_notes: why the native loop has not executed it, where it was not asked to stand aside.
         limited: axis and limit of its drive, "X.torque_limited" -> share of the recorded instants at which it was met.
         grid: the axes whose pose the plant follows; none where it has one pose.
@@ -300,8 +300,8 @@ class Run:
     wall_time: float
     cpu_time: float
     units: Mapping[str, Mapping[str, str]]
-    notes: tuple[str, ...] = ()
-    executor_notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
+    executor_notes: tuple[Finding, ...] = ()
     limited: Mapping[str, float] = field(default_factory=dict)
     grid: tuple[GridAxis, ...] = ()
     crossings: Crossings | None = None
@@ -543,7 +543,7 @@ def _follow(
 class Ready:
     """What is known of a scenario ahead of its first step; notes, grid and acting as of a :class:`Run`."""
 
-    notes: tuple[str, ...]
+    notes: tuple[Finding, ...]
     grid: tuple[GridAxis, ...]
     acting: tuple[Acting, ...]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from feedsim.files.trace import release
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.model import SCHEMES, Scheme
 from feedsim.simulation.cosim import operations as op
 from feedsim.simulation.cosim.exchange import Exchange, Native
@@ -66,18 +66,22 @@ class Cycle:
         self._without_slope: dict[str, Floats] = {}  # unit -> how often its slopes were not finite
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know of it, a sentence each."""
+    def warnings(self) -> tuple[Finding, ...]:
+        """What a user should know of it."""
         missing = [
-            f"{unit}: gave a slope that is not finite at {count[1]:.0f} of its steps; there the exchange took its "
-            "output as constant over the next step"
+            Finding(
+                "slope-not-finite", "doubt",
+                f"{unit}: gave a slope that is not finite at {count[1]:.0f} of its steps; there the exchange took its "
+                "output as constant over the next step",
+                unit,
+            )
             for unit, count in self._without_slope.items()
             if count[1]
-        ]
+        ]  # fmt: skip
         return (*self._warnings, *missing)
 
-    def _check(self) -> tuple[str, ...]:
-        """What a user should know of how other makers' units are exchanged, a sentence each.
+    def _check(self) -> tuple[Finding, ...]:
+        """What a user should know of how other makers' units are exchanged.
 
         Raises:
             InputError: lists the units that the scheme or the step does not suit.
@@ -94,10 +98,12 @@ class Cycle:
             elif scheme.speed_ramp and not (role.takes_slopes and role.gives_slopes):
                 known = {"speed": role.takes_slopes, "torque": role.gives_slopes}
                 without = " nor of its ".join(name for name, there in known.items() if not there)
-                warnings.append(
+                warnings.append(Finding(
+                    "slope-missing", "doubt",
                     f"{role}: knows no slope of its {without}: on this axis the exchange holds what has none, as "
-                    f"gauss_seidel does, and is of first order; coupling.substeps above {self.substeps} make it finer"
-                )
+                    f"gauss_seidel does, and is of first order; coupling.substeps above {self.substeps} make it finer",
+                    str(role), f"coupling.substeps={2 * self.substeps}",
+                ))  # fmt: skip
         steps = [(control.role, self.cycle, "cycles.control") for control in self.system.controllers]
         steps += [(role, self.step, "cycles.control over coupling.substeps") for role in contacts]
         problems += filter(None, (check_step(*step) for step in steps))

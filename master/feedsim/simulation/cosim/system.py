@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import Closing
 from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
@@ -392,7 +392,7 @@ class System(Closing):
         }
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Finding]:
         archives = dict.fromkeys(unit.archive for unit in self.instances.values())
         ahead = [warning for archive in archives for warning in archive.warnings]
         ahead += (warning for role in self.roles.values() for warning in role.warnings)

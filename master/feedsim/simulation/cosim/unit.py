@@ -22,7 +22,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from numpy.typing import NDArray
 
-from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.simulation.cosim.archive import Archive, restored
 from feedsim.simulation.cosim.worker import calling
 
@@ -109,7 +109,7 @@ class Unit:
         self.signals = signals
         self.name = name
         self.role = ""  # what it is in the machine, such as "friction of Z"
-        self.warnings: list[str] = []
+        self.warnings: list[Finding] = []
         self._messages: list[str] = []
         self._last_text = ""
         self._stand = _Stand()
@@ -135,7 +135,7 @@ class Unit:
                     self._fmu.setDebugLogging(True, wanted)
             except FMICallException as error:  # it goes on with fewer messages
                 self.note_status(error)
-                self._warn(f"fmi2SetDebugLogging failed: {self.said(error)}")
+                self._call_failed(f"fmi2SetDebugLogging failed: {self.said(error)}")
         self._component = self._fmu.component
         self._last_text = ""  # what it says of its making explains no later fault
         self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
@@ -145,25 +145,33 @@ class Unit:
         text = _CALL.sub("", text)  # which call it was says nothing to the master's user
         self._last_text = text or self._last_text
         if status == WARNING:
-            self._warn(text or "a warning without a message")
+            self._warn(
+                Finding("unit-warns", "doubt", f"{self.name}: {text or 'a warning without a message'}", self.name)
+            )
         elif status > WARNING and text and len(self._messages) < MAX_WARNINGS:
             self._messages.append(text)
 
-    def _warn(self, text: str) -> None:
-        said = f"{self.name}: {text}"
-        if said in self.warnings:
+    def _warn(self, finding: Finding) -> None:
+        if finding in self.warnings:
             return
         if len(self.warnings) < MAX_WARNINGS:
-            self.warnings.append(said)
+            self.warnings.append(finding)
         elif len(self.warnings) == MAX_WARNINGS:
-            self.warnings.append(f"{self.name}: more warnings, which are not shown")
+            text = f"{self.name}: more warnings, which are not shown"
+            self.warnings.append(Finding("unit-warns-often", "doubt", text, self.name))
+
+    def _call_failed(self, text: str) -> None:
+        """A call failed without which the run goes on."""
+        self._warn(Finding("unit-call-failed", "doubt", f"{self.name}: {text}", self.name))
 
     def warn_of_arithmetic(self) -> None:
         """That it has left the processor's settings changed."""
-        self._warn(
-            "it changes how its process computes (rounding, denormal numbers or traps: fesetround, MXCSR), which "
-            "changes what other units compute; this is put back after each of its calls"
-        )
+        self._warn(Finding(
+            "unit-changes-arithmetic", "doubt",
+            f"{self.name}: it changes how its process computes (rounding, denormal numbers or traps: fesetround, "
+            "MXCSR), which changes what other units compute; this is put back after each of its calls",
+            self.name,
+        ))  # fmt: skip
 
     @contextmanager
     def calls(self, action: str, where: str = "") -> Iterator[None]:
@@ -333,7 +341,7 @@ class Unit:
                 self._fmu.terminate()
         except Exception as error:
             self.note_status(error)
-            self.warnings.append(f"{self.name}: fmi2Terminate, after the last step, failed: {self.said(error)}")
+            self._call_failed(f"fmi2Terminate, after the last step, failed: {self.said(error)}")
 
     def close(self) -> None:
         """Free the instance; never raises, so that it can stand in a `finally`."""
@@ -377,10 +385,12 @@ class Unexecuted(Unit):
         self._component = None
         self.role = ""
         archive.library()
-        self.warnings = [
+        self.warnings = [Finding(
+            "unit-not-checked", "doubt",
             f"{name}: not checked: what {archive.path} itself says of its parameters, and whether it can be loaded; "
-            "its program is another maker's, which only a run executes"
-        ]
+            "its program is another maker's, which only a run executes",
+            name,
+        )]  # fmt: skip
 
     def call(self, operation: str) -> Callable[..., int]:
         return lambda *_: OK

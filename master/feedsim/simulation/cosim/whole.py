@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Coupling, Friction, Machine
 from feedsim.scenario.axis_units import Parameter
 from feedsim.scenario.model import SCHEMES
@@ -214,7 +214,7 @@ class WholeCycle(Cycle):
 
     system: Whole
 
-    def _check(self) -> tuple[str, ...]:
+    def _check(self) -> tuple[Finding, ...]:
         if self.scheme.passes > 1 or self.substeps > 1:
             followed = ", ".join(name for name, scheme in SCHEMES.items() if scheme.passes == 1)
             raise InputError(

@@ -35,7 +35,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from feedsim.foundation.errors import FeedsimError, SimulationError
+from feedsim.foundation.errors import FeedsimError, Finding, SimulationError
 from feedsim.foundation.owned import TemporaryFolder, held
 
 # --- Messages between two processes of which one executes programs of other makers, which may write into the pipe
@@ -365,7 +365,7 @@ class _Worker:
         self.end()
         if result is None:
             raise SimulationError(how)
-        said = f"{how}; that was behind the last step, the result is whole"
+        said = Finding("unit-ended-late", "doubt", f"{how}; that was behind the last step, the result is whole")
         return replace(result, **{_notes(result): (*getattr(result, _notes(result)), said)})
 
     def _how(self, operations: tuple[float, Sequence[tuple[str, str, float]]], garbled: bool) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.model import SCHEMES
@@ -128,7 +128,7 @@ class Exported:
     instances: tuple[str, ...]
     duration: float  # s
     platforms: tuple[str, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
 
 
 def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Exported:

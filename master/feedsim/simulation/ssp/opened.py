@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from feedsim.files.source import closed
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.motions.setpoints import Recorded
 from feedsim.scenario import Scenario, load
@@ -43,7 +43,7 @@ class Opened:
         path: the SSP file.
         program: the setpoints of the file's own table; its segments are the motions, where the annotation shows them.
         fmus: folder with the file's own archives.
-        warnings: what a user should know, a sentence each.
+        warnings: what a user should know.
         sources: place in that folder -> what the archive there is called in the file.
     """
 
@@ -51,19 +51,23 @@ class Opened:
     program: Program
     path: Path
     fmus: Path
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
     sources: Mapping[str, str]
 
-    def told(self, warnings: Iterable[str]) -> tuple[str, ...]:
+    def told(self, warnings: Iterable[Finding]) -> tuple[Finding, ...]:
         """The file's own warnings and those of a run of it, which then speak of the file as well."""
-        return (*self.warnings, *map(self.named, warnings))
+        named = self.named
+        return (*self.warnings, *(
+            replace(finding, text=named(finding.text), place=named(finding.place), remedy=named(finding.remedy))
+            for finding in warnings
+        ))  # fmt: skip
 
     def named(self, text: str) -> str:
         """A text that speaks of the file's parts by their names in it."""
         result = text
         for place, source in self.sources.items():
             result = result.replace(str(self.fmus / place), f"{self.path}: {source}")
-        return type(text)(_named(result, self.path, self.fmus))  # what is wrong stays so
+        return _named(result, self.path, self.fmus)
 
 
 @contextmanager
@@ -114,7 +118,8 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
             reported = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
             if guessed:
                 cycle = units.show(T_c, "s")
-                reported += (f"{path.name}: no drive gives its control cycle; it is {cycle}, {guessed}",)
+                text = f"{path.name}: no drive gives its control cycle; it is {cycle}, {guessed}"
+                reported += (Finding("control-cycle-assumed", "doubt", text, path.name),)
             yield Opened(scenario, program, path, folder, reported, _sources(structure, parts, folder))
 
 
@@ -209,9 +214,9 @@ def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:
 
 def _with_motions(
     parts: Parts, own: Mapping[str, Any] | None, program: Program, path: Path, folder: Path, overrides: Sequence[str]
-) -> tuple[Scenario, Program, tuple[str, ...]]:
+) -> tuple[Scenario, Program, tuple[Finding, ...]]:
     """The scenario, and the program with the annotation's motions as its segments, if they are those of the table."""
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     if own is not None and "motions" in own:
         data = rebuilt.scenario_data(parts, own, path.stem, folder, motions=True)
         before = _load(data, folder, path)
@@ -227,15 +232,16 @@ def _with_motions(
             _check_cycles(scenario, parts, path)
             scenario, lost = setpoints.evaluation(scenario, planned, program)
             if lost:
-                warnings.append(
-                    f"{path.name}: ends at {program.duration:.6g} s, too early for {', '.join(lost)}: left out"
-                )
+                text = f"{path.name}: ends at {program.duration:.6g} s, too early for {', '.join(lost)}: left out"
+                warnings.append(Finding("evaluation-left-out", "doubt", text, path.name))
             kept = setpoints.segments(planned, program)
             return scenario, Program(program.time, program.x_s, program.n_ffw, kept), tuple(warnings)
-        warnings.append(
+        warnings.append(Finding(
+            "setpoints-of-other-motions", "doubt",
             f"{path.name}: its setpoints are not those of the motions that it names: they run as recorded ones, and "
-            "what was to be evaluated is not"
-        )
+            "what was to be evaluated is not",
+            path.name,
+        ))  # fmt: skip
     scenario = _load(rebuilt.scenario_data(parts, own, path.stem, folder, motions=False), folder, path, overrides)
     _check_cycles(scenario, parts, path)
     axes = parts.roles.axes
@@ -253,21 +259,26 @@ def _with_motions(
     return scenario, Program(program.time, program.x_s, program.n_ffw, (segment,)), tuple(warnings)
 
 
-def _late(structure: Structure, path: Path) -> list[str]:
+def _late(structure: Structure, path: Path) -> list[Finding]:
     if structure.start == 0.0:
         return []
     start = units.show(structure.start, "s")
-    return [f"{path.name}: starts at {start}; results count time from there: their 0 s is its {start}"]
+    text = f"{path.name}: starts at {start}; results count time from there: their 0 s is its {start}"
+    return [Finding("start-time-shifted", "doubt", text, path.name)]
 
 
-def _jumps(scenario: Scenario, program: Program, path: Path) -> list[str]:
+def _jumps(scenario: Scenario, program: Program, path: Path) -> list[Finding]:
     """Warnings about axes that do not stand where their setpoints begin."""
     return [
-        f"{path.name}: axis {axis} stands at {units.show(x_0, 'm')}, its setpoints begin at "
-        f"{units.show(float(program.x_s[axis][0]), 'm')}: it jumps there at once"
+        Finding(
+            "setpoints-jump", "doubt",
+            f"{path.name}: axis {axis} stands at {units.show(x_0, 'm')}, its setpoints begin at "
+            f"{units.show(float(program.x_s[axis][0]), 'm')}: it jumps there at once",
+            axis,
+        )
         for axis, x_0 in scenario.machine.pose.items()
         if abs(float(program.x_s[axis][0]) - x_0) > SAME_POSITION
-    ]
+    ]  # fmt: skip
 
 
 def _check_cycles(scenario: Scenario, parts: Parts, path: Path) -> None:

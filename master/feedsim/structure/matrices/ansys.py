@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.files import source
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.structure.parts import AnsysStructure
 from feedsim.structure.assembly import DEGREES, counted
 from feedsim.structure.matrices.tables import FREEDOM_NAMES, Raw, from_triangle, read_points
@@ -65,7 +65,8 @@ def read(structure: AnsysStructure) -> Raw:
         entries = matrix.tocoo()
         rows, columns = entries.row.astype(np.int64), entries.col.astype(np.int64)
         matrices.append(from_triangle(rows, columns, entries.data.astype(np.float64), len(nodes), file))
-    notes = (f"{counted(int(fixed.sum()), *DEGREES)} constrained: removed",) if np.any(fixed) else ()
+    text = f"{counted(int(fixed.sum()), *DEGREES)} constrained: removed"
+    notes = (Finding("freedom-constrained", "doubt", text),) if np.any(fixed) else ()
     return Raw(
         matrices[0],
         matrices[1],

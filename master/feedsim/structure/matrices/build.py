@@ -16,7 +16,7 @@ from scipy import sparse
 
 from feedsim.files import source
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.structure.parts import (
     AnsysStructure,
     CalculixStructure,
@@ -62,7 +62,8 @@ def read(structure: MatrixMarketStructure) -> Raw:
     fixed = (np.diff(mass.indptr) == 0) & (np.diff(stiffness.indptr) == 0)
     notes = []
     if np.any(fixed):
-        notes.append(f"{counted(int(fixed.sum()), *DEGREES)} without mass and stiffness: removed as constrained")
+        text = f"{counted(int(fixed.sum()), *DEGREES)} without mass and stiffness: removed as constrained"
+        notes.append(Finding("freedom-constrained", "doubt", text))
     absent = f"no column of {structure.nodes} gives it a degree of freedom" if structure.nodes else ""
     return Raw(mass, stiffness, table.nodes, table.directions, fixed, absent, table.points, tuple(notes))
 
@@ -138,7 +139,7 @@ class Imported:
     """An imported model, and what a person should know of the import."""
 
     assembly: Assembly
-    notes: tuple[str, ...]
+    notes: tuple[Finding, ...]
 
 
 def import_model(structure: FiniteElements) -> Imported:
@@ -199,13 +200,14 @@ def build(structure: FiniteElements, system: UnitSystem, raw: Raw, name: str) ->
     return Imported(assembly, tuple(notes))
 
 
-def _dropped(vectors: dict[str, Floats], raw: Raw, labels: tuple[str, ...]) -> list[str]:
+def _dropped(vectors: dict[str, Floats], raw: Raw, labels: tuple[str, ...]) -> list[Finding]:
     """A stator on the ground moves nothing: right, but worth a word."""
     notes = []
     for port, vector in vectors.items():
         on = np.flatnonzero((vector != 0) & raw.fixed)
         if len(on):
-            notes.append(f"port {port}: constrained degrees of freedom add nothing ({few(labels, on)})")
+            text = f"port {port}: constrained degrees of freedom add nothing ({few(labels, on)})"
+            notes.append(Finding("port-on-constrained", "doubt", text, port))
     return notes
 
 

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from feedsim.files.fields import did_you_mean
 from feedsim.files.trace.cells import named_columns, twice
-from feedsim.foundation.errors import InputError
+from feedsim.foundation.errors import Finding, InputError
 from feedsim.structure.assembly import Floats, Integers, few
 from feedsim.structure.modes import TOOL_PORTS
 
@@ -72,7 +72,7 @@ class Raw:
     fixed: NDArray[np.bool_]
     absent: str = ""
     points: Points | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     @property
     def size(self) -> int:

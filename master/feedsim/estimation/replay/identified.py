@@ -310,7 +310,7 @@ def identify_drives(
             try:
                 with (
                     _begun(machine, name, note, axes, interval, cycle) as own,
-                    Replay(own, {axis: each}, fmus=fmus, only_motion=True) as replay,
+                    Replay(own, {axis: each}, fmus=fmus, only_motion=modes == 0) as replay,
                 ):
                     return identify_drive(
                         own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,

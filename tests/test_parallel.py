@@ -12,7 +12,7 @@ import pytest
 
 from feedsim.foundation import parallel
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.parallel import in_parallel
+from feedsim.foundation.parallel import in_parallel, in_threads
 
 forks = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
 
@@ -87,3 +87,31 @@ def test_a_process_that_is_killed_is_told(monkeypatch: pytest.MonkeyPatch) -> No
 
     with pytest.raises(RuntimeError, match="1 of 2 tasks were not done"):
         in_parallel([killed, partial(squared, 2)])
+
+
+def test_threads_have_the_results_of_one(cores: int) -> None:
+    """In the order of the values; the error is that of the first one in this order, and all have been worked."""
+    worked: list[int] = []
+
+    def tripled(k: int) -> int:
+        worked.append(k)
+        if k > 5:
+            raise InputError(f"no {k}")
+        return 3 * k
+
+    assert in_threads(tripled, [4, 1, 5]) == [12, 3, 15]
+    worked.clear()
+    with pytest.raises(InputError, match="no 8"):
+        in_threads(tripled, [1, 8, 2, 7])
+    assert sorted(worked) == [1, 2, 7, 8]
+
+
+@forks
+@pytest.mark.usefixtures("alone")
+def test_processes_side_by_side_start_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
+
+    def threads(_: Callable[..., None]) -> set[int]:
+        return set(in_threads(lambda _: threading.get_ident(), [1, 2, 3]))
+
+    assert [len(own) for own in in_parallel([threads, threads])] == [1, 1]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from feedsim.estimation.least_squares import LeastSquares, secant
+from feedsim.estimation.least_squares import LeastSquares, Point, secant, secant_from
 from feedsim.estimation.parameter import Array, Parameter
 from feedsim.foundation.errors import InputError
 
@@ -111,3 +111,41 @@ def test_slopes_in_the_end() -> None:
     form = np.column_stack([decay, -x[0] * TIME * decay, np.sin(angle), x[2] * np.cos(angle)])
     assert point.exact
     assert np.abs(point.slopes - form).max() < 1e-7
+
+
+def test_a_search_goes_on_from_a_point_without_a_call() -> None:
+    """Where it has ended with slopes by differences, nothing is found anew."""
+    errors = Counted()
+    problem = least(errors)
+    point = problem.exact(secant(problem, TRUE, unknown(), 1e-6))
+    errors.calls = 0
+    assert secant_from(problem, point, 1e-4) is point
+    assert errors.calls == 0
+
+
+def test_slopes_near_the_end_are_named() -> None:
+    """Those by differences at a point with about the same cost are; those from elsewhere are not."""
+    problem = least(Counted())
+    end = problem.exact(secant(problem, TRUE, unknown(), 1e-6))
+    assert end.near
+    assert not secant(problem, end.x, 1.1 * end.slopes, 1e-2).near
+
+
+def test_a_search_that_leads_to_nothing_is_given_up() -> None:
+    """It is asked with slopes by differences, and with what a step of any length would gain: nearly all, far away."""
+    asked: list[float] = []
+
+    def give_up(point: Point, predicted: float, taken: int) -> bool:
+        assert point.exact
+        assert taken == len(asked) + 1
+        asked.append(predicted / problem.cost(point.x, point.errors))
+        return True
+
+    begin = np.array([0.1, 2.0, 1.0, 1.0])
+    problem, whole = least(errors := Counted()), least(all_errors := Counted())
+    point = secant(problem, begin, unknown(), 1e-6, give_up)
+    end = secant(whole, begin, unknown(), 1e-6)
+    assert len(asked) == 1
+    assert 0 < asked[0] < 1
+    assert errors.calls < all_errors.calls
+    assert problem.cost(point.x, point.errors) > whole.cost(end.x, end.errors)

@@ -20,6 +20,7 @@ from feedsim.estimation.replay.identified import _refuse_implausible
 from feedsim.files.columns import load_columns
 from feedsim.files.trace import write_csv
 from feedsim.files.trace.trace import Array
+from feedsim.foundation import parallel
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import load, load_machine
 from feedsim.simulation.cosim import run
@@ -85,6 +86,20 @@ def test_intervals_hold_the_truth_under_noise(tmp_path: Path) -> None:
             if each.status == "estimated":
                 misses += not each.interval[0] <= getattr(true, name) <= each.interval[1]
     assert misses <= 4
+
+
+def test_the_values_are_the_same_with_one_core_and_with_several(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the last bit, and so is the number of runs: threads share the runs of a Jacobian."""
+    machine = load_machine(MACHINES / "one_axis")
+    log = logged(tmp_path, "X", "M_a: 2 %", machine=MACHINES / "one_axis")
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+        found.append(identified(log, "X", machine)[0])
+    assert found[0].estimates == found[1].estimates
+    assert found[0].runs == found[1].runs
 
 
 def test_a_rigid_machine_is_written_whole(tmp_path: Path) -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from math import exp
 from pathlib import Path
 
 import pytest
 
 from drive_helpers import COLUMNS, MACHINES
 from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.drive import start_of
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import ElasticMode, with_modes
+from feedsim.estimation.replay.tuning import parameter
 from feedsim.files.columns import load_columns
 from feedsim.files.trace import write_csv
 from feedsim.scenario import load, load_machine
@@ -68,6 +71,14 @@ def test_the_structure_of_a_drive(
         # A low-pass is not quite a current loop: a hundredth besides.
         reach = 1.5 * (one.interval[1] - one.value) + 0.01 * abs(values[name])
         assert abs(one.value - values[name]) <= reach, name
+
+
+def test_a_filter_stays_below_half_of_the_sampling_rate() -> None:
+    """The unit refuses what lies above: a fit that wandered there had no end, after some hundred runs."""
+    machine = load_machine(MACHINES / "sinumerik_840d")
+    start = start_of(machine, "X") | {"filter_1.f": 1400.0}
+    assert parameter("filter_1.f", start).upper == pytest.approx(0.49 / machine.cycles.T_c)
+    assert parameter("filter_1.f", start | {"filter_1.f": 10.0}).upper == pytest.approx(10 * exp(4 * 0.7))
 
 
 def test_an_elastic_mode_that_nobody_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

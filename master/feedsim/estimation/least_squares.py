@@ -251,13 +251,15 @@ Model = Callable[[Mapping[str, float]], Array]
 class Point:
     """Where a search is or ends.
 
-    x: (P,) positions. errors: (N,) of the model there. slopes: (N, P) d errors/d x; exact: by differences there.
+    x: (P,) positions. errors: (N,) of the model there. slopes: (N, P) d errors/d x; exact: by differences there; near:
+    by differences there, or where the cost was hardly another one.
     """
 
     x: Array
     errors: Array
     slopes: Array
     exact: bool = False
+    near: bool = False
 
 
 def no_prior(x: Array) -> Array:
@@ -274,6 +276,7 @@ class LeastSquares:
         steps: of the differences, of positions: one, or (P,).
         prior: (P,) positions to (M,) further residuals.
         weights: of the model's errors: one, or (N,).
+        apply: a function to each of several positions, in any order, as `map` does.
     """
 
     def __init__(
@@ -283,7 +286,9 @@ class LeastSquares:
         steps: float | Array,
         prior: Callable[[Array], Array] = no_prior,
         weights: float | Array = 1.0,
+        apply: Callable[[Callable[[Array], Array], Sequence[Array]], Iterable[Array]] = map,
     ) -> None:
+        self.apply = apply
         self.model, self.parameters, self.prior = model, tuple(parameters), prior
         self.names = tuple(parameter.name for parameter in parameters)
         self.steps = np.broadcast_to(np.asarray(steps, dtype=np.float64), (len(self.parameters),))
@@ -333,14 +338,19 @@ class LeastSquares:
 
         here: (N,) of(x).
         """
-        columns = []
+        ends: list[tuple[int, Array, Array]] = []
         for k in which:
             ahead, behind = x.copy(), x.copy()
             ahead[k], behind[k] = min(x[k] + self.steps[k], self.high[k]), max(x[k] - self.steps[k], self.low[k])
             if not central:
                 behind, ahead = (x, ahead) if ahead[k] - x[k] >= x[k] - behind[k] else (behind, x)
-            first, second = (here if side is x or side[k] == x[k] else of(side) for side in (behind, ahead))
-            columns.append((second - first) / (ahead[k] - behind[k]))
+            ends.append((k, behind, ahead))
+        asked = [side for k, *both in ends for side in both if side[k] != x[k]]
+        there = iter(list((map if of == self.prior else self.apply)(of, asked)))
+        columns = []
+        for k, *both in ends:
+            first, second = (next(there) if side[k] != x[k] else here for side in both)
+            columns.append((second - first) / (both[1][k] - both[0][k]))
         return np.column_stack(columns) if columns else np.zeros((len(here), 0))
 
     def exact(self, point: Point, central: bool = False) -> Point:
@@ -348,7 +358,7 @@ class LeastSquares:
         if point.exact and not central:
             return point
         slopes = self.differences(self.errors, point.x, point.errors, range(len(point.x)), central)
-        return Point(point.x, point.errors, slopes, True)
+        return Point(point.x, point.errors, slopes, True, True)
 
 
 # --- Least squares within bounds where calls are dear: Gauss-Newton steps, whose Jacobian the steps themselves
@@ -366,7 +376,17 @@ MAX_FAILURES = 2  # steps that gain nothing until differences are due
 MAX_JACOBIANS = 8  # times that differences are taken
 
 
-def secant(problem: LeastSquares, begin: Array, slopes: Array, tolerance: float) -> Point:
+# Of a point whose slopes are by differences there, of the reduction that a step of any length is predicted to have, and
+# of how often differences were taken before: whether the search ends there, as it leads to nothing.
+GiveUp = Callable[[Point, float, int], bool]
+
+
+def never(point: Point, predicted: float, taken: int) -> bool:
+    """A search that goes on to its end."""
+    return False
+
+
+def secant(problem: LeastSquares, begin: Array, slopes: Array, tolerance: float, give_up: GiveUp = never) -> Point:
     """Go from the positions `begin` (P,) to where no step has a predicted reduction above a share of the cost.
 
     slopes: (N, P) of the model's errors from nearby, nan in the columns of which nothing is known.
@@ -377,8 +397,14 @@ def secant(problem: LeastSquares, begin: Array, slopes: Array, tolerance: float)
     unknown = np.flatnonzero(np.isnan(slopes[0]))
     slopes = slopes.copy()
     slopes[:, unknown] = problem.differences(problem.errors, begin, errors, map(int, unknown))
-    here = Point(begin, errors, slopes, len(unknown) == len(begin))
-    cost = last = problem.cost(begin, errors)
+    exact = len(unknown) == len(begin)
+    return secant_from(problem, Point(begin, errors, slopes, exact, exact), tolerance, give_up)
+
+
+def secant_from(problem: LeastSquares, here: Point, tolerance: float, give_up: GiveUp = never) -> Point:
+    """The same from a point at which the model is known."""
+    begin, fresh = here, here.near
+    cost = last = problem.cost(here.x, here.errors)
     radius, failed, taken = LARGEST_STEP, 0, 0
     while taken < MAX_JACOBIANS:
         step, predicted = _step(problem, here, radius)
@@ -401,11 +427,14 @@ def secant(problem: LeastSquares, begin: Array, slopes: Array, tolerance: float)
                 if ahead is not None and not here.exact:
                     here = Point(here.x, here.errors, ahead.slopes)
         if failed >= MAX_FAILURES and not here.exact:
-            if taken and last - cost <= tolerance * cost:  # nor did the last differences lead further
+            if fresh and last - cost <= tolerance * cost:  # nor did the last differences lead further
                 break
-            here = problem.exact(here)
+            here, fresh = problem.exact(here), True
             last, taken, failed, radius = cost, taken + 1, 0, max(radius, 0.1 * LARGEST_STEP)
-    return here
+            if give_up is not never and give_up(here, _step(problem, here, inf)[1], taken):
+                break
+    near = here.exact or (fresh and last - cost <= tolerance * cost)
+    return here if here is begin else Point(here.x, here.errors, here.slopes, here.exact, near)
 
 
 def _ahead(problem: LeastSquares, here: Point, step: Array) -> Point | None:

@@ -1,6 +1,6 @@
-"""Independent work in as many processes as there are cores, with the results of one.
+"""Independent work in as many processes or threads as there are cores, with the results of one.
 
-May use: nothing. Start reading at in_parallel().
+May use: nothing. Start reading at in_parallel(), and at in_threads() for work that is mostly native.
 
 Processes are forked: they begin with all that this one has loaded, which takes milliseconds. What they compute is what
 this process would, bit for bit. Where forking is not safe (other systems than Linux, a process with several threads) or
@@ -13,8 +13,10 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+S = TypeVar("S")
 T = TypeVar("T")
 Say = Callable[..., None]
 
@@ -91,3 +93,28 @@ def _work(tasks: Sequence[Callable[[Say], Any]], first: int, step: int, there: A
             content = False, error
         there.send((k, content))
     there.close()
+
+
+def in_threads(of: Callable[[S], T], values: Sequence[S]) -> list[T]:
+    """The result of every value, in their order; the error of the first one that raises, behind the last of them.
+
+    of: spends its time in native code that lets other threads go on; may be called by several threads at once.
+    """
+    count = 1 if _state["forked"] else min(cores(), len(values))
+    if count < 2:
+        done = [_tried(of, value) for value in values]
+    else:
+        with ThreadPoolExecutor(count) as threads:
+            done = list(threads.map(lambda value: _tried(of, value), values))
+    for _, error in done:
+        if error is not None:
+            raise error
+    return [result for results, _ in done for result in results]
+
+
+def _tried(of: Callable[[S], T], value: S) -> tuple[list[T], Exception | None]:
+    """The result, or the error."""
+    try:
+        return [of(value)], None
+    except Exception as error:
+        return [], error

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import inf, isinf, pi
 from pathlib import Path
@@ -275,7 +276,9 @@ class Replay(Closing):
     ) -> None:
         """only_motion: rests ahead of the first motion and behind the last one are not run; the axes have in these rows
         what they have where the run begins and ends."""
-        self.records, self._follower = dict(records), Follower(coupling=coupling, fmus=fmus)
+        self.records = dict(records)
+        self._open = partial(Follower, coupling=coupling, fmus=fmus)
+        self._idle: list[Follower] = []  # as many as have been at work at once
         one = next(iter(records.values())).record
         self.time, self.interval = one.time, one.interval
         if not same_time(records):
@@ -403,14 +406,22 @@ class Replay(Closing):
         per_row: samples from one row to the next; ((N - 1) per_row + 1,) then. scale: by which the torques of `machine`
         are less than they are meant; so are the loads.
 
+        Several threads may call it at once, each with units of its own.
+
         Raises SimulationError: a unit failed, as with a drive that is unstable.
         """
         machine = machine.model_copy(update={"pose": machine.pose | self.pose})
         columns = [f"{axis}.{signal}" for axis in self.records for signal in signals]
         loads = [replace(load, values=load.values / scale) for load in self._loads]
-        trace = self._follower.follow(
-            machine, self.program(machine, scale), columns, self.interval / per_row, loads=loads
-        )
+        program = self.program(machine, scale)
+        try:
+            follower = self._idle.pop()
+        except IndexError:
+            follower = self._open()
+        try:
+            trace = follower.follow(machine, program, columns, self.interval / per_row, loads=loads)
+        finally:
+            self._idle.append(follower)
         begin, end = self.run
         first = round(self.lead / self.interval) * per_row
         rows = slice(first, first + (end - begin) * per_row + 1)
@@ -421,7 +432,8 @@ class Replay(Closing):
         }
 
     def close(self) -> None:
-        self._follower.close()
+        while self._idle:
+            self._idle.pop().close()
 
 
 def per_row_of(interval: float, machine: Machine) -> int:

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf, log, nan, pi
 from typing import TypeVar
 
@@ -100,7 +101,7 @@ def friction_parts(
     while len(chosen) < len(BLOCKS):
         progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
         # As near to its end as what it is compared with.
-        tuned = problem.exact(problem.fitted(tuned.names, tuned.values, tuned))
+        tuned = problem.near(problem.continued(tuned))
         score = _predicted(problem, tuned)
         tried = {}
         for part, block in BLOCKS.items():
@@ -111,7 +112,7 @@ def friction_parts(
             if _at_end(problem, tried[part], block):
                 gains[part] = -inf
                 continue
-            tried[part] = problem.exact(tried[part])
+            tried[part] = problem.near(tried[part])
             by = _predicted(problem, tried[part]) - score
             # Both partitions ask for it: what one gains at the other's cost is no law.
             gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
@@ -132,7 +133,7 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
     three quarters, predict the fourth one better with it, or where the number is given.
     """
     folds = np.array_split(np.arange(len(problem.rows)), FOLDS)
-    result = problem.exact(result)
+    result = problem.near(result)
     predicted = {0: unpredicted(problem, result, folds)[0] * problem.weights["position"]}
     for k in range(1, (MOST_MODES if count is None else count) + 1):
         machine, scale = problem.tuned(result.values)
@@ -155,7 +156,7 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
         if best is None:
             break
         problem.start = best[2]
-        fit = problem.exact(best[1])
+        fit = problem.near(best[1])
         gain = _likelihood(problem, fit, folds) - _likelihood(problem, before, folds)
         predicted[k] = unpredicted(problem, fit, folds)[0] * problem.weights["position"]
         if count is None and not gain > BETTER:
@@ -163,7 +164,7 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
             break
         result = fit
         problem.weigh(result)
-        result = problem.exact(problem.fitted(result.names, result.values, result))
+        result = problem.near(problem.continued(result))
     return result, predicted
 
 
@@ -223,6 +224,7 @@ EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 # Standard deviations of a delay [s], and of K_v over itself, below which a regression is better than a fit of the axis.
 DELAY_SIGMA, GAIN_SIGMA = 10e-6, 0.01
 MIN_MOVING_ROWS = 50  # in which the axis moves
+MOST_FILTERED = 0.49  # of the sampling rate: highest frequency of a filter, which is below half of it
 MISSED, MIN_POSITION_NOISE = (
     3.0,
     0.1e-6,
@@ -323,9 +325,11 @@ def identify_drive(
         )
     problem = Problem(machine, each, replay, candidates[0], total, J, first_weights(each), rows)
     driven = each.record.driven
-    free = ["K_p", "K_i", "T_sym", "k_ffw"]
+    # The delay is the first of the differences: the run that they are about is one of the last ones then.
+    free = ["delay"] if driven else []
+    free += ["K_p", "K_i", "T_sym", "k_ffw"]
     # Without a torque friction and load are the machine's: what they do to the position, the speed controller may, too.
-    free += ["M_0", "delay", "F_C", "sigma_0", "sigma_1", "sigma_2"] if driven else []
+    free += ["M_0", "F_C", "sigma_0", "sigma_1", "sigma_2"] if driven else []
     free += [] if structure_known else ["J"]
     free += [] if gain is not None else ["K_v"]
     free += [] if total is not None else ["T_dyn"]
@@ -348,13 +352,13 @@ def identify_drive(
             found = _preloaded(problem, found)
         chosen, parts, found, undecided = friction_parts(problem, found, progress)
         progress("rival structures", 1 + len(BLOCKS), 2 + len(BLOCKS))
-        found, rivals = with_rivals(problem, found, far=_misses(problem, found))
+        found, rivals = with_rivals(problem, found, partial(_misses, problem))
         if any(one.taken for one in rivals):  # parts of the friction law may have made up for the structure
             of_parts = [name for part in chosen for name in BLOCKS[part]]
             found = problem.fitted([name for name in found.names if name not in of_parts], problem.start)
             problem.weigh(found)
             chosen, parts, found, undecided = friction_parts(problem, found, progress)
-            found, further = with_rivals(problem, found, far=False)
+            found, further = with_rivals(problem, found, lambda fit: False)
             rivals = [*(one for one in rivals if one.taken), *further]
         elastic_rivals = possible_modes(problem, found) if modes == 0 else []
         rivals = [*rivals, *elastic_rivals]
@@ -368,7 +372,7 @@ def identify_drive(
     for _ in range(MOST_TURNS):
         before = problem.weights
         problem.weigh(found)
-        found = problem.fitted(found.names, found.values, found, FINAL_TOLERANCE)
+        found = problem.continued(found, FINAL_TOLERANCE)
         if all(abs(problem.weights[channel] / weight - 1) < WEIGHT_TOLERANCE for channel, weight in before.items()):
             break
     refuse_poor(each, found)
@@ -461,7 +465,7 @@ def start_of(machine: Machine, axis: str) -> dict[str, float]:
         EXCESS: float(friction.F_S) - values["F_C"], "M_0": machine.axes[axis].M_0,
         "K_v": drive.K_v, "k_ffw": drive.k_ffw, "T_sym": drive.T_sym, "T_dyn": drive.T_dyn, "delay": 0.0,
         "K_p": drive.K_p, "K_i": drive.K_p / T_n, "J": checked_modes(machine).J_tot(axis),
-        "omega_0": drive.omega_0 or 1.0, "D": drive.D or 1.0,
+        "omega_0": drive.omega_0 or 1.0, "D": drive.D or 1.0, "filter_1.f_most": MOST_FILTERED / machine.cycles.T_c,
     }  # fmt: skip
 
 

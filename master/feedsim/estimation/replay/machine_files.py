@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, pi, sqrt
+from threading import get_ident
 from typing import Any
 
 import numpy as np
@@ -141,7 +142,10 @@ def with_modes(machine: Machine, axis: str, modes: Sequence[ElasticMode]) -> Mac
     )
     name = hashlib.sha256(repr(modes).encode()).hexdigest()[:16]
     path = machine.modes.parent / f"modes_{name}.csv"
-    path.write_text(modes_text(whole), encoding="utf-8")  # of a temporary folder: no need for a disk
+    if not path.exists():  # of a temporary folder: no need for a disk; another thread may read it already
+        fresh = path.with_name(f"{name}_{get_ident()}")
+        fresh.write_text(modes_text(whole), encoding="utf-8")
+        fresh.replace(path)
     return machine.model_copy(update={"modes": path})
 
 

@@ -7,11 +7,13 @@ intervals take differences anew.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from math import exp, hypot, inf, log, nan, sqrt
-from typing import Any
+from math import exp, hypot, inf, log, log1p, nan, sqrt
+from threading import Lock
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +23,23 @@ from feedsim.estimation.identify.clipping import limit_shown
 from feedsim.estimation.identify.parameters import EXCESS
 from feedsim.estimation.identify.position_loop import rms
 from feedsim.estimation.identify.result import Estimate
-from feedsim.estimation.least_squares import NORMAL_95, LeastSquares, Point, correlation_length, half_width, secant
+from feedsim.estimation.least_squares import (
+    NORMAL_95,
+    GiveUp,
+    LeastSquares,
+    Point,
+    correlation_length,
+    half_width,
+    never,
+    secant,
+    secant_from,
+)
 from feedsim.estimation.parameter import Parameter
 from feedsim.estimation.replay.closed_loop import AxisRecord, Mask, Replay, of_cycle, per_row_of
 from feedsim.estimation.replay.machine_files import KEYS, modes_of, with_modes
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import FeedsimError, InputError
+from feedsim.foundation.parallel import in_threads
 from feedsim.scenario import Filter, Machine
 
 # --- The parameters of a fit of a drive: what each may be, how it is scaled, and what is known of it beforehand -------
@@ -104,7 +117,8 @@ def row(name: str) -> Row:
 def parameter(name: str, start: Mapping[str, float]) -> Parameter:
     """With its bounds and the prior's deviation as scale; position 0 is the start.
 
-    start: all values to begin with; J_sigma: deviation of the logarithm of the inertia, where it is known.
+    start: all values to begin with; J_sigma: deviation of the logarithm of the inertia, where it is known; NAME_most:
+        what a logarithm's value is at most.
     """
     own, value = row(name), start[name]
     unit = start["F_C"] if own.of_friction else 1.0
@@ -116,6 +130,7 @@ def parameter(name: str, start: Mapping[str, float]) -> Parameter:
     lower, upper = own.lower * unit, own.upper * unit
     if own.log:
         lower, upper = value * exp(-SPAN * deviation), value * exp(SPAN * deviation)
+        upper = min(upper, start.get(f"{name}_most", inf))
     return Parameter(name, value, lower, upper, scale=deviation, log=own.log, origin=value)
 
 
@@ -180,6 +195,17 @@ def first_weights(each: AxisRecord) -> dict[str, float]:
     return {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}
 
 
+class Simulated(NamedTuple):
+    """A run of the units: of what, x_a [m] at the rows and M_a [N.m] between them, too."""
+
+    machine: Machine
+    start: Mapping[str, float]
+    preloaded: bool
+    values: Mapping[str, float]  # but for the delay, which does not move the units
+    x_a: Array
+    M_a: Array
+
+
 @dataclass(eq=False)
 class Problem:
     """The units on one record, over the parameters that are free."""
@@ -193,6 +219,8 @@ class Problem:
     weights: dict[str, float]
     rows: Rows  # that are fitted
     runs: int = 0
+    simulated: deque[Simulated] = field(default_factory=lambda: deque(maxlen=8))  # the last runs
+    lock: Lock = field(default_factory=Lock)
 
     def tuned(self, values: Mapping[str, float]) -> tuple[Machine, float]:
         """The machine with values, and what its torques are to be multiplied with.
@@ -251,19 +279,34 @@ class Problem:
 
         A torque that the record cuts off is none that the motor has: it is 0 there.
         """
+        result = self.run(values)
+        delay = (self.start | dict(values))["delay"]
+        time, h = self.replay.time, self.replay.interval / self.per_row
+        fine = time[0] + h * np.arange(len(result.M_a))
+        torque = np.interp(time - delay, fine, result.M_a)
+        off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
+        off = np.where(self.each.counted, off, 0.0)
+        return result.x_a - self.each.position, off
+
+    def run(self, values: Mapping[str, float]) -> Simulated:
+        """The units with values; one of the last runs where it had the same ones. InputError: they run away."""
+        own = {name: value for name, value in values.items() if name != "delay"}
+        with self.lock:
+            for last in self.simulated:
+                same = last.machine is self.machine and last.start is self.start
+                if same and last.preloaded == self.replay.preloaded and last.values == own:
+                    return last
+            self.runs += 1
         machine, scale = self.tuned(values)
-        self.runs += 1
         try:
             result = self.replay.follow(machine, ("x_a", "M_a"), self.per_row, scale)[self.each.axis]
         except FeedsimError as error:  # a drive that is unstable runs away until its numbers do
             raise InputError(str(error)) from None
-        delay = (self.start | dict(values))["delay"]
-        time, h = self.replay.time, self.replay.interval / self.per_row
-        fine = time[0] + h * np.arange(len(result["M_a"]))
-        torque = scale * np.interp(time - delay, fine, result["M_a"])
-        off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
-        off = np.where(self.each.counted, off, 0.0)
-        return result["x_a"][:: self.per_row] - self.each.position, off
+        x_a, M_a = np.array(result["x_a"][:: self.per_row]), scale * result["M_a"]
+        done = Simulated(self.machine, self.start, self.replay.preloaded, own, x_a, M_a)
+        with self.lock:
+            self.simulated.append(done)
+        return done
 
     def damping_penalty(self, values: Mapping[str, float]) -> float:
         """How far the speed loop J s^2 + K_p s + K_i is less damped than a tuned one, in standard deviations."""
@@ -297,7 +340,7 @@ class Problem:
         """A fit from the start, whose weights are those of what is left."""
         fit = self.fitted(free, {}, tolerance=FIRST_TOLERANCE)
         self.weigh(fit)
-        fit = self.fitted(free, fit.values, fit)
+        fit = self.continued(fit)
         self.weigh(fit)
         return fit
 
@@ -307,10 +350,11 @@ class Problem:
         begin: Mapping[str, float],
         near: Tuned | None = None,
         tolerance: float = COMPARED_TOLERANCE,
+        give_up: GiveUp = never,
     ) -> Tuned:
         """From `begin`, with the weights as they are, to where no step has a predicted reduction above that share.
 
-        near: a fit nearby, whose Jacobian is taken over.
+        near: a fit nearby, whose Jacobian is taken over. give_up: as of a search (estimation/least_squares.py).
         """
         names = tuple(free)
         problem = self._least_squares(names)
@@ -318,10 +362,21 @@ class Problem:
         for k, name in enumerate(names):
             if near is not None and name in near.names:
                 slopes[:, k] = near.point.slopes[:, near.names.index(name)]
-        return self._tuned(problem, secant(problem, problem.position(begin), slopes, tolerance))
+        return self._tuned(problem, secant(problem, problem.position(begin), slopes, tolerance, give_up))
+
+    def continued(self, fit: Tuned, tolerance: float = COMPARED_TOLERANCE) -> Tuned:
+        """From where a fit of this problem has ended, with the weights as they are."""
+        problem = self._least_squares(fit.names)
+        return self._tuned(problem, secant_from(problem, fit.point, tolerance))
+
+    def near(self, fit: Tuned) -> Tuned:
+        """The same with its Jacobian by differences there, or where the fit was hardly another one: what
+        cross-validation is taken from."""
+        problem = self._least_squares(fit.names)
+        return self._tuned(problem, fit.point if fit.point.near else problem.exact(fit.point))
 
     def exact(self, fit: Tuned, central: bool = False) -> Tuned:
-        """The same with its Jacobian by differences, which cross-validation and intervals are taken from."""
+        """The same with its Jacobian by differences, which intervals are taken from."""
         problem = self._least_squares(fit.names)
         return self._tuned(problem, problem.exact(fit.point, central))
 
@@ -330,6 +385,10 @@ class Problem:
         problem = self._least_squares(tuple(names))
         x = problem.position(values)
         return problem.weighted(x, problem.errors(x))
+
+    def cost(self, names: tuple[str, ...], point: Point) -> float:
+        """Half the sum of squares, with the weights as they are."""
+        return self._least_squares(names).cost(point.x, point.errors)
 
     def moved(self, fit: Tuned, step: Array) -> dict[str, float]:
         """The values of a fit after a step (P,) in usual deviations, within the bounds."""
@@ -349,12 +408,17 @@ class Problem:
 
         weights = np.repeat([self.weights["position"], self.weights["torque"]], len(self.rows))
         steps = np.array([difference(entry) for entry in parameters])
-        problem = LeastSquares(errors, parameters, steps, prior, weights)
+        problem = LeastSquares(errors, parameters, steps, prior, weights, _first_and_then_others)
         return problem
 
     def _tuned(self, problem: LeastSquares, point: Point) -> Tuned:
         values, residuals, jacobian = problem.values(point.x), problem.residuals(point), problem.jacobian(point)
         return Tuned(problem.names, values, point, residuals, jacobian, self.counted)
+
+
+def _first_and_then_others(of: Callable[[Array], Array], points: Sequence[Array]) -> list[Array]:
+    """The first one is moved by the delay alone, which is the run that the others may forget."""
+    return [*map(of, points[:1]), *in_threads(of, points[1:])]
 
 
 # --- The cycle in which a control closes its position loop: the axis fitted with another one, and a test between both -
@@ -367,6 +431,7 @@ class Problem:
 # correlation over time.
 
 
+CLEARLY = 1.5  # of what decides between cycles: a fit that the record speaks against by so much is not finished
 OTHERWISE = "with a position cycle of {:g} ms, which fits as well, it is {:.4g} {}"
 
 
@@ -406,35 +471,44 @@ def other_cycle(
     problem.machine = machine.model_copy(update={"cycles": cycles})
     problem.start = of_cycle(start, cycle, problem.each.record.interval)
     try:
-        fits = [_refitted(problem, fit)]
-        if fit.values["T_sym"] <= TABLE["T_sym"].lower:
+        at_bound = fit.values["T_sym"] <= TABLE["T_sym"].lower
+
+        def spoken_against(point: Point, predicted: float, taken: int) -> bool:
+            """Whether the record speaks clearly against this cycle, were the cost twice as much less as predicted."""
+            share = min(2 * predicted / problem.cost(fit.names, point), 0.99)
+            reserve = -0.5 * (len(fit.counted) + np.count_nonzero(fit.counted)) * log1p(-share)
+            gain, sigma = gain_of(_likelihood(point, fit.counted) - _likelihood(fit.point, fit.counted))
+            return bool(gain + reserve < -CLEARLY * NORMAL_95 * sigma)
+
+        fits = [problem.fitted(fit.names, fit.values, fit, give_up=never if at_bound else spoken_against)]
+        if at_bound or not spoken_against(fits[0].point, 0.0, 0):
+            problem.weigh(fits[0])
+            fits = [problem.continued(fits[0])]
+        if at_bound:
             # A wrong cycle has driven the delay to its bound; what it leaves of the position has no weight any more.
             problem.weights = first_weights(problem.each)
             with suppress(InputError):
                 fits.append(problem.first(fit.names))
-        best = max(fits, key=lambda one: float(np.sum(_likelihood(one))))
-        gain, sigma = gain_of(_likelihood(best) - _likelihood(fit))
+        best = max(fits, key=lambda one: float(np.sum(_likelihood(one.point, one.counted))))
+        gain, sigma = gain_of(_likelihood(best.point, best.counted) - _likelihood(fit.point, fit.counted))
         if gain < -NORMAL_95 * sigma:
             return OtherCycle(cycle, gain, sigma)
         problem.weigh(best)
-        best = problem.exact(problem.fitted(best.names, best.values, best), central=True)
+        best = problem.exact(problem.continued(best), central=True)
         return OtherCycle(cycle, gain, sigma, judged(best))
     finally:
         problem.machine, problem.weights, problem.start = machine, weights, start
 
 
-def _refitted(problem: Problem, fit: Tuned) -> Tuned:
-    """A fit near another one, whose weights are those of what is left."""
-    fit = problem.fitted(fit.names, fit.values, fit, COMPARED_TOLERANCE)
-    problem.weigh(fit)
-    return problem.fitted(fit.names, fit.values, fit, COMPARED_TOLERANCE)
+def _likelihood(point: Point, counted: Mask) -> Array:
+    """(N,) logarithm of the likelihood of every row, normally distributed by what is left there of either channel.
 
-
-def _likelihood(fit: Tuned) -> Array:
-    """(N,) logarithm of the likelihood of every row, normally distributed by what the fit leaves of either channel."""
-    torque = np.zeros(len(fit.counted))
-    torque[fit.counted] = _of_channel(fit.torque)
-    return _of_channel(fit.position) + torque
+    counted: (N,) rows whose torque counts.
+    """
+    position, of_torque = np.split(point.errors, 2)
+    torque = np.zeros(len(counted))
+    torque[counted] = _of_channel(of_torque[counted])
+    return _of_channel(position) + torque
 
 
 def _of_channel(remaining: Array) -> Array:
@@ -478,6 +552,9 @@ def with_either(estimates: Mapping[str, Estimate], other: OtherCycle) -> dict[st
 
 
 FITTED_SHARE = 0.5  # of what the test needs: a rival that is predicted to gain less is not fitted
+# A rival is given up that does not reach the fit without it by so many times of what differences predict, or has so
+# many times its cost where they were taken so often.
+FURTHER, FAR, MAX_FAR = 2.0, 2.0, 2
 ERROR_RATE = 0.01  # of each test: how often a rival is taken that the axis does not have
 CURRENT_DAMPING, OTHER_DAMPING = 1.0, 0.7  # of the low-pass that stands for a current loop: at first, and as it begins
 BEGIN_CURRENT = 1400.0  # [Hz] of that low-pass: twice the bandwidth
@@ -551,24 +628,25 @@ def possible_modes(problem: Problem, fit: Tuned) -> list[Tried]:
     return result
 
 
-def with_rivals(problem: Problem, fit: Tuned, far: bool) -> tuple[Tuned, list[Tried]]:
+def with_rivals(problem: Problem, fit: Tuned, misses: Callable[[Tuned], bool]) -> tuple[Tuned, list[Tried]]:
     """The fit with the rivals that the record asks for, one after the other, and what was tried; the problem has their
     structure then.
 
-    far: whether the fit contradicts what the record shows without one, and may have ended far away.
+    misses: whether a fit contradicts what the record shows without one, and may have ended far away.
     """
     tried: dict[str, Tried] = {}
+    far = misses(fit)
     while True:
-        fit = problem.exact(fit)
-        machine, start = problem.machine, dict(problem.start)
+        fit = problem.near(fit)
+        machine, start = problem.machine, problem.start
         best: tuple[Tried, Tuned, Machine, dict[str, float]] | None = None
         for rival in rivals_of(problem):
             problem.machine, problem.start = _with(machine, problem.each.axis, rival), start | dict(rival.begin)
             one = _predicted(problem, fit, rival)
             if far or one.gain > FITTED_SHARE * one.least:
-                other = _best_fit(problem, fit, rival, far)
-                gain = 0.5 * float(np.sum(fit.residuals**2) - np.sum(other.residuals**2)) if other is not None else 0.0
-                if other is not None and gain > 0:  # else it has ended elsewhere: the fit is one of it in the limit
+                other = _best_fit(problem, fit, rival, one.least, misses if far else None)
+                if other is not None:  # else it has ended elsewhere: the fit is one of it in the limit
+                    gain = 0.5 * float(np.sum(fit.residuals**2) - np.sum(other.residuals**2))
                     one = replace(one, gain=gain, values=other.values)
                     if gain > max(one.least, best[0].gain if best is not None else 0.0):
                         best = replace(one, taken=True, values={}), other, problem.machine, problem.start
@@ -578,7 +656,7 @@ def with_rivals(problem: Problem, fit: Tuned, far: bool) -> tuple[Tuned, list[Tr
             return fit, list(tried.values())
         tried[best[0].name], fit, problem.machine, problem.start = best
         problem.weigh(fit)
-        fit, far = problem.fitted(fit.names, fit.values, fit), False
+        fit, far = problem.continued(fit), False
 
 
 def _predicted(problem: Problem, fit: Tuned, rival: Rival, tests: int = 1) -> Tried:
@@ -609,14 +687,30 @@ def _with(machine: Machine, axis: str, rival: Rival) -> Machine:
     return machine.model_copy(update={"axes": machine.axes | {axis: own.model_copy(update={"drive": drive})}})
 
 
-def _best_fit(problem: Problem, fit: Tuned, rival: Rival, far: bool) -> Tuned | None:
-    """From the fit without the rival; where that may have ended far away, from where it began, too."""
+def _best_fit(
+    problem: Problem, fit: Tuned, rival: Rival, least: float, misses: Callable[[Tuned], bool] | None
+) -> Tuned | None:
+    """From the fit without the rival; where that may have ended far away, from where it began, too, unless the first
+    has found what is missing. None: there is no better one.
+
+    least: gain of the logarithm of the likelihood that a rival needs. misses: as of with_rivals; None: it has not.
+    """
     names = [*fit.names, *rival.begin]
-    fits: list[Tuned] = []
-    with suppress(InputError):  # the units cannot run it
-        fits.append(problem.fitted(names, {**fit.values, **rival.begin}, fit))
+    without = 0.5 * float(np.sum(fit.residuals**2))
+
+    def is_none(point: Point, predicted: float, taken: int) -> bool:
+        cost = problem.cost(tuple(names), point)
+        return cost - FURTHER * predicted > without or (taken >= MAX_FAR and cost > FAR * without)
+
     # What delays the speed setpoint is beside what the symmetry filter has to match.
     later = problem.start["T_sym"] + 2 * rival.begin.get("D", 0.0) / rival.begin.get("omega_0", 1.0)
-    with suppress(InputError):
-        fits += [problem.fitted(names, {"T_sym": later})] if far else []
-    return min(fits, key=lambda one: float(np.sum(one.residuals**2)), default=None)
+    best: Tuned | None = None
+    cost = without
+    for begin, near in (({**fit.values, **rival.begin}, fit), ({"T_sym": later}, None)):
+        with suppress(InputError):  # the units cannot run it
+            other = problem.fitted(names, begin, near, give_up=is_none)
+            if (own := 0.5 * float(np.sum(other.residuals**2))) < cost:
+                best, cost = other, own
+        if misses is None or (best is not None and without - cost > least and not misses(best)):
+            break
+    return best

@@ -24,8 +24,8 @@ from compensation_study import scenarios
 
 from feedsim import scenario
 from feedsim.analysis import Diagnosis, contour
-from feedsim.analysis.circle import CircleUnderTest, TurnedPath, diagnose, name
-from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnosed, tasks
+from feedsim.analysis.circle import CircleUnderTest, TurnedPath, diagnose, term_name
+from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnose_turns, tasks
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import FeedsimError
 from feedsim.simulation import cosim, nc
@@ -135,7 +135,7 @@ def diagnosis(drawn: Drawn, task: CircleTask, trace: Trace) -> Diagnosis | None:
     """What a run's report says; at the tool where the cause acts there."""
     columns = tuple(f"tcp.x_{axis}" for axis in task.turn.axes) if drawn.at_tool else None
     response = None if drawn.at_tool else task.response
-    return diagnosed(trace, task.turns, task.pitch, task.gain, task.drag, columns, False, response, task.following)
+    return diagnose_turns(trace, task.turns, task.pitch, task.gain, task.drag, columns, False, response, task.following)
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def judged(
         off = term.value - true.get(key, 0.0)
         if (term.size if term.key == "cogging" else abs(off) * radial.get(term.key, 1.0)) > INVENTED:
             factor, unit = FIGURE_UNITS[term.unit]
-            invented.append(f"{name(term)} {factor * off:.3g} +- {factor * term.half:.2g} {unit}")
+            invented.append(f"{term_name(term)} {factor * off:.3g} +- {factor * term.half:.2g} {unit}")
     return within, invented
 
 

@@ -27,7 +27,7 @@ from feedsim.analysis import circularity, tasks
 from feedsim.design.tune.circles import Circles, practical, size
 from feedsim.design.tune.compensators import GROUP_OF_KIND, tune
 from feedsim.design.uncertainty import cloud_of, curves_of, of_run
-from feedsim.estimation.identify import Identified, Options, friction_file, identify
+from feedsim.estimation.identify import IdentifiedFriction, Options, friction_file, identify
 from feedsim.estimation.identify import stribeck as drift
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Estimate
@@ -57,9 +57,9 @@ def warmed(made: Sequence[Record], sigma_2: float, seed: int) -> list[Record]:
     random = np.random.default_rng((seed, 1))
     age = np.linspace(0.0, 1.0, len(made[0].time))
     courses = (
-        drift.WARMS * random.normal() * (age > 0),
-        drift.WARMS * random.normal() * age,
-        drift.WARMS * np.cumsum(random.normal(size=len(age))) / np.sqrt(len(age)),
+        drift.WARMING_DEVIATION * random.normal() * (age > 0),
+        drift.WARMING_DEVIATION * random.normal() * age,
+        drift.WARMING_DEVIATION * np.cumsum(random.normal(size=len(age))) / np.sqrt(len(age)),
     )
     change = courses[random.integers(len(courses))]
     result = []
@@ -83,7 +83,7 @@ def identified(true: Scenario, logs: int, folder: Path, *, still: bool) -> list[
         with FrictionLaw() as law:
             found = identify(made, law, Options(AXIS, axis.I_P, J=J, modes=modes, delay=0.0))
         file = folder / f"friction_{seed}.yaml"
-        file.write_text(friction_file.friction_yaml(Identified(found, tuple(made), ()), SOFTWARE))
+        file.write_text(friction_file.friction_yaml(IdentifiedFriction(found, tuple(made), ()), SOFTWARE))
         files.append(file)
     return files
 

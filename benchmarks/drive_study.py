@@ -33,7 +33,7 @@ import numpy as np
 
 from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.closed_loop import cut_window, read_axes
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import ElasticMode, with_modes
 from feedsim.estimation.replay.tuning import decision
@@ -256,7 +256,7 @@ def identified(
     for axis in kind.axes:
         (folder / "columns.yaml").write_text(columns(kind, axis))
         read |= read_axes(folder / "log.csv", [axis], None, load_columns(folder / "columns.yaml"))
-    records = {axis: windowed(axis, read[axis], None) for axis in kind.axes}
+    records = {axis: cut_window(axis, read[axis], None) for axis in kind.axes}
     modes = None if kind.modes and kind.asked else 0
     found = identify_drives(read, records, None, [], "made", "made", modes=modes).drives[kind.axis]
     true, estimated = truth(known, kind.axis), {}

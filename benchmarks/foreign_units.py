@@ -45,7 +45,7 @@ def main(words: Sequence[str] | None = None) -> int:
         steps = 3 * cycles  # drive, structure, friction
 
         def run(watched: bool) -> float:
-            before, worker.AVAILABLE = worker.AVAILABLE, watched
+            before, worker.WORKERS_AVAILABLE = worker.WORKERS_AVAILABLE, watched
             try:
                 rows = 0
 
@@ -57,7 +57,7 @@ def main(words: Sequence[str] | None = None) -> int:
                 cosim.run(plan, program=program, sink=sink)
                 return time.perf_counter() - begun
             finally:
-                worker.AVAILABLE = before
+                worker.WORKERS_AVAILABLE = before
 
         run(True), run(False)  # the worker is started, the libraries are loaded
         contestants = [Contestant(name, lambda w=w: run(w)) for name, w in (("watched", True), ("here", False))]

@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 import feedsim
-from feedsim.estimation.identify import Asked, Options, Record, identify, read_traces
+from feedsim.estimation.identify import AxisRequest, Options, Record, identify, read_traces
 from feedsim.estimation.identify.motion import RecordTorque, motion
 from feedsim.estimation.identify.parameters import torque as torque_over_speed
-from feedsim.estimation.identify.read import Recorded
+from feedsim.estimation.identify.read import RecordedAxis
 from feedsim.estimation.identify.stages import with_structure
 from feedsim.files.columns import load_columns
 from feedsim.scenario import Friction, Machine, load_machine
@@ -80,13 +80,13 @@ class Row:
     slow: float
 
 
-def _options(law: str, axis: str | None, recorded: Sequence[Recorded], machine: Machine | None) -> Options:
+def _options(law: str, axis: str | None, recorded: Sequence[RecordedAxis], machine: Machine | None) -> Options:
     """Without the friction of the machine file, which may be identified from what is judged."""
-    known = Asked(axis=axis, law=law).with_traces([each.provenance for each in recorded], machine)
+    known = AxisRequest(axis=axis, law=law).with_traces([each.provenance for each in recorded], machine)
     return replace(known, fallback={})
 
 
-def halves(name: str, recorded: Sequence[Recorded], machine: Machine | None, axis: str) -> Case:
+def halves(name: str, recorded: Sequence[RecordedAxis], machine: Machine | None, axis: str) -> Case:
     """A case that is fitted to the first half of what moves in each record, and judged by the rest."""
     records = [record for each in recorded for record in each.records]
     cuts = []

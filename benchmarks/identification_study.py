@@ -23,7 +23,7 @@ from types import FrameType
 
 from identification_logs import FLAWS, Log, made, names
 
-from feedsim.estimation.identify import Asked, identify, named_apart, read_traces
+from feedsim.estimation.identify import AxisRequest, identify, named_apart, read_traces
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.columns import load_columns
 from feedsim.foundation.errors import Finding, InputError
@@ -99,7 +99,7 @@ def judged(log: Log) -> Outcome:
         with _given_up(LONGEST):
             recorded = read_traces(log.files, load_columns(log.mapping))
             sources = tuple(each.provenance for each in recorded)
-            asked = Asked(axis="Z", inertia=log.inertia, delay=log.delay)
+            asked = AxisRequest(axis="Z", inertia=log.inertia, delay=log.delay)
             with FrictionLaw() as law:
                 found = identify(named_apart(recorded), law, asked.with_traces(sources))
         warnings = (*(finding for source in sources for finding in source.warnings), *found.warnings)

@@ -22,9 +22,9 @@ sys.path.insert(0, str(ROOT / "tests"))
 from feedsim import scenario  # noqa: E402
 from feedsim.report.live_page import html  # noqa: E402
 from feedsim.report.live_page.content import content  # noqa: E402
-from feedsim.report.live_page.html import computing  # noqa: E402
+from feedsim.report.live_page.html import computing_script  # noqa: E402
 from feedsim.simulation import cosim, nc  # noqa: E402
-from feedsim.simulation.judge import judged  # noqa: E402
+from feedsim.simulation.judge import judge_run  # noqa: E402
 from page_helpers import NODE  # noqa: E402
 
 ROUNDS, TURNS = 15, 50
@@ -70,7 +70,7 @@ def against_native(given: Any, program: Any, data: Any, folder: Path) -> tuple[l
     """CPU times [s] of the runs, in turns; the first ones, in which both warm up, are left out."""
     assert NODE is not None
     (folder / "data.json").write_text(json.dumps(data))
-    (folder / "served.js").write_text('"use strict";\n' + computing() + SERVED)
+    (folder / "served.js").write_text('"use strict";\n' + computing_script() + SERVED)
     server = subprocess.Popen(
         [NODE, "served.js", "data.json"], cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -79,7 +79,7 @@ def against_native(given: Any, program: Any, data: Any, folder: Path) -> tuple[l
     server.stdout.readline()
     native, page = [], []
     for _ in range(ROUNDS + 3):
-        native.append(judged(cosim.run(given, program=program, native=True)).wall_time)
+        native.append(judge_run(cosim.run(given, program=program, native=True)).wall_time)
         server.stdin.write("\n")
         server.stdin.flush()
         page.append(float(server.stdout.readline()))
@@ -93,7 +93,7 @@ def in_browser(given: Any, program: Any, folder: Path) -> None:
     from playwright.sync_api import sync_playwright
 
     file = folder / "page.html"
-    html.write(judged(cosim.run(given, program=program)), file)
+    html.write(judge_run(cosim.run(given, program=program)), file)
     with sync_playwright() as api:
         chromium = shutil.which("chromium") or shutil.which("chromium-browser")
         browser = api.chromium.launch(executable_path=chromium, args=["--headless", "--no-sandbox", "--disable-gpu"])

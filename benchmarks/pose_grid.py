@@ -23,7 +23,7 @@ from feedsim.scenario.structure.checks import load_structure
 from feedsim.scenario.structure.parts import GeometryStructure
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim.archive import Archive
-from feedsim.simulation.cosim.operations import Interpreter, When, do_step, get_row, set_real, set_slopes
+from feedsim.simulation.cosim.operations import DueCycles, Interpreter, do_step, get_row, set_real, set_slopes
 from feedsim.simulation.cosim.unit import Log, Port, Unit
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
 from feedsim.structure.pack import pack
@@ -113,7 +113,7 @@ def drive(plant: Path, machine: Machine, recorded: Recorded, modes_file: Path | 
             unit.enter_initialisation(0.0, count * h)
             unit.exit_initialisation()
             torque, slopes = recorded.torque.T, np.diff(recorded.torque, axis=1).T / h
-            rows = get_row(log, When())
+            rows = get_row(log, DueCycles())
             driven = [*set_real(port, torque), *set_slopes(port, slopes), do_step(unit, 0.0, h)]
             Interpreter([*rows, *driven], h).run(0, count - 1)
             Interpreter(rows, h).run(count - 1, count)

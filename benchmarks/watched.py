@@ -137,7 +137,7 @@ def main() -> int:
     from feedsim.report.page import Partial
     from feedsim.simulation import cosim, nc
     from feedsim.simulation.cosim.system import System
-    from feedsim.simulation.judge import judged  # noqa: F401, timed below
+    from feedsim.simulation.judge import judge_run  # noqa: F401, timed below
 
     of_runs = sys.modules["feedsim.simulation.judge"]
     for home, name, part in (

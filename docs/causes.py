@@ -14,11 +14,11 @@ import numpy as np
 
 from feedsim import scenario
 from feedsim.analysis import Diagnosis
-from feedsim.analysis.circle import name
+from feedsim.analysis.circle import term_name
 from feedsim.analysis.circle.words import worth_telling
 from feedsim.analysis.circularity import contour
-from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnosed, tasks
-from feedsim.report.formatting import SIMULATED
+from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnose_turns, tasks
+from feedsim.report.formatting import SIMULATED_COLOUR
 from feedsim.simulation import cosim
 
 HERE = Path(__file__).resolve().parent
@@ -111,7 +111,7 @@ def diagnosis(cause: Cause, feed: float, radius: float) -> tuple[Diagnosis, list
     (task,) = (each for each in tasks(run.scenario, run.program) if isinstance(each, CircleTask))
     columns = ("tcp.x_X", "tcp.x_Z") if cause.at_tool else None
     response = None if cause.at_tool else task.response  # of the scales
-    found = diagnosed(
+    found = diagnose_turns(
         run.trace, task.turns, task.pitch, task.gain, task.drag, columns, cause.recorded, response, task.following
     )
     assert found is not None
@@ -134,7 +134,7 @@ def words(found: Diagnosis, cause: Cause) -> str:
         if term.key == "offset" or (term.key == "peaks" and not cause.term.startswith("peaks")):
             continue
         factor, unit = FIGURE_UNITS[term.unit]
-        text = f"{name(term)} {factor * term.value:.3g} +- {factor * term.half:.2g} {unit}"
+        text = f"{term_name(term)} {factor * term.value:.3g} +- {factor * term.half:.2g} {unit}"
         if term.key == "scale" and found.unlike is not None and abs(found.unlike) > term.half:
             text += f" (by the response of the axes {1e6 * found.unlike:.3g})"
         named.append(f"**{text}**" if f"{term.key} {term.axis}".strip() == cause.term else text)
@@ -167,7 +167,9 @@ def picture(shown: dict[str, list[tuple[np.ndarray, np.ndarray]]], file: Path) -
         for (angle, deviation), line in zip(turns, ("-", "--"), strict=True):  # directions, as in reports
             r = 1 + 0.35 * deviation / largest
             order = np.argsort(angle)[:: max(1, len(angle) // POINTS)]
-            place.plot((r * np.cos(angle))[order], (r * np.sin(angle))[order], line, color=SIMULATED, linewidth=1)
+            place.plot(
+                (r * np.cos(angle))[order], (r * np.sin(angle))[order], line, color=SIMULATED_COLOUR, linewidth=1
+            )
         place.set_title(f"{textwrap.fill(title, 34)}\nlargest deviation {1e6 * largest:.3g} um")
         place.set_aspect("equal")
     figure.tight_layout()

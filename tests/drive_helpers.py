@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from feedsim.estimation.identify import Recorded
-from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.identify import RecordedAxis
+from feedsim.estimation.replay.closed_loop import AxisRecord, cut_window, read_axes
 from feedsim.estimation.replay.drive import DriveFound
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.files.columns import Columns
@@ -54,8 +54,8 @@ def identified(
     mapping: Columns | None = None,
     position_cycle: float | None = None,
 ) -> tuple[DriveFound, dict[str, str]]:
-    read: dict[str, Recorded] = read_axes(path, [axis], machine, mapping)
-    records: dict[str, AxisRecord] = {axis: windowed(axis, read[axis], None)}
+    read: dict[str, RecordedAxis] = read_axes(path, [axis], machine, mapping)
+    records: dict[str, AxisRecord] = {axis: cut_window(axis, read[axis], None)}
     found = identify_drives(
         read, records, machine, ["made by a test"], "made", "by a test", position_cycle=position_cycle
     )

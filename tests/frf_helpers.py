@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import linear
-from feedsim.analysis.campaign import Campaign, Excited, Plan
+from feedsim.analysis.campaign import Campaign, ExcitedInput, Plan
 from feedsim.analysis.responses import Overlay, Responses, closed_form
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.linear.loops import names
@@ -51,7 +51,7 @@ def campaign_of(closed: FrequencyResponse, coherence: float = 1.0) -> Campaign:
         {name: closed.unit(name) for name in measured},
         dict.fromkeys(measured, known),
     )
-    excited = (Excited("Z.n_add", "rad/s", 0.5, 1.1, len(f), 2.0),)
+    excited = (ExcitedInput("Z.n_add", "rad/s", 0.5, 1.1, len(f), 2.0),)
     units = {"plant": {"guid": "0011223344556677-8899aabbccddeeff", "version": "0.1.0"}}
     return Campaign(Plan(band=BAND), response, excited, 1.5, 8.0, units, ())
 

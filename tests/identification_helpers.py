@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.estimation.identify import Identified, parameters
+from feedsim.estimation.identify import IdentifiedFriction, parameters
 from feedsim.estimation.identify.read import Provenance
 from feedsim.estimation.identify.record import Array, Record
 from feedsim.estimation.identify.result import (
@@ -50,7 +50,7 @@ def estimates() -> dict[str, Estimate]:
         found[name] = replace(found[name], status="held", reason=reason)
     found |= {
         name: parameters.estimate(name, parameters.NO_EFFECT[name], status="held")
-        for name in parameters.FIXED
+        for name in parameters.FIXED_PARAMETERS
         if name in TRUE
     }
     found["J"] = replace(found["J"], status="given", reason="of the machine's modes")
@@ -162,9 +162,11 @@ def provenance(file: Path | str = "sine.csv", **changes: Any) -> Provenance:
     )  # fmt: skip
 
 
-def identified(**changes: Any) -> Identified:
+def identified(**changes: Any) -> IdentifiedFriction:
     sources = (provenance("constant.csv"), provenance("sine.csv"))
-    whole = Identified(identification(), records(), sources, load_subject(MACHINE), {"hold": "beta=1"}, "2026-01-31")
+    whole = IdentifiedFriction(
+        identification(), records(), sources, load_subject(MACHINE), {"hold": "beta=1"}, "2026-01-31"
+    )
     return replace(whole, **changes)
 
 

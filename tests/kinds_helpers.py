@@ -6,7 +6,7 @@ from pathlib import Path
 
 from command_helpers import feedsim
 from feedsim.analysis import evaluate
-from feedsim.foundation.arguments import Call, calling
+from feedsim.foundation.arguments import Call, call_context
 from feedsim.jobs.identify import result_of
 from feedsim.jobs.parameters import command_line
 from identification_helpers import identified
@@ -73,11 +73,11 @@ class Kinds:
         if (place / "report.html").exists():
             return place
         if kind == "identify":
-            with calling(Call({}, command_line)):
+            with call_context(Call({}, command_line)):
                 result_of(identified()).save(place)
         elif kind in ("circle", "stop"):
             run = circle_run() if kind == "circle" else positioning_run()
-            with calling(Call({"scenario": run.scenario}, command_line)):
+            with call_context(Call({"scenario": run.scenario}, command_line)):
                 write_run(run, evaluate(run), place)
         else:
             needs, words = COMMANDS[kind]

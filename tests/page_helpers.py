@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.foundation.errors import Finding
-from feedsim.report.live_page.html import computing
+from feedsim.report.live_page.html import computing_script
 
 NODE = shutil.which("node")
 MAIN = """
@@ -39,7 +39,7 @@ def answers(data: dict[str, Any], asked: list[dict[str, Any]], folder: Path) -> 
     assert NODE is not None
     (folder / "data.json").write_text(json.dumps(data))
     (folder / "asked.json").write_text(json.dumps(asked))
-    (folder / "main.js").write_text('"use strict";\n' + computing() + MAIN)
+    (folder / "main.js").write_text('"use strict";\n' + computing_script() + MAIN)
     command = [NODE, "main.js", "data.json", "asked.json", "found.json"]
     done = subprocess.run(command, cwd=folder, capture_output=True, encoding="utf-8", check=False)
     assert done.returncode == 0, done.stderr

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.estimation.identify.read import Recorded, read_records
+from feedsim.estimation.identify.read import RecordedAxis, read_records
 from feedsim.files.columns import Columns, load_columns
 from feedsim.foundation.errors import InputError
 
@@ -43,7 +43,7 @@ def mapped(tmp_path: Path, text: str) -> Columns:
     return load_columns(path)
 
 
-def only(recorded: Recorded) -> Any:
+def only(recorded: RecordedAxis) -> Any:
     assert len(recorded.records) == 1
     return recorded.records[0]
 

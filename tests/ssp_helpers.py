@@ -9,7 +9,7 @@ from pathlib import Path
 
 from feedsim import scenario
 from feedsim.simulation import cosim, ssp
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 
 ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
@@ -43,8 +43,8 @@ def export_short(folder: Path, fmus: Path) -> Path:
 
 def run_ssp(file: Path, *overrides: str) -> JudgedRun:
     """The scenario that an SSP file holds, run on the archives in it."""
-    with ssp.opened(file, overrides) as found:
-        return judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
+    with ssp.open_system(file, overrides) as found:
+        return judge_run(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
 
 
 def contents(path: Path) -> dict[str, bytes]:

@@ -36,7 +36,7 @@ class Counted:
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "kept"
-    monkeypatch.setenv(owned.FOLDER, str(folder))
+    monkeypatch.setenv(owned.CACHE_VARIABLE, str(folder))
     return folder
 
 
@@ -49,7 +49,7 @@ def code(tmp_path: Path) -> Path:
 
 def test_an_answer_is_found_once(place: Path, code: Path) -> None:
     find = Counted([0.1 + 0.2, 1e-300, "words", None])
-    answers = [owned.cached("kind", ["a", 1.5], [code], find) for _ in range(3)]
+    answers = [owned.cache_answer("kind", ["a", 1.5], [code], find) for _ in range(3)]
     assert answers == [find.answer] * 3  # to the last bit
     assert find.times == 1
     assert [file.name.startswith("kind-") for file in place.iterdir()] == [True]
@@ -58,11 +58,11 @@ def test_an_answer_is_found_once(place: Path, code: Path) -> None:
 def test_what_follows_from_something_else_is_found_anew(place: Path, code: Path) -> None:
     find = Counted()
     for follows_from in (["a", 1.0], ["a", 1.0 + 1e-15], ["b", 1.0]):
-        owned.cached("kind", follows_from, [code], find)
+        owned.cache_answer("kind", follows_from, [code], find)
     assert find.times == 3
     (code / "solver.py").write_text("x = 2\n")
     owned._versions.cache_clear()
-    owned.cached("kind", ["a", 1.0], [code], find)
+    owned.cache_answer("kind", ["a", 1.0], [code], find)
     assert find.times == 4
 
 
@@ -71,10 +71,10 @@ def test_what_follows_from_something_else_is_found_anew(place: Path, code: Path)
 )
 def test_a_damaged_file_is_replaced(content: str, place: Path, code: Path) -> None:
     find = Counted(7)
-    owned.cached("kind", [], [code], find)
+    owned.cache_answer("kind", [], [code], find)
     (file,) = place.iterdir()
     file.write_text(content)
-    assert owned.cached("kind", [], [code], find) == 7
+    assert owned.cache_answer("kind", [], [code], find) == 7
     assert find.times == 2
     assert json.loads(file.read_text())["answer"] == 7
 
@@ -82,9 +82,9 @@ def test_a_damaged_file_is_replaced(content: str, place: Path, code: Path) -> No
 def test_a_folder_that_cannot_be_written_is_none(tmp_path: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     for folder in ("", str(tmp_path / "file"), str(tmp_path / "file" / "below")):
-        monkeypatch.setenv(owned.FOLDER, folder)
+        monkeypatch.setenv(owned.CACHE_VARIABLE, folder)
         find = Counted(3)
-        assert [owned.cached("kind", [], [code], find) for _ in range(2)] == [3, 3]
+        assert [owned.cache_answer("kind", [], [code], find) for _ in range(2)] == [3, 3]
         assert find.times == 2
 
 
@@ -95,17 +95,17 @@ def test_a_folder_that_cannot_be_written_is_none(tmp_path: Path, code: Path, mon
      ({"HOME": "/home/a", "XDG_CACHE_HOME": "/b"}, Path("/b/feedsim"))],
 )  # fmt: skip
 def test_where_answers_are_kept(set_to: dict[str, str], expected: Path | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (owned.FOLDER, "HOME", "XDG_CACHE_HOME"):
+    for name in (owned.CACHE_VARIABLE, "HOME", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     for name, value in set_to.items():
         monkeypatch.setenv(name, value)
-    assert owned.folder() == expected
+    assert owned.cache_folder() == expected
 
 
 def test_the_oldest_answers_go(place: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(owned, "MAX_ANSWERS", 3)
     for k in range(6):
-        owned.cached("kind", [k], [code], Counted(k))
+        owned.cache_answer("kind", [k], [code], Counted(k))
         for file in place.iterdir():  # a clock may be coarse
             if json.loads(file.read_text())["answer"] == k:
                 os.utime(file, (k, k))
@@ -117,14 +117,14 @@ def test_the_pose_is_judged_the_same_and_solved_once(place: Path, monkeypatch: p
     machine = load_machine(MACHINE)
 
     def judged() -> tuple[Any, Any]:
-        for each in (room._between, room._end, room._middle, room._modes_of_table):
+        for each in (room._changes_between, room._end, room._solve_pose, room._modes_of_table):
             each.cache_clear()
         return pose_change(machine, RANGES), room.table_mismatch(machine)
 
-    monkeypatch.setenv(owned.FOLDER, "")
+    monkeypatch.setenv(owned.CACHE_VARIABLE, "")
     plain = judged()
     assert plain[0].axes[0].modes
-    monkeypatch.setenv(owned.FOLDER, str(place))
+    monkeypatch.setenv(owned.CACHE_VARIABLE, str(place))
     assert judged() == plain
     monkeypatch.setattr(room, "_model", lambda *_, **__: pytest.fail("solved again"))
     monkeypatch.setattr(room, "_modes_of_table", lambda *_: pytest.fail("solved again"))

@@ -11,7 +11,7 @@ import pytest
 
 from feedsim import analysis, cli, scenario
 from feedsim.simulation import cosim, ssp
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted(
@@ -70,16 +70,16 @@ def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypat
             continue
         if options.scenario.name == "x.ssp":  # what the page calls any such file
             options.scenario = written
-        with ssp.opened(options.scenario, vars(options).get("set", ())) as found:
+        with ssp.open_system(options.scenario, vars(options).get("set", ())) as found:
             assert found.scenario.machine.axes
 
 
 def test_figures_of_the_readme(fmus: Path) -> None:
     """Every number of the README's table of figures, to the digits it is written with."""
     runs = {
-        "Z, ": judged(cosim.run(scenario.load(ROOT / "scenarios" / "z_positioning.yaml"), fmus=fmus)),
-        "X-Z": judged(cosim.run(scenario.load(ROOT / "scenarios" / "xz_circle.yaml"), fmus=fmus)),
-        "pure": judged(
+        "Z, ": judge_run(cosim.run(scenario.load(ROOT / "scenarios" / "z_positioning.yaml"), fmus=fmus)),
+        "X-Z": judge_run(cosim.run(scenario.load(ROOT / "scenarios" / "xz_circle.yaml"), fmus=fmus)),
+        "pure": judge_run(
             cosim.run(
                 scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["machine.axes.*.friction.W=0 rad"]), fmus=fmus
             )

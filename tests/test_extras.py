@@ -186,15 +186,15 @@ def test_what_is_drawn_is_asked_for_ahead_of_a_run(folder: Path) -> None:
 
 @pytest.mark.parametrize("module", ["scipy", "distributed"])
 def test_a_study_asks_for_all_at_once(module: str) -> None:
-    told = installation.missing(ModuleNotFoundError("x", name=module), "feedsim.sweep")
+    told = installation.missing_package_error(ModuleNotFoundError("x", name=module), "feedsim.sweep")
     assert str(told).endswith(f'of which {module} is not installed: pip install "feedsim[sweep]"')
-    run = str(installation.missing(ModuleNotFoundError("x", name="scipy"), "feedsim.frf"))
+    run = str(installation.missing_package_error(ModuleNotFoundError("x", name="scipy"), "feedsim.frf"))
     assert run.endswith('pip install "feedsim[run]"')
 
 
 def test_what_is_no_extra_is_an_error_of_its_own() -> None:
-    assert installation.missing(ModuleNotFoundError("x", name="feedsim.unknown")) is None
-    assert installation.missing(ImportError("cannot import name", name="scipy")) is None
+    assert installation.missing_package_error(ModuleNotFoundError("x", name="feedsim.unknown")) is None
+    assert installation.missing_package_error(ImportError("cannot import name", name="scipy")) is None
 
 
 def test_the_front_door_says_it_too(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from command_helpers import feedsim
 from feedsim.foundation.errors import OutputError
-from feedsim.foundation.outputs import archive_with, begins_with, check_file, replacing, unchanged
+from feedsim.foundation.outputs import allow_replacement, archive_with, begins_with, check_file, content_check
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -30,7 +30,7 @@ def test_an_input_is_refused_by_every_name_and_by_force(tmp_path: Path) -> None:
     file.write_text("a")
     for name in spelt(file):
         for force in (False, True):
-            with replacing(force), pytest.raises(OutputError, match="is an input and would be replaced"):
+            with allow_replacement(force), pytest.raises(OutputError, match="is an input and would be replaced"):
                 check_file(name, [file], ours=lambda path: True)
 
 
@@ -39,9 +39,9 @@ def test_a_file_of_others_stays_unless_forced(tmp_path: Path) -> None:
     file.write_text("mine")
     with pytest.raises(OutputError, match=r"is no report that feedsim wrote; .* --force"):
         check_file(file, what="report")
-    with replacing():
+    with allow_replacement():
         check_file(file)
-    check_file(file, ours=unchanged(b"mine"))
+    check_file(file, ours=content_check(b"mine"))
     check_file(file, ours=begins_with(b"mi"))
     check_file(tmp_path / "new.html")
     with pytest.raises(OutputError, match="is a directory"):

@@ -19,7 +19,7 @@ from command_helpers import PATIENCE
 from feedsim.files.trace import written_whole
 from feedsim.foundation import owned
 from feedsim.foundation.errors import OutputError
-from feedsim.foundation.owned import TemporaryFolder, claimed, remove_orphans
+from feedsim.foundation.owned import TemporaryFolder, claim_folder, remove_orphans
 
 ROOT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -46,18 +46,18 @@ def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[
         process.communicate("\n", timeout=PATIENCE)
 
 
-CLAIM = "claim = claimed(Path('out/below'))\nclaim.__enter__()"
+CLAIM = "claim = claim_folder(Path('out/below'))\nclaim.__enter__()"
 
 
 def test_a_folder_belongs_to_one_process(tmp_path: Path) -> None:
     folder = tmp_path / "out" / "below"
     with another_process(CLAIM, tmp_path) as process:
-        with pytest.raises(OutputError) as told, claimed(folder):
+        with pytest.raises(OutputError) as told, claim_folder(folder):
             pass
         words = str(told.value)
         assert words.startswith(f"{folder}: another process writes its results there: process {process.pid} on ")
         assert words.endswith("; wait until it has ended, or take another directory")
-    with claimed(folder):
+    with claim_folder(folder):
         pass
 
 
@@ -65,13 +65,13 @@ def test_a_killed_process_keeps_nobody_waiting(tmp_path: Path) -> None:
     folder = tmp_path / "out" / "below"
     with another_process(CLAIM, tmp_path, kill=True):
         assert [path.name for path in folder.iterdir()] == [owned.LOCK]
-        with claimed(folder):
+        with claim_folder(folder):
             (folder / "result").touch()
         assert [path.name for path in folder.iterdir()] == ["result"]
 
 
 def test_what_is_made_goes_where_nothing_comes_of_it(tmp_path: Path) -> None:
-    with claimed(tmp_path / "a" / "b"):
+    with claim_folder(tmp_path / "a" / "b"):
         assert (tmp_path / "a" / "b").is_dir()
     assert list(tmp_path.iterdir()) == []
 
@@ -81,12 +81,12 @@ def test_blocks_of_a_thread_may_stand_in_one_another_those_of_two_not(tmp_path: 
 
     def other() -> None:
         try:
-            with claimed(tmp_path):
+            with claim_folder(tmp_path):
                 told.append("had it")
         except OutputError as error:
             told.append(str(error))
 
-    with claimed(tmp_path), claimed(tmp_path):
+    with claim_folder(tmp_path), claim_folder(tmp_path):
         thread = threading.Thread(target=other)
         thread.start()
         thread.join()
@@ -101,7 +101,7 @@ def test_many_take_turns_without_a_gap(tmp_path: Path) -> None:
 
     def work() -> None:
         for _ in range(30):
-            with claimed(tmp_path / "out", wait=60.0):
+            with claim_folder(tmp_path / "out", wait=60.0):
                 with guard:
                     inside[0] += 1
                     most[0] = max(most[0], inside[0])
@@ -132,7 +132,7 @@ def test_a_folder_that_comes_and_goes_is_no_file(tmp_path: Path) -> None:
     thread.start()
     try:
         for _ in range(300):
-            with claimed(folder, wait=60.0):
+            with claim_folder(folder, wait=60.0):
                 pass
     finally:
         done.set()
@@ -142,7 +142,7 @@ def test_a_folder_that_comes_and_goes_is_no_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("elsewhere", [True, False])
 def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: bool) -> None:
     """The folder for temporary files has some, for this machine; another machine's word has to be believed."""
-    real, folder = owned.locked, tmp_path / "out"
+    real, folder = owned.lock_file, tmp_path / "out"
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path / "tmp"))  # type: ignore[attr-defined]
 
@@ -151,12 +151,12 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     if not Path("/proc/self/fd").is_dir():
         pytest.skip("needs /proc")
-    monkeypatch.setattr(owned, "locked", locked)
-    with claimed(folder):
+    monkeypatch.setattr(owned, "lock_file", locked)
+    with claim_folder(folder):
         told: list[str] = []
 
         def other() -> None:
-            with pytest.raises(OutputError) as error, claimed(folder):
+            with pytest.raises(OutputError) as error, claim_folder(folder):
                 pass
             told.append(str(error.value))
 
@@ -169,10 +169,10 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
     host = "elsewhere" if elsewhere else owned.platform.node()  # type: ignore[attr-defined]
     (folder / owned.LOCK).write_text(f"process 7 on {host} since 2020-01-01 00:00:00: feedsim run")
     if elsewhere:
-        with pytest.raises(OutputError, match="not at work any more, remove that file"), claimed(folder):
+        with pytest.raises(OutputError, match="not at work any more, remove that file"), claim_folder(folder):
             pass
     else:  # it has been killed: its lock on this machine is free
-        with claimed(folder):
+        with claim_folder(folder):
             pass
 
 

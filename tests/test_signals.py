@@ -50,7 +50,7 @@ def test_a_signal_arrives_behind_the_block(number: int) -> None:
     went_on: list[bool] = []
 
     def block() -> None:
-        with owned.held():
+        with owned.defer_signals():
             _swallow(number)
             went_on.append(True)
 
@@ -62,14 +62,14 @@ def test_a_signal_arrives_behind_the_block(number: int) -> None:
 
 def test_what_is_ignored_stays_so(number: int) -> None:
     signal.signal(number, signal.SIG_IGN)
-    with owned.held():
+    with owned.defer_signals():
         assert signal.getsignal(number) is signal.SIG_IGN
         signal.raise_signal(number)
 
 
 def test_an_error_in_the_block_puts_the_handler_back(number: int) -> None:
     handler = signal.getsignal(number)
-    with pytest.raises(ValueError, match="inside"), owned.held():
+    with pytest.raises(ValueError, match="inside"), owned.defer_signals():
         raise ValueError("inside")
     assert signal.getsignal(number) is handler
 
@@ -78,7 +78,7 @@ def test_other_threads_are_left_alone() -> None:
     done: list[bool] = []
 
     def work() -> None:
-        with owned.held():  # signal.signal would raise here
+        with owned.defer_signals():  # signal.signal would raise here
             done.append(True)
 
     thread = threading.Thread(target=work)

@@ -42,19 +42,19 @@ def __getattr__(public: str) -> _Any:
 
         return version("feedsim") or "unknown"
     if public in _OLD_NAMES:
-        return _renamed(public)
+        return _old_function(public)
     if public not in _HOMES:
         raise AttributeError(f"module 'feedsim' has no attribute '{public}'")
     room, name = _HOMES[public]
     try:
         return getattr(_import_module(room), name)
     except ModuleNotFoundError as error:
-        from feedsim.foundation.installation import missing
+        from feedsim.foundation.installation import missing_package_error
 
-        raise missing(error, f"feedsim.{public}") or error from None
+        raise missing_package_error(error, f"feedsim.{public}") or error from None
 
 
-def _renamed(old: str) -> _Any:
+def _old_function(old: str) -> _Any:
     """The function that had this name; calling it says how it is called today."""
     import functools
     import warnings

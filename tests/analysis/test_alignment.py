@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.analysis.circularity import Turn, amplitude_spectrum
-from feedsim.analysis.side_by_side import Source, aligned, approaches, read_sources, stops
+from feedsim.analysis.side_by_side import Source, align_sources, approaches, read_sources, stops
 from feedsim.foundation.errors import InputError
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def written(path: Path, **columns: Array) -> Path:
 
 
 def sources(*paths: Path) -> list[Source]:
-    return aligned(read_sources(paths))
+    return align_sources(read_sources(paths))
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def test_turns_of_a_record_are_found_by_the_angle(tmp_path: Path, off: float) ->
     )
     first, second = read_sources([simulated, record])
     turn = Turn(("X", "Z"), (0.1, 0.2), 0.02, 1, 0.5, 1.5)
-    found = aligned([replace(first, circles={"XZ": (turn,)}), second])[1]
+    found = align_sources([replace(first, circles={"XZ": (turn,)}), second])[1]
     (own,) = found.circles["XZ"]
     assert own.centre == pytest.approx((0.1 + off, 0.2), abs=1e-8)
     assert own.end - own.begin == pytest.approx(1.0, rel=1e-3)

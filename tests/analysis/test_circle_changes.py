@@ -8,7 +8,7 @@ import numpy as np
 from drawn_circles import Causes, driven
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose
-from feedsim.analysis.circle.words import changed, named
+from feedsim.analysis.circle.words import compare_terms, sure_changes
 
 CIRCLE = CircleUnderTest(("X", "Z"), 0.1, 1 / 60, recorded=True)
 PAIRS, SAMPLES = 40, 720
@@ -53,13 +53,13 @@ def test_changes_of_ten_percent_are_named_where_they_are_beyond_doubt_and_only_t
         after = change(before, 1.1 if k % 2 else 0.9)
         waves = np.column_stack([draw(0, 0.3e-6, 4), draw(0, 6, 4)])
         (one, turns), (other, later) = (taken(causes, waves, rng) for causes in (before, after))
-        changes = changed(one, other, turns, later)
+        changes = compare_terms(one, other, turns, later)
         of = {(each.before.key, each.before.axis): each for each in changes}
         for place, value in truths(before).items():
             asked += 1
             held += abs(of[place].difference - (truths(after)[place] - value)) <= of[place].half
         of_it = {(key, axis), *([("radius", "")] if key == "scale" else [])}  # one axis longer: a larger mean radius
-        false_pairs += any((each.before.key, each.before.axis) not in of_it for each in named(changes))
+        false_pairs += any((each.before.key, each.before.axis) not in of_it for each in sure_changes(changes))
         if key:
             truth = abs(truths(after)[key, axis] - truths(before)[key, axis])
             clear += truth > 3 * of[key, axis].half

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose, name
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose, term_name
 
 Array = NDArray[np.float64]
 PITCH, LEAD = 0.02, 0.02 / (2 * math.pi)
@@ -57,7 +57,7 @@ def test_order_and_amplitude_come_back(radius: float, speed: float) -> None:
     (term,) = found
     assert (term.axis, term.order, term.unit) == ("X", 6, "N.m")
     assert abs(term.value - 0.05) < term.half < 0.1 * 0.05
-    assert name(term) == "cogging of X, 6 per turn"
+    assert term_name(term) == "cogging of X, 6 per turn"
 
 
 def test_two_axes_have_their_own() -> None:

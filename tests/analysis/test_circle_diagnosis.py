@@ -12,7 +12,15 @@ import pytest
 from drawn_circles import Causes, driven
 from scipy import stats
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence, swinging
+from feedsim.analysis.circle import (
+    CircleUnderTest,
+    Diagnosis,
+    TurnedPath,
+    cause_sentence,
+    describe_vibrations,
+    diagnose,
+    explain_circle,
+)
 from feedsim.estimation.least_squares import student
 
 BALLBAR = CircleUnderTest(("X", "Z"), radius=0.1, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
@@ -29,7 +37,7 @@ def test_nothing_is_made_of_a_round_circle() -> None:
     assert found.G < 1e-12
     assert not any(term.shows for term in found.terms)
     assert all(peak.height == 0 for peak in found.peaks)
-    assert "No single cause" in answer(found)
+    assert "No single cause" in explain_circle(found)
 
 
 def test_play_that_is_used_up_first_is_no_peak() -> None:
@@ -122,13 +130,13 @@ def test_one_direction_tells_squareness_and_servo_mismatch_as_one() -> None:
         found = diagnose(BALLBAR, [driven(BALLBAR, causes, 1, rng, SAMPLES)])
         term = found["squareness_or_servo"]
         assert term.value == pytest.approx(25e-6, rel=1e-3)  # v tau / 2 = R theta / 2
-        assert words in sentence(found, term)
-        assert "record the other direction" in answer(found)
+        assert words in cause_sentence(found, term)
+        assert "record the other direction" in explain_circle(found)
         with pytest.raises(KeyError):
             found["servo"]
     back = diagnose(BALLBAR, [driven(BALLBAR, Causes(delay=(1e-3, 0.0)), -1, rng, SAMPLES)])
     assert back["squareness_or_servo"].value == pytest.approx(-25e-6, rel=1e-3)
-    assert "X lags Z by 1.0 ms" in sentence(back, back["squareness_or_servo"])
+    assert "X lags Z by 1.0 ms" in cause_sentence(back, back["squareness_or_servo"])
 
 
 def test_a_peak_has_its_height_width_and_decay() -> None:
@@ -218,7 +226,7 @@ def test_the_axis_that_vibrates_is_named(axis: int, frequency: float, causes: Ca
     assert found.vibration is not None
     assert found.vibration.frequency == pytest.approx(frequency, rel=0.02)
     assert found.vibration.amplitude == pytest.approx(1e-6, rel=0.10)
-    assert f"swings {SMALL.axes[axis]} " in swinging(found)
+    assert f"swings {SMALL.axes[axis]} " in describe_vibrations(found)
 
 
 @pytest.mark.parametrize("circle", [SMALL, BALLBAR], ids=["small", "ballbar"])
@@ -228,7 +236,7 @@ def test_no_vibration_is_invented(circle: CircleUnderTest, causes: Causes) -> No
     for seed in range(20):
         found = both(circle, replace(causes, noise=0.2e-6 * (seed > 0)), seed)
         assert found.vibrations == ()
-        assert swinging(found) == ""
+        assert describe_vibrations(found) == ""
 
 
 def test_path_lag_is_told_from_the_radius_where_the_drives_are_known() -> None:
@@ -242,10 +250,10 @@ def test_path_lag_is_told_from_the_radius_where_the_drives_are_known() -> None:
     assert shrink == pytest.approx(14e-6, rel=0.01)
     assert found.lag == pytest.approx(-shrink, rel=1e-9)
     assert found["radius"].value == pytest.approx(-shrink + 2e-5 * SMALL.radius, abs=found["radius"].half)
-    assert "path lag makes -14.0 um" in sentence(found, found["radius"])
+    assert "path lag makes -14.0 um" in cause_sentence(found, found["radius"])
     unknown = both(SMALL, Causes(lag=(1 / K_v, 1 / K_v), noise=0.1e-6))
     assert unknown.lag is None
-    assert "one feed cannot tell which" in sentence(unknown, unknown["radius"])
+    assert "one feed cannot tell which" in cause_sentence(unknown, unknown["radius"])
 
 
 def test_unlike_amplitudes_are_told_with_what_the_response_makes_of_them() -> None:
@@ -253,13 +261,13 @@ def test_unlike_amplitudes_are_told_with_what_the_response_makes_of_them() -> No
     known = replace(SMALL, gain={"X": 1 + 100e-6, "Z": 1.0})
     found = both(known, Causes(scale=(140e-6, 0.0)))
     assert found.unlike == pytest.approx(100e-6, rel=1e-9)
-    words = sentence(found, found["scale"])
+    words = cause_sentence(found, found["scale"])
     assert "X travels 140 um/m more than Z: the response of the axes makes 100" in words
     assert "scale, temperature or pitch compensation 40" in words
     unknown = both(SMALL, Causes(scale=(140e-6, 0.0)))
-    assert "or an unlike decrease of the amplitude by path lag" in sentence(unknown, unknown["scale"])
+    assert "or an unlike decrease of the amplitude by path lag" in cause_sentence(unknown, unknown["scale"])
     other = both(replace(SMALL, gain={"X": 1.0, "Z": 1 + 100e-6}), Causes(scale=(0.0, 140e-6)))
-    assert "Z travels 140 um/m more than X: the response of the axes makes 100" in sentence(other, other["scale"])
+    assert "Z travels 140 um/m more than X: the response of the axes makes 100" in cause_sentence(other, other["scale"])
 
 
 # Coulomb friction through loops of first order, 30 um/(N.m) where they are slow: of odd multiples of the turn's rate.
@@ -435,7 +443,7 @@ def test_errors_that_no_term_describes_are_not_called_causes() -> None:
             paths.append(TurnedPath(path.angle, path.deviation + form, sense))
         found = diagnose(untold, paths)
         assert max(term.size for term in found.terms if term.key not in ("rest", "peaks")) < 3 * found.G
-        words = answer(found)
+        words = explain_circle(found)
         assert "No single cause stands out" in words or "explains less than half of G" in words, words
 
 

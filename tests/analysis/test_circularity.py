@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
-from feedsim.analysis.evaluate import bidirectional
+from feedsim.analysis.evaluate import bidirectional_figures
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, Dwell, Move
@@ -144,7 +144,7 @@ def test_both_directions_together() -> None:
         }
         later = t[-1] + 1
         found = values(
-            bidirectional(
+            bidirectional_figures(
                 Trace(time, columns), turn(1), Turn(("X", "Z"), CENTRE, RADIUS, -1, later + LAP, later + 2 * LAP)
             )
         )

@@ -17,7 +17,7 @@ from feedsim.analysis.contour_error import ContourError, contour_error, per_bloc
 from feedsim.files.trace import Trace
 from feedsim.motions.part_program import Motion, Moves
 from feedsim.motions.planner.nearest import ProgrammedPath
-from feedsim.motions.program import Programmed
+from feedsim.motions.program import ProgrammedGeometry
 from feedsim.simulation.nc import Program, Segment
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ def evaluated(moves: Moves, path: ProgrammedPath, at: Any, delay: float, frictio
     )
     ends = path.s / 0.05
     plan = SimpleNamespace(start_time=ends[:-1], end_time=ends[1:], notes=())
-    programmed = Programmed(moves, path, plan, 0.0, time, np.minimum(0.05 * time, path.s[-1]), names)  # type: ignore[arg-type]
+    programmed = ProgrammedGeometry(moves, path, plan, 0.0, time, np.minimum(0.05 * time, path.s[-1]), names)  # type: ignore[arg-type]
     segment = Segment("program", 0, 0.0, end, "", {}, {}, names, programmed)
     columns = {f"{axis}.x_a": np.asarray(at(time)[i]) for i, axis in enumerate(names)}
     trace = Trace(time, columns, dict.fromkeys(columns, "m"))

@@ -14,12 +14,12 @@ from scipy.stats import t as student
 from feedsim.analysis.history import (
     ERROR_RATE,
     Change,
-    Fitted,
+    FittedChange,
     Series,
     changes,
-    crossing,
+    find_limit_crossing,
+    fit_weighted,
     scatter,
-    weighted,
 )
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def test_the_date_of_a_limit_lies_in_its_interval(between: float) -> None:
         days = months(12, random)
         rate = 0.1 / (11 * MONTH)
         one = changes([series(days, 1 - rate * days, RELATIVE[0], between, random)])[0]
-        at = crossing(one.model, 0.8)
+        at = find_limit_crossing(one.model, 0.8)
         if one.changed:
             count += 1
             assert at.state == "ahead"
@@ -124,7 +124,7 @@ def test_the_interval_of_a_date_is_fiellers() -> None:
     random = np.random.default_rng(4)
     days = months(12, random)
     model = changes([series(days, 1 - 0.002 * days, 0.01, 0.0, random)])[0].model
-    at = crossing(model, 0.1)
+    at = find_limit_crossing(model, 0.1)
     design = np.column_stack([np.ones(12), days])
     weights = 1 / (model.series.sigma**2 + model.tau2)
     covariance = np.linalg.inv(design.T @ (design * weights[:, None]))
@@ -188,19 +188,21 @@ def test_limits_that_are_passed_and_that_are_not_reached() -> None:
     days = MONTH * np.arange(12.0)
     random = np.random.default_rng(8)
 
-    def model(level: Array) -> Fitted:
+    def model(level: Array) -> FittedChange:
         return changes([series(days, level, 0.001, 0.0, random)])[0].model
 
     wear, lost = model(1 - 0.1 * days / days[-1]), model(1 - 0.4 * (np.arange(12) >= 9))
-    assert crossing(wear, 0.95).state == "passed"
-    assert crossing(wear, 0.95).day == pytest.approx(days[-1] / 2, rel=0.05)
-    assert crossing(wear, 1.2).state == "never"
-    assert crossing(wear, 0.8, side=1).state == "beyond"  # as a compensation that does not help from the first date on
+    assert find_limit_crossing(wear, 0.95).state == "passed"
+    assert find_limit_crossing(wear, 0.95).day == pytest.approx(days[-1] / 2, rel=0.05)
+    assert find_limit_crossing(wear, 1.2).state == "never"
+    assert (
+        find_limit_crossing(wear, 0.8, side=1).state == "beyond"
+    )  # as a compensation that does not help from the first date on
     gained = model(-0.1 + 0.2 * days / days[-1])
-    assert crossing(gained, 0.0, side=1).state == "passed"
-    assert crossing(gained, 0.0, side=1).day == pytest.approx(days[-1] / 2, rel=0.05)
-    assert crossing(lost, 0.8).interval == (days[8], days[9])
-    assert crossing(lost, 0.5).state == "never"
+    assert find_limit_crossing(gained, 0.0, side=1).state == "passed"
+    assert find_limit_crossing(gained, 0.0, side=1).day == pytest.approx(days[-1] / 2, rel=0.05)
+    assert find_limit_crossing(lost, 0.8).interval == (days[8], days[9])
+    assert find_limit_crossing(lost, 0.5).state == "never"
 
 
 # --- Machines of one kind ---------------------------------------------------------------------------------------------
@@ -255,6 +257,6 @@ def test_intervals_of_the_scatter_hold_it_in_nineteen_of_twenty() -> None:
 def test_paule_and_mandel_make_the_sum_of_squares_the_degrees_of_freedom() -> None:
     random = np.random.default_rng(13)
     value, sigma = random.normal(size=20), random.uniform(0.01, 0.5, 20)
-    found = weighted(np.ones((1, 20, 1)), value, sigma)
+    found = fit_weighted(np.ones((1, 20, 1)), value, sigma)
     assert found.squares[0] == pytest.approx(19, rel=1e-8)
-    assert weighted(np.ones((1, 20, 1)), value, 100 * sigma).tau2[0] == 0.0
+    assert fit_weighted(np.ones((1, 20, 1)), value, 100 * sigma).tau2[0] == 0.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy.optimize import brentq
 
-from feedsim.analysis import Approach, Figure, PositioningTask, check, positioning, tasks
+from feedsim.analysis import Approach, Figure, PositioningTask, check, positioning_figures, tasks
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
 from feedsim.motions import Circle, Dwell, Move
@@ -62,7 +62,7 @@ def values(figures: dict[str, Figure]) -> dict[str, float]:
 
 @pytest.mark.parametrize("sense", [1, -1])
 def test_damped_sine(sense: int) -> None:
-    found = values(positioning(stop(sense), approach(sense)))
+    found = values(positioning_figures(stop(sense), approach(sense)))
     peak = math.atan(OMEGA / DECAY) / OMEGA
     # sampled every 250 us, the peak is missed by up to A (w h/2)^2/2 = 5e-10 m
     expected = AMPLITUDE * math.exp(-DECAY * peak) * math.sin(OMEGA * peak)
@@ -88,29 +88,29 @@ def test_damped_sine(sense: int) -> None:
 
 def test_ringing_does_not_mind_a_slow_creep() -> None:
     """Crossings of the position would: with 0.4 um of creep the first ones come late."""
-    found = values(positioning(stop(creep=0.4e-6), approach()))
+    found = values(positioning_figures(stop(creep=0.4e-6), approach()))
     assert found["ringing_frequency"] == pytest.approx(20.75, rel=2e-3)
 
 
 def test_band_is_a_setting_and_wide_bands_are_never_left() -> None:
-    assert values(positioning(stop(), approach(), band=5e-6))["settling_time"] == 0
-    narrow = values(positioning(stop(), approach(), band=0.5e-6))["settling_time"]
-    assert narrow > values(positioning(stop(), approach(), band=1e-6))["settling_time"] + 50
+    assert values(positioning_figures(stop(), approach(), band=5e-6))["settling_time"] == 0
+    narrow = values(positioning_figures(stop(), approach(), band=0.5e-6))["settling_time"]
+    assert narrow > values(positioning_figures(stop(), approach(), band=1e-6))["settling_time"] + 50
 
 
 def test_what_the_trace_does_not_show_is_nan_not_a_number() -> None:
     short = stop().between(0.0, END + 0.02)
-    found = values(positioning(short, approach()))
+    found = values(positioning_figures(short, approach()))
     assert math.isnan(found["settling_time"])  # still outside at the last sample
     assert math.isnan(found["ringing_frequency"])  # the window begins 30 ms after the end
     assert math.isnan(found["rest_torque"])  # 1 s after the end is not recorded
-    assert str(positioning(short, approach())["rest_torque"]) == "not determined"
+    assert str(positioning_figures(short, approach())["rest_torque"]) == "not determined"
 
 
 def test_no_overshoot_is_zero_not_negative() -> None:
     trace = stop()
     from_below = Trace(trace.time, {"Z.x_a": TARGET - np.abs(damped(trace.time)) - 1e-7})
-    found = values(positioning(from_below, approach()))
+    found = values(positioning_figures(from_below, approach()))
     assert found["overshoot"] == 0
     # nothing of what is not recorded: torques, the tool point
     assert not [name for name in found if "torque" in name or name.startswith("tool.")]
@@ -119,7 +119,7 @@ def test_no_overshoot_is_zero_not_negative() -> None:
 def test_tool_point_is_reported_beside_the_scale() -> None:
     trace = stop()
     tool = {**trace.columns, "tcp.x_Z": TARGET + 1.5 * damped(trace.time)}
-    found = values(positioning(Trace(trace.time, tool), approach()))
+    found = values(positioning_figures(Trace(trace.time, tool), approach()))
     assert found["tool.overshoot"] == pytest.approx(1.5 * found["overshoot"], rel=1e-9)
     assert found["tool.settling_time"] > found["settling_time"]
     assert found["tool.ringing_frequency"] == pytest.approx(20.75, abs=5e-3)
@@ -127,9 +127,9 @@ def test_tool_point_is_reported_beside_the_scale() -> None:
 
 def test_too_little_of_a_trace_is_refused() -> None:
     with pytest.raises(InputError, match=r"positioning needs Z\.x_a, which is not recorded; recorded: Z.M_a"):
-        positioning(stop().select(["Z.M_a"]), approach())
+        positioning_figures(stop().select(["Z.M_a"]), approach())
     with pytest.raises(InputError, match=r"needs the trace from 0\.2 to 1\.2 s .* recorded: 0 to 1 s"):
-        positioning(stop().between(0.0, 1.0), approach())
+        positioning_figures(stop().between(0.0, 1.0), approach())
     with pytest.raises(InputError, match="axis Z does not move"):
         Approach("Z", START, END, UNTIL, TARGET, TARGET, None)
 
@@ -224,7 +224,7 @@ def test_rest_too_short_to_evaluate_is_refused_before_the_run(motions: list[Any]
 def test_figures_of_a_rest_too_short_are_nan() -> None:
     """Cut 30 ms after the end: the first crest, 11.6 ms behind it, is there by luck."""
     for part, made in ((stop().between(0.0, END + 0.03), approach()), (stop(), replace(approach(), until=END + 0.03))):
-        found = values(positioning(part, made))
+        found = values(positioning_figures(part, made))
         assert all(math.isnan(found[name]) for name in ("overshoot", "settling_time", "ringing_frequency"))
         assert found["duration"] == pytest.approx(1.0)
         assert found["peak_torque"] == 20.0
@@ -235,12 +235,12 @@ def test_passing_through_the_band_is_not_settling() -> None:
     crossing = 3 * math.pi / OMEGA
     part = stop().between(0.0, END + crossing)
     assert abs(part["Z.x_a"][-1] - TARGET) < 1e-6
-    found = values(positioning(part, approach()))
+    found = values(positioning_figures(part, approach()))
     assert math.isnan(found["settling_time"])
     assert found["overshoot"] > 3  # 72 ms are enough for that
-    settled = values(positioning(stop(), approach()))["settling_time"]
+    settled = values(positioning_figures(stop(), approach()))["settling_time"]
     whole = stop().between(0.0, END + settled / 1e3 + 0.051)
-    assert values(positioning(whole, approach()))["settling_time"] == settled
+    assert values(positioning_figures(whole, approach()))["settling_time"] == settled
 
 
 def test_overshoot_that_still_grows_is_not_determined() -> None:
@@ -250,14 +250,14 @@ def test_overshoot_that_still_grows_is_not_determined() -> None:
         t = np.arange(0.0, END + 0.0605, 1e-3)
         x = np.where(t < END, 0.0, TARGET + level * (1 if level < 0 else t / t[-1]))
         x = np.where(t < END, x, x + 1e-8 * (t - END))
-        found = values(positioning(Trace(t, {"Z.x_a": x}), approach()))["overshoot"]
+        found = values(positioning_figures(Trace(t, {"Z.x_a": x}), approach()))["overshoot"]
         assert math.isfinite(found) == known, level
 
 
 def test_torque_of_a_plateau_that_has_not_settled_is_not_determined() -> None:
     for length, known in ((0.12, False), (0.13, True)):
         steady = (0.1, 0.1 + length)
-        found = values(positioning(stop(), replace(approach(), steady=steady)))["plateau_torque"]
+        found = values(positioning_figures(stop(), replace(approach(), steady=steady)))["plateau_torque"]
         assert math.isfinite(found) == known
 
 

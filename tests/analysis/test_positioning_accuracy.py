@@ -16,7 +16,7 @@ from feedsim.scenario import Scenario, load
 from feedsim.scenario.loads import TorqueNoise
 from feedsim.simulation.cosim import run
 from feedsim.simulation.cosim.loads import _random
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.simulation.nc import plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -102,7 +102,7 @@ def test_a_cycle_meets_every_target_from_both_sides(tmp_path: Path) -> None:
 def test_without_noise_an_axis_repeats_itself(tmp_path: Path, fmus: Path) -> None:
     """The first run has another past than the others, no more; friction leaves little after 0.2 s.
     Noise of the measuring system is what makes R, then, and it is the same again with the same seed."""
-    still = judged(run(scenario(tmp_path), fmus=fmus))
+    still = judge_run(run(scenario(tmp_path), fmus=fmus))
     figures = evaluate(still)
     assert figures["Z.R_up"].value < 0.05
     assert figures["Z.R_down"].value < 0.05
@@ -155,7 +155,7 @@ def test_a_load_at_random_has_its_size_and_its_corner() -> None:
 
 def test_the_report_has_the_sheet(tmp_path: Path, fmus: Path) -> None:
     """Every target has its row, the picture every reading, within what is shown at first."""
-    found = judged(run(scenario(tmp_path), fmus=fmus))
+    found = judge_run(run(scenario(tmp_path), fmus=fmus))
     figures = evaluate(found)
     report = report_of(found, figures, draw(found, figures))
     (sheet_of_scale, sheet_of_tool) = (

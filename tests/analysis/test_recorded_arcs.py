@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, further
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose, explain_circle, suggest_circles
 
 CIRCLE = CircleUnderTest(("X", "Z"), 0.1, 1 / 60, recorded=True)
 SWEEPS = (90, 180, 220, 300)
@@ -108,10 +108,10 @@ def test_lost_motion_is_that_of_the_reversals_on_the_arc() -> None:
     for name in ("lost_motion X", "peaks X"):
         assert not found[name].determined
         assert not found[name].shows
-    words = " ".join(further(found))
+    words = " ".join(suggest_circles(found))
     assert "An arc of 120 deg is no full turn: figures of ISO 230-4 are not determined." in words
     assert "lost motion of X" in words
-    assert "on an arc of 120 deg the radial deviation ranges over" in answer(found)
+    assert "on an arc of 120 deg the radial deviation ranges over" in explain_circle(found)
 
 
 @pytest.mark.parametrize("group", ["ellipse", "lost motion", "bent guides", "drift", "all"])

@@ -11,7 +11,7 @@ import pytest
 from drawn_circles import Causes
 from recorded_circles import Seen, recorded
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose, further
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose, suggest_circles
 from feedsim.analysis.circle.model import fit
 from feedsim.analysis.circle.setup import angle_offset
 
@@ -78,7 +78,7 @@ def test_terms_are_in_their_intervals_and_none_is_invented(group: str) -> None:
     for _ in range(DRAWS):
         circle, seen = drawn(rng, group)
         found = diagnose(circle, recorded(circle, seen, rng, 3000), centred=True)
-        bent = any("guides that are bent in third order" in each for each in further(found))
+        bent = any("guides that are bent in third order" in each for each in suggest_circles(found))
         for key, (value, radial) in true(circle, seen).items():
             term = found[key]
             within[key] += abs(term.value - value) <= term.half or (key == "squareness" and bent)
@@ -111,24 +111,25 @@ def test_angles_that_are_off_show_where_axes_reverse(degrees: float, senses: tup
     assert found.angles.seen
     off = 0.2 if len(senses) == 2 else 1.0
     assert math.degrees(found.angles.angle) == pytest.approx(degrees, abs=off)
-    assert any("as the places of the reversals show" in each for each in further(found))
+    assert any("as the places of the reversals show" in each for each in suggest_circles(found))
 
 
 def test_a_circle_that_separates_is_named() -> None:
-    bent = further(of(Seen(STEPS, third=(3e-6, 0.0))))
+    bent = suggest_circles(of(Seen(STEPS, third=(3e-6, 0.0))))
     assert any("a circle of half the radius does it (50 mm)" in each for each in bent)
     unseen = of(Seen(Causes(scale=(200e-6, 0.0), noise=0.05e-6), angle=math.radians(4)))
     assert any(
-        "slower circle of a smaller radius shows reversals (50 mm, 900 mm/min)" in each for each in further(unseen)
+        "slower circle of a smaller radius shows reversals (50 mm, 900 mm/min)" in each
+        for each in suggest_circles(unseen)
     )
     assert abs(unseen["squareness"].value) <= unseen["squareness"].half
-    one = further(of(Seen(STEPS), senses=(1,)))
+    one = suggest_circles(of(Seen(STEPS), senses=(1,)))
     assert any("a circle in the other direction separates them" in each for each in one)
-    pivot = further(of(Seen(STEPS, eccentric=(3e-6, 0.0))))
+    pivot = suggest_circles(of(Seen(STEPS, eccentric=(3e-6, 0.0))))
     assert any("a second turn in the same direction" in each for each in pivot)
-    fast = further(of(Seen(STEPS), replace(BALLBAR, radius=0.015, speed=0.17)))
+    fast = suggest_circles(of(Seen(STEPS), replace(BALLBAR, radius=0.015, speed=0.17)))
     assert any("a feed of 1.8e+03 mm/min separates them" in each for each in fast)
-    assert further(of(Seen(STEPS))) == []
+    assert suggest_circles(of(Seen(STEPS))) == []
 
 
 def test_no_edge_leaves_the_angles_unknown() -> None:

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 from friction_laws import Row, halves, main, summary, table  # noqa: E402
 
-from feedsim.estimation.identify.read import Provenance, Recorded  # noqa: E402
+from feedsim.estimation.identify.read import Provenance, RecordedAxis  # noqa: E402
 from feedsim.estimation.identify.record import Record  # noqa: E402
 
 I_P, J, F_C, SIGMA_2 = 0.02 / (2 * pi), 0.0164, 1.5, 0.01
@@ -37,7 +37,7 @@ def test_a_record_is_cut_in_the_middle_of_its_motion() -> None:
         "late.csv", np.arange(5000) * 2e-3, np.append(rest, record.torque), speed=np.append(rest, record.speed)
     )
     source = Provenance(Path("late.csv"), "", "Z", {}, pitch=0.02)
-    case = halves("late", [Recorded((longer,), source)], None, "Z")
+    case = halves("late", [RecordedAxis((longer,), source)], None, "Z")
     assert len(case.fitted[0]) == pytest.approx(4000, abs=20)
     assert len(case.fitted[0]) + len(case.judged[0]) == 5000
     assert case.options("gms").law == "gms"

@@ -136,7 +136,7 @@ def test_worse_is_judged_figure_by_figure() -> None:
         before = {"G": 8.0, "G_ls": 8.0, "tool.G": 8.2, "glitch_Z": 7.9, "dip_Z": -0.3, "mean": 2.0}
         figures = {f"before.{name}": Figure(value, "um", "") for name, value in before.items()}
         figures |= {f"after.{name}": Figure(after.get(name, 0.05), "um", "") for name in before}
-        return compensation._worse(figures, {"Z+": 7.9e-6, "Z-": 7.9e-6}, {"Z+": reversal, "Z-": 0.1e-6})
+        return compensation._warn_worse_figures(figures, {"Z+": 7.9e-6, "Z-": 7.9e-6}, {"Z+": reversal, "Z-": 0.1e-6})
 
     assert told() == []
     assert told(dip_Z=-0.37, mean=-2.07) == []  # less than a hundredth of G

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from command_helpers import feedsim, feedsim_process
-from feedsim.cli.commands import COMMANDS, Painted, painted, shown_streams
+from feedsim.cli.commands import COMMANDS, PaintedText, paint_text, shown_streams
 from feedsim.cli.kinds import INPUT_KINDS, kind
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -148,13 +148,13 @@ class Terminal(io.StringIO):
 def test_colours_are_for_terminals_that_show_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
-    assert painted("wrong", "red", Terminal()) == "\x1b[31mwrong\x1b[0m"
-    assert painted("wrong", "red", io.StringIO()) == painted("wrong", "", Terminal()) == "wrong"
+    assert paint_text("wrong", "red", Terminal()) == "\x1b[31mwrong\x1b[0m"
+    assert paint_text("wrong", "red", io.StringIO()) == paint_text("wrong", "", Terminal()) == "wrong"
     monkeypatch.setenv("TERM", "dumb")
-    assert painted("wrong", "red", Terminal()) == "wrong"
+    assert paint_text("wrong", "red", Terminal()) == "wrong"
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("NO_COLOR", "1")
-    assert painted("wrong", "red", Terminal()) == "wrong"
+    assert paint_text("wrong", "red", Terminal()) == "wrong"
 
 
 # What stands on the command line, the last word of it unfinished -> what is offered, and something that is not.
@@ -216,7 +216,7 @@ def test_a_traceback_and_colours_of_our_own() -> None:
             raise ValueError(HOSTILE)
         except ValueError:
             traceback.print_exc()
-        print(Painted("\x1b[31mwrong\x1b[0m"), file=sys.stderr)
+        print(PaintedText("\x1b[31mwrong\x1b[0m"), file=sys.stderr)
     assert "\x1b]" not in stream.getvalue()
     assert "\\u202e" in stream.getvalue()
     assert "\x1b[31mwrong\x1b[0m" in stream.getvalue()

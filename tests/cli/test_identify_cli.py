@@ -21,7 +21,7 @@ from feedsim.estimation.identify.motion import RecordTorque
 from feedsim.estimation.identify.read import distinct
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Correlation, Estimate, Plateau
-from feedsim.estimation.identify.stages import begins, merged_correlation, transitions
+from feedsim.estimation.identify.stages import merged_correlation, record_starts, transitions
 from feedsim.files.trace import write_csv
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.units import parameters
@@ -399,9 +399,9 @@ def test_files_count_one_after_the_other_and_pieces_by_their_time() -> None:
         time = np.linspace(first, last, 101)
         return Record("x", time, np.zeros(101), speed=np.ones(101))
 
-    assert begins([record(0.0, 10.0)]) == [0.0]
+    assert record_starts([record(0.0, 10.0)]) == [0.0]
     # The second begins 5 s after the first; the third is another file.
-    assert begins([record(2.0, 10.0), record(15.0, 20.0), record(0.0, 4.0), record(0.0, 1.0)]) == [
+    assert record_starts([record(2.0, 10.0), record(15.0, 20.0), record(0.0, 4.0), record(0.0, 1.0)]) == [
         0.0,
         13.0,
         18.0,

@@ -11,7 +11,7 @@ import pytest
 
 import feedsim as fs
 from feedsim.cli import main, parser
-from feedsim.cli.commands import COMMANDS, COMMON, GROUPS, OLD_COMMANDS, Command, commands, renamed
+from feedsim.cli.commands import COMMANDS, COMMON, GROUPS, OLD_COMMANDS, Command, commands, rename_words
 from feedsim.jobs.parameters import read_annotation
 
 OF_THE_TERMINAL = ("docs", "tools completion")  # what Python has no function for
@@ -43,25 +43,25 @@ def test_help_says_in_a_few_words_what_a_command_does(command: Command) -> None:
     examples = command.declared.examples.replace("\\\n", "").replace(" && ", "\n").splitlines()
     for line in examples:
         if line.startswith("feedsim "):
-            words, notes = renamed(shlex.split(line)[1:])
+            words, notes = rename_words(shlex.split(line)[1:])
             assert notes == [], "an example has an old name"
             parser(words[0]).parse_args(words)
 
 
 @pytest.mark.parametrize("old", OLD_COMMANDS)
 def test_old_names_are_commands_of_today(old: str) -> None:
-    words, (note,) = renamed([*old.split(), "a.yaml"])
+    words, (note,) = rename_words([*old.split(), "a.yaml"])
     assert words == [*OLD_COMMANDS[old].split(), "a.yaml"]
     assert note == f"feedsim {old} is called feedsim {OLD_COMMANDS[old]} now; the old name goes with the next version"
     assert any(" ".join(words).startswith(name) for name in COMMANDS)
 
 
 def test_identify_alone_is_of_friction() -> None:
-    words, notes = renamed(["identify", "log.csv", "--axis=Z"])
+    words, notes = rename_words(["identify", "log.csv", "--axis=Z"])
     assert words == ["identify", "friction", "log.csv", "--axes=Z"]
     assert len(notes) == 2
-    assert renamed(["identify", "drive", "x.csv"]) == (["identify", "drive", "x.csv"], [])
-    assert renamed(["identify", "--help"]) == (["identify", "--help"], [])
+    assert rename_words(["identify", "drive", "x.csv"]) == (["identify", "drive", "x.csv"], [])
+    assert rename_words(["identify", "--help"]) == (["identify", "--help"], [])
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_identify_alone_is_of_friction() -> None:
     ],
 )  # fmt: skip
 def test_dry_runs_of_studies_are_checks_without_the_options_that_these_lack(old: str, today: str) -> None:
-    words, notes = renamed(old.split())
+    words, notes = rename_words(old.split())
     assert words == today.split()
     assert len(notes) == (old != today)
 
@@ -87,7 +87,7 @@ def test_the_file_of_a_comparison_is_refused_with_what_to_type(typed: str, capsy
         main(["compare", "a", "b", *typed.split()])
     assert end.value.code == 2
     assert "--json > verdict.json" in capsys.readouterr().err
-    assert renamed(["compare", "a", "b", "--json"]) == (["compare", "a", "b", "--json"], [])
+    assert rename_words(["compare", "a", "b", "--json"]) == (["compare", "a", "b", "--json"], [])
 
 
 def test_defaults_in_the_help_name_the_arguments_in_capitals() -> None:

@@ -16,7 +16,7 @@ import yaml
 from feedsim import cli, scenario
 from feedsim.analysis import evaluate
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure import read_modes
 from feedsim.structure.pose_change import table_mismatch
 
@@ -310,7 +310,7 @@ def test_info_tells_of_a_table_that_is_not_the_structures(machine: Path, capsys:
 
 def test_one_axis_machine_runs(fmus: Path) -> None:
     """Stable, without warnings, and with an overshoot that a positioning table may have."""
-    result = judged(cosim.run(scenario.load(ROOT / "scenarios" / "one_axis.yaml"), fmus=fmus))
+    result = judge_run(cosim.run(scenario.load(ROOT / "scenarios" / "one_axis.yaml"), fmus=fmus))
     figures = evaluate(result)
     assert result.warnings == ()
     assert figures["X.overshoot"].unit == "um"

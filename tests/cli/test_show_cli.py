@@ -16,7 +16,7 @@ import pytest
 from command_helpers import feedsim
 from feedsim import cli
 from feedsim.analysis import diagnoses, evaluate
-from feedsim.report.show import _beside, _figures
+from feedsim.report.show import _figures, _values_text
 from report_helpers import circle_run, write_run
 
 
@@ -143,7 +143,7 @@ def test_the_first_line_says_what_has_changed(results: tuple[Path, Path], tmp_pa
     ],
 )
 def test_figures_beside_one_another(values: list[tuple[float, str] | None], text: str) -> None:
-    assert _beside(values) == text
+    assert _values_text(values) == text
 
 
 def test_results_that_are_alike_are_said_to_be(results: tuple[Path, Path], tmp_path: Path, capsys: Any) -> None:

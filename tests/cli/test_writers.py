@@ -81,8 +81,8 @@ def complete(out: Path, besides: Sequence[str] = ()) -> dict[str, object]:
 def test_a_second_one_is_refused_before_it_begins(
     command: str, place: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = "import sys\nfrom pathlib import Path\nfrom feedsim.foundation.owned import claimed\n"
-    code += "with claimed(Path('claimed')):\n    print('there', flush=True)\n    sys.stdin.readline()\n"
+    code = "import sys\nfrom pathlib import Path\nfrom feedsim.foundation.owned import claim_folder\n"
+    code += "with claim_folder(Path('claimed')):\n    print('there', flush=True)\n    sys.stdin.readline()\n"
     owner = subprocess.Popen(
         [sys.executable, "-c", code], cwd=place, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT / "master")},
@@ -199,7 +199,7 @@ def alive(group: int) -> bool:
 
 def test_a_move_that_was_cut_short_is_brought_to_its_end(tmp_path: Path) -> None:
     """Killed between two files: there is no summary, and the next one puts the rest in its place."""
-    from feedsim.report.results import MOVES, check_place
+    from feedsim.report.results import MOVES_FILE, check_place
 
     scratch = tmp_path / ".feedsim-x"
     (scratch / "fresh" / "figures").mkdir(parents=True)
@@ -209,7 +209,7 @@ def test_a_move_that_was_cut_short_is_brought_to_its_end(tmp_path: Path) -> None
     for name in ("summary.json", "figures/a.png"):
         (scratch / "fresh" / name).write_text("new")
     moves = {name: f".feedsim-x/fresh/{name}" for name in ("result.csv", "figures/a.png", "summary.json")}
-    (scratch / MOVES).write_text(json.dumps(moves | {"log.csv": None, "../outside": None}))
+    (scratch / MOVES_FILE).write_text(json.dumps(moves | {"log.csv": None, "../outside": None}))
     check_place(tmp_path, (), kind="run")
     found = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
     assert found == {"result.csv", "summary.json", "figures/a.png"}

@@ -11,12 +11,12 @@ import pytest
 
 from compare_helpers import changed, wave, written
 from feedsim.cli import main
-from feedsim.comparison import Options, Tolerances, compare, thinned
+from feedsim.comparison import Options, Tolerances, compare, thin_series
 from feedsim.files.trace import Array, Series, as_series
 
 TIGHT = Tolerances.parse(["1e-6"])
 DENSE = wave(3201)
-KEPT, BOUNDS = thinned(DENSE, 32)
+KEPT, BOUNDS = thin_series(DENSE, 32)
 
 
 def at(time: Array) -> Series:
@@ -151,7 +151,7 @@ def test_columns_and_time_that_are_left_out_are_told() -> None:
 @pytest.mark.parametrize(
     ("between", "reason"),
     [
-        (thinned(DENSE, 16)[1], "of another one: 201 rows"),
+        (thin_series(DENSE, 16)[1], "of another one: 201 rows"),
         (Series(BOUNDS.time, {"Z.x_a.below": BOUNDS["Z.x_a.below"]}), "column 'Z.x_a.below'; pairs"),
         (Series(BOUNDS.time, {"b.below": BOUNDS.time, "b.above": BOUNDS.time}), "NAME a column of the reference"),
         (changed(BOUNDS, Z__x_a__below=BOUNDS.time * np.nan), "no number in column 'Z.x_a.below' at 0 s"),
@@ -171,7 +171,7 @@ def test_bounds_are_those_of_the_dense_reference() -> None:
     """Brute force: line plus bounds hold every dense row, and one of them is touched in every interval."""
     random = np.random.default_rng(3)
     dense = as_series(Series(np.cumsum(random.uniform(0.1, 1, 101)), {"a": random.normal(size=101)}))
-    kept, between = thinned(dense, 7)
+    kept, between = thin_series(dense, 7)
     assert kept.time[-1] == dense.time[-1]
     for k in range(1, len(kept)):
         rows = (dense.time >= kept.time[k - 1]) & (dense.time <= kept.time[k])

@@ -11,7 +11,7 @@ import pytest
 from compare_helpers import changed, wave, written
 from feedsim.cli import main
 from feedsim.comparison import Comparison, Options, Tolerances, compare
-from feedsim.files.trace import Array, Series, Trace, matches, matching, read_series
+from feedsim.files.trace import Array, Series, Trace, match_names, matches, read_series
 from feedsim.foundation.errors import InputError
 
 
@@ -155,7 +155,7 @@ def test_elements_of_arrays_can_be_addressed() -> None:
 
 
 def test_a_name_means_itself_before_what_it_matches() -> None:
-    assert matching(["*", "a", "b"], ["*"]) == ["*"]
+    assert match_names(["*", "a", "b"], ["*"]) == ["*"]
     assert Trace(np.arange(2.0), {"a*": np.zeros(2), "ab": np.ones(2)}).select(["a*"]).names == ("a*",)
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feedsim.files.control.formats import opened
-from feedsim.files.control.reading import Value, read
-from feedsim.files.control.writing import changed, number
+from feedsim.files.control.formats import parse_file
+from feedsim.files.control.reading import Value, read_values
+from feedsim.files.control.writing import change_files, number
 from feedsim.foundation.errors import InputError
 
 NC = """\ufeff; Sch\xe4rfe \xb5m, by hand\r
@@ -58,8 +58,8 @@ def written_lines(text: str, new: str) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
 def test_only_the_value_differs(encoding: str) -> None:
-    archive = opened("nc.tea", NC.encode(encoding))
-    found = changed([archive], {"X": "X1"}, {"X": {"drive.K_v": 70.0, "drive.k_ffw": 1.0, "pitch": 0.004}})
+    archive = parse_file("nc.tea", NC.encode(encoding))
+    found = change_files([archive], {"X": "X1"}, {"X": {"drive.K_v": 70.0, "drive.k_ffw": 1.0, "pitch": 0.004}})
     new = found.contents["nc.tea"].decode(encoding)
     assert written_lines(NC, new) == [
         ("N31030 $MA_LEADSCREW_PITCH[AX1]=10\r", "N31030 $MA_LEADSCREW_PITCH[AX1]=8\r"),
@@ -75,12 +75,14 @@ def test_only_the_value_differs(encoding: str) -> None:
 
 def test_latin_text_keeps_its_bytes() -> None:
     data = NC.removeprefix("\ufeff").encode("latin-1")
-    found = changed([opened("nc.tea", data)], {"X": "X1"}, {"X": {"drive.K_v": 250 / 3 * 1.1}})
+    found = change_files([parse_file("nc.tea", data)], {"X": "X1"}, {"X": {"drive.K_v": 250 / 3 * 1.1}})
     assert found.contents["nc.tea"] == data.replace(b" = 5.00 ", b" = 5.5 ")
 
 
 def test_nothing_differs() -> None:
-    found = changed([opened("nc.tea", NC.encode())], {"X": "X1"}, {"X": {"drive.K_v": 5000 / 60, "drive.T_dyn": 0.0}})
+    found = change_files(
+        [parse_file("nc.tea", NC.encode())], {"X": "X1"}, {"X": {"drive.K_v": 5000 / 60, "drive.T_dyn": 0.0}}
+    )
     assert found.contents == {}
     assert found.changes == []
 
@@ -90,7 +92,7 @@ def test_what_goes_together_and_what_is_a_bit() -> None:
         "drive.filter_1.type": "band_stop", "drive.filter_1.f": 500.0, "drive.M_max": 60.0, "drive.K_p": 8.0,
         "drive.reference_model": False, "drive.p": 4.0, "drive.K_t": 2.0,
     }  # fmt: skip
-    found = changed([opened("ps.tea", DRIVE.encode())], {"X": "X"}, {"X": values})
+    found = change_files([parse_file("ps.tea", DRIVE.encode())], {"X": "X"}, {"X": values})
     assert written_lines(DRIVE, found.contents["ps.tea"].decode()) == [
         ("p1400[0]='H8029'", "p1400[0]='H8021'"),
         ("p1460[0]=7.5", "p1460[0]=8"),
@@ -111,7 +113,7 @@ def test_what_goes_together_and_what_is_a_bit() -> None:
     ],
 )
 def test_values_to_type(values: dict[str, Value], number_: str, reason: str) -> None:
-    found = changed([opened("nc.tea", NC.encode())], {"X": "X1"}, {"X": values})
+    found = change_files([parse_file("nc.tea", NC.encode())], {"X": "X1"}, {"X": values})
     assert found.contents == {}
     (change,) = found.changes
     assert (change.name.number, change.written) == (number_, False)
@@ -120,7 +122,9 @@ def test_values_to_type(values: dict[str, Value], number_: str, reason: str) -> 
 
 def test_a_filter_that_is_off_in_the_control() -> None:
     text = DRIVE.replace("'H0001'", "'H0000'")
-    found = changed([opened("ps.tea", text.encode())], {"X": "X"}, {"X": {"drive.filter_1.type": "second_order"}})
+    found = change_files(
+        [parse_file("ps.tea", text.encode())], {"X": "X"}, {"X": {"drive.filter_1.type": "second_order"}}
+    )
     assert found.contents == {}
     assert [each.name.number for each in found.changes] == ["p1656.0", "p1657"]
     assert "it does not act: p1656 is 'H0000'" in found.changes[1].reason
@@ -133,7 +137,7 @@ def test_the_bit_of_a_filter_that_is_to_be_typed(word: str, old: str) -> None:
     values: dict[str, Value] = {"drive.filter_1.type": "band_stop", "drive.filter_1.f": 455.0,
                                 "drive.filter_1.D_den": 0.9, "drive.filter_1.D_num": 0.1,
                                 "drive.filter_2.type": "off"}  # fmt: skip
-    found = changed([opened("ps.tea", text.encode())], {"X": "X"}, {"X": values})
+    found = change_files([parse_file("ps.tea", text.encode())], {"X": "X"}, {"X": values})
     assert found.contents == {}
     typed = {each.name.number: each for each in found.changes}
     assert {number: each.new for number, each in typed.items()} == {
@@ -145,16 +149,16 @@ def test_the_bit_of_a_filter_that_is_to_be_typed(word: str, old: str) -> None:
 
 def test_a_word_of_bits_keeps_its_form() -> None:
     text = DRIVE.replace("'H8029'", "8029H")
-    found = changed([opened("ps.tea", text.encode())], {"X": "X"}, {"X": {"drive.reference_model": False}})
+    found = change_files([parse_file("ps.tea", text.encode())], {"X": "X"}, {"X": {"drive.reference_model": False}})
     assert found.contents["ps.tea"].decode() == text.replace("8029H", "8021H")
 
 
 def test_checksums_and_containers_are_not_written() -> None:
     line = "N32200 $MA_POSCTRL_GAIN[0,AX1]=5 '2C3D'\n"
-    found = changed([opened("nc.tea", line.encode())], {"X": "AX1"}, {"X": {"drive.K_v": 50.0}})
+    found = change_files([parse_file("nc.tea", line.encode())], {"X": "AX1"}, {"X": {"drive.K_v": 50.0}})
     assert found.contents == {}
     assert "the line has a checksum" in found.changes[0].reason
-    found = changed([opened("a.arc", b"\x00\x01head\n" + line[:-8].encode() + b"\n")], {"X": "AX1"},
+    found = change_files([parse_file("a.arc", b"\x00\x01head\n" + line[:-8].encode() + b"\n")], {"X": "AX1"},
                     {"X": {"drive.K_v": 50.0}})  # fmt: skip
     assert found.contents == {}
     assert "a container" in found.changes[0].reason
@@ -162,29 +166,29 @@ def test_checksums_and_containers_are_not_written() -> None:
 
 def test_every_equal_place_is_written() -> None:
     text = "CHANDATA(1)\nN32200 $MA_POSCTRL_GAIN[0,AX1]=5\nCHANDATA(2)\nN32200 $MA_POSCTRL_GAIN[0,AX1]=5\n"
-    found = changed([opened("nc.tea", text.encode())], {"X": "AX1"}, {"X": {"drive.K_v": 50.0}})
+    found = change_files([parse_file("nc.tea", text.encode())], {"X": "AX1"}, {"X": {"drive.K_v": 50.0}})
     assert found.contents["nc.tea"].decode() == text.replace("=5", "=3")
 
 
 def test_two_axes_on_one_list_that_differ() -> None:
-    archive = opened("ps.tea", DRIVE.encode())
+    archive = parse_file("ps.tea", DRIVE.encode())
     with pytest.raises(InputError, match="p1460 is to be 3 and 4, by two axes or two parameters"):
-        changed([archive], {"X": "X", "Y": "Y"}, {"X": {"drive.K_p": 3.0}, "Y": {"drive.K_p": 4.0}},
+        change_files([archive], {"X": "X", "Y": "Y"}, {"X": {"drive.K_p": 3.0}, "Y": {"drive.K_p": 4.0}},
                 places={"X": ["drive"], "Y": ["drive"]})  # fmt: skip
 
 
 def test_a_list_of_whole_numbers() -> None:
     text = "getriebe[0].kv   5000   # gain\n"
-    found = changed([opened("x.lis", text.encode())], {"X": "X"}, {"X": {"drive.K_v": 60.0}})
+    found = change_files([parse_file("x.lis", text.encode())], {"X": "X"}, {"X": {"drive.K_v": 60.0}})
     assert found.contents["x.lis"].decode() == text.replace("5000", "6000")
-    found = changed([opened("x.lis", text.encode())], {"X": "X"}, {"X": {"drive.K_v": 60.001}})
+    found = change_files([parse_file("x.lis", text.encode())], {"X": "X"}, {"X": {"drive.K_v": 60.001}})
     assert found.contents == {}
     assert "whole numbers" in found.changes[0].reason
 
 
 def test_inches() -> None:
     text = "[TRAJ]\nLINEAR_UNITS = inch\n[JOINT_0]\nMAX_VELOCITY = 10 # inch/s\n"
-    found = changed([opened("m.ini", text.encode())], {"X": "JOINT_0"}, {"X": {"max_speed": 0.508}})
+    found = change_files([parse_file("m.ini", text.encode())], {"X": "JOINT_0"}, {"X": {"max_speed": 0.508}})
     assert found.contents["m.ini"].decode() == text.replace("= 10", "= 20")
 
 
@@ -204,10 +208,10 @@ RANDOM = st.fixed_dictionaries(
 @settings(max_examples=60)
 @given(RANDOM, st.sampled_from(ENCODINGS))
 def test_writing_and_reading_is_the_identity(values: dict[str, Value], encoding: str) -> None:
-    files = [opened("nc.tea", NC.encode(encoding)), opened("ps.tea", DRIVE.encode())]
-    found = changed(files, {"X": "X1"}, {"X": values})
-    made = [opened(each.name, found.contents.get(each.name, each.text.encode(each.encoding))) for each in files]
-    now = {each.parameter: each.value for each in read(made, {"X": "X1"}).taken}
+    files = [parse_file("nc.tea", NC.encode(encoding)), parse_file("ps.tea", DRIVE.encode())]
+    found = change_files(files, {"X": "X1"}, {"X": values})
+    made = [parse_file(each.name, found.contents.get(each.name, each.text.encode(each.encoding))) for each in files]
+    now = {each.parameter: each.value for each in read_values(made, {"X": "X1"}).taken}
     for parameter, value in values.items():
         if parameter == "drive.filter_1.type":
             assert now[parameter] == "second_order"
@@ -222,7 +226,7 @@ def test_writing_and_reading_is_the_identity(values: dict[str, Value], encoding:
         cut = [(a.span, b.span) for a, b in spans]
         assert outside(before.text, [a for a, _ in cut]) == outside(after.text, [b for _, b in cut])
     # A second export changes nothing.
-    assert changed(made, {"X": "X1"}, {"X": values}).contents == {}
+    assert change_files(made, {"X": "X1"}, {"X": values}).contents == {}
 
 
 def outside(text: str, spans: list[tuple[int, int]]) -> str:

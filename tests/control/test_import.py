@@ -9,13 +9,13 @@ import pytest
 
 from control_helpers import DRIVE, INI, NC, reasons, values
 from feedsim.files.control import table
-from feedsim.files.control.formats import opened
-from feedsim.files.control.reading import read, usual_ranges
+from feedsim.files.control.formats import parse_file
+from feedsim.files.control.reading import read_values, usual_ranges
 from feedsim.foundation.errors import InputError
 
 
 def test_machine_data() -> None:
-    found = read([opened("nc.tea", NC.encode())], {"X": "X1", "Y": "AX2"})
+    found = read_values([parse_file("nc.tea", NC.encode())], {"X": "X1", "Y": "AX2"})
     assert values(found, "X") == {
         "drive.K_v": pytest.approx(5000 / 60),
         "drive.k_ffw": 0.95,
@@ -33,16 +33,16 @@ def test_machine_data() -> None:
 
 
 def test_a_unit_that_was_checked() -> None:
-    archive = opened("nc.tea", NC.encode())
+    archive = parse_file("nc.tea", NC.encode())
     for checked in (["MD32810"], "all", ["all"]):
-        found = read([archive], {"X": "X1"}, checked=[checked] if isinstance(checked, str) else checked)
+        found = read_values([archive], {"X": "X1"}, checked=[checked] if isinstance(checked, str) else checked)
         assert values(found, "X")["drive.T_sym"] == 0.0035
     with pytest.raises(InputError, match="MD999 is no number of the table of names"):
-        read([archive], {"X": "X1"}, checked=["MD999"])
+        read_values([archive], {"X": "X1"}, checked=["MD999"])
 
 
 def test_parameters_of_a_drive() -> None:
-    found = read([opened("ps.tea", DRIVE.encode())], {"X": "X"})
+    found = read_values([parse_file("ps.tea", DRIVE.encode())], {"X": "X"})
     assert values(found, "X") == {
         "drive.K_p": 7.5,
         "drive.T_n": pytest.approx(0.0125),
@@ -81,7 +81,7 @@ def test_parameters_of_a_drive() -> None:
     ],
 )
 def test_values_of_a_drive_that_are_refused(change: tuple[str, str], number: str, reason: str) -> None:
-    found = read([opened("ps.tea", DRIVE.replace(*change).encode())], {"X": "X"})
+    found = read_values([parse_file("ps.tea", DRIVE.replace(*change).encode())], {"X": "X"})
     assert number not in {each.name.number for each in found.taken}
     assert reason in reasons(found)[number]
 
@@ -105,7 +105,7 @@ def test_values_of_a_drive_that_are_refused(change: tuple[str, str], number: str
 )  # fmt: skip
 def test_machine_data_that_are_refused(change: tuple[str, str], number: str, reason: str) -> None:
     assert change[0] in NC
-    found = read([opened("nc.tea", NC.replace(*change).encode())], {"X": "X1"})
+    found = read_values([parse_file("nc.tea", NC.replace(*change).encode())], {"X": "X1"})
     assert number not in {each.name.number for each in found.taken}
     assert reason in reasons(found)[number]
 
@@ -121,7 +121,7 @@ N32550 $MA_FRICT_COMP_ACCEL1[0,AX1]=0.02
 
 
 def test_a_friction_pulse() -> None:
-    found = read([opened("p.tea", PULSE.encode())], {"X": "AX1"}, checked=["all"])
+    found = read_values([parse_file("p.tea", PULSE.encode())], {"X": "AX1"}, checked=["all"])
     assert values(found, "X") == {
         "drive.friction_pulse.amplitude": pytest.approx(17.1e-3 / 60),
         "drive.friction_pulse.amplitude_min": pytest.approx(34e-3 / 60),
@@ -129,17 +129,17 @@ def test_a_friction_pulse() -> None:
         "drive.friction_pulse.adaptation": True,
         "drive.friction_pulse.acceleration_1": 0.02,
     }
-    off = opened("p.tea", PULSE.replace("ENABLE[0,AX1]=1", "ENABLE[0,AX1]=0", 1).encode())
-    assert values(read([off], {"X": "AX1"}), "X") == {"drive.friction_pulse.amplitude": "off"}
-    neural = opened("p.tea", PULSE.replace("MODE[0,AX1]=1", "MODE[0,AX1]=2").encode())
-    found = read([neural], {"X": "AX1"}, checked=["all"])
+    off = parse_file("p.tea", PULSE.replace("ENABLE[0,AX1]=1", "ENABLE[0,AX1]=0", 1).encode())
+    assert values(read_values([off], {"X": "AX1"}), "X") == {"drive.friction_pulse.amplitude": "off"}
+    neural = parse_file("p.tea", PULSE.replace("MODE[0,AX1]=1", "MODE[0,AX1]=2").encode())
+    found = read_values([neural], {"X": "AX1"}, checked=["all"])
     assert values(found, "X") == {}
     assert reasons(found)["MD32520"] == "it can be taken where FRICT_COMP_MODE=1; FRICT_COMP_MODE is 2"
 
 
 def test_what_the_files_do_not_have_is_assumed() -> None:
     text = NC.replace("N32620 $MA_FFW_MODE[AX1]=3\n", "").replace("N31050 $MA_DRIVE_AX_RATIO_DENOM[0,AX1]=1\n", "")
-    found = read([opened("nc.tea", text.encode())], {"X": "X1"}, assume={"FFW_MODE": "1", "MD31050": "1"})
+    found = read_values([parse_file("nc.tea", text.encode())], {"X": "X1"}, assume={"FFW_MODE": "1", "MD31050": "1"})
     assert values(found, "X")["drive.k_ffw"] == 0.95
     assert values(found, "X")["pitch"] == pytest.approx(0.005)
 
@@ -149,7 +149,7 @@ def test_a_record_that_cuts_a_line_takes_the_value_with_it(at: int) -> None:
     """A container has binary heads between its records; a head within a line must not leave a part of a number."""
     line = "N32200 $MA_POSCTRL_GAIN[0,AX1]=16.625"
     whole = NC.replace("N32200 $MA_POSCTRL_GAIN[0,AX1]=5\n", line[:at] + "\x00\x01head\x00\x02" + line[at:] + "\n")
-    found = read([opened("a.arc", whole.encode("latin-1"))], {"X": "AX1"})
+    found = read_values([parse_file("a.arc", whole.encode("latin-1"))], {"X": "AX1"})
     value = values(found, "X").get("drive.K_v")
     assert value is None or value == pytest.approx(16625 / 60)
     assert values(found, "X")["max_acceleration"] == 2.5
@@ -161,20 +161,20 @@ def test_a_container_with_drives() -> None:
     name = "".join(f"p199[{k}]={ord(c)}\n" for k, c in enumerate("SERVO_Y"))
     heads = [f"\x00\\_NC_ACT.DIR\\_N_PS00000{n}_TEAPS00000{n}.TEA\x00\x07/_N_SYSTEM_DRV/" for n in (3, 4)]
     data = ("\x02\x00_N_INITIAL_INI\x00" + NC + heads[0] + DRIVE + heads[1] + second + name).encode("latin-1")
-    archive = opened("all.arc", data)
+    archive = parse_file("all.arc", data)
     assert archive.container
     assert archive.places == {"PS000003": "", "PS000004": "SERVO_Y"}
-    found = read([archive], {"X": "X1", "Y": "Y1"})
+    found = read_values([archive], {"X": "X1", "Y": "Y1"})
     assert "drive.K_p" not in values(found, "X")
     assert (found.notes[0].code, found.notes[0].remedy) == ("drive-not-known", "--drives X=PS000003")
     assert "the files have PS000003, PS000004 (SERVO_Y)" in found.notes[0].text
-    found = read([archive], {"X": "X1", "Y": "Y1"}, places={"X": ["PS000003"], "Y": ["PS000004"]})
+    found = read_values([archive], {"X": "X1", "Y": "Y1"}, places={"X": ["PS000003"], "Y": ["PS000004"]})
     assert (values(found, "X")["drive.K_p"], values(found, "Y")["drive.K_p"]) == (7.5, 3.0)
     with pytest.raises(InputError, match="no drive object or list 'PS9'; the files have PS000003, PS000004"):
-        read([archive], {"X": "X1"}, places={"X": ["PS9"]})
+        read_values([archive], {"X": "X1"}, places={"X": ["PS9"]})
     with pytest.raises(InputError, match=r"no axis 'Q'; the files have AX1 \(X1\), AX2 \(Y1\)"):
-        read([archive], {"X": "Q"})
-    named = opened("all.arc", data.replace(b"p199[0]=83", b"p199[0]=89").replace(b"p199[1]=69", b"p199[1]=0"))
+        read_values([archive], {"X": "Q"})
+    named = parse_file("all.arc", data.replace(b"p199[0]=83", b"p199[0]=89").replace(b"p199[1]=69", b"p199[1]=0"))
     assert named.places["PS000004"] == "YRVO_Y"
 
 
@@ -183,45 +183,47 @@ def test_drives_of_two_units_with_the_same_numbers() -> None:
     head = "\x00\\_N_PS000003_TEAPS000003.TEA/_N_BUS3_DIR/_N_SLAVE{0}_DIR/\\BUS3.DIR\\SLAVE{0}.DIR\\"
     other = DRIVE.replace("p1460[0]=7.5", "p1460[0]=3")
     data = (NC + head.format(3) + DRIVE + head.format(11) + other).encode("latin-1")
-    archive = opened("all.arc", data)
+    archive = parse_file("all.arc", data)
     assert [*archive.places] == ["SLAVE3.PS000003", "SLAVE11.PS000003"]
     for place, gain in (("SLAVE3.PS000003", 7.5), ("SLAVE11.PS000003", 3.0)):
-        assert values(read([archive], {"X": "X1"}, places={"X": [place]}), "X")["drive.K_p"] == gain
+        assert values(read_values([archive], {"X": "X1"}, places={"X": [place]}), "X")["drive.K_p"] == gain
     with pytest.raises(InputError, match="no drive object or list 'PS000003'; the files have SLAVE3"):
-        read([archive], {"X": "X1"}, places={"X": ["PS000003"]})
-    one = opened("one.arc", (NC + head.format(3) + DRIVE).encode("latin-1"))
-    assert values(read([one], {"X": "X1"}, places={"X": ["PS000003"]}), "X")["drive.K_p"] == 7.5
+        read_values([archive], {"X": "X1"}, places={"X": ["PS000003"]})
+    one = parse_file("one.arc", (NC + head.format(3) + DRIVE).encode("latin-1"))
+    assert values(read_values([one], {"X": "X1"}, places={"X": ["PS000003"]}), "X")["drive.K_p"] == 7.5
 
 
 def test_much_that_is_not_understood_is_counted() -> None:
-    archive = opened("nc.tea", (NC + "what is this\n" * 5000).encode())
+    archive = parse_file("nc.tea", (NC + "what is this\n" * 5000).encode())
     assert archive.odd_count == 5000
     assert len(archive.odd) == 1000
 
 
 def test_words_of_bits_in_hexadecimal() -> None:
-    found = read([opened("d.tea", DRIVE.replace("'H0003'", "FH").encode())], {"X": "X"})
+    found = read_values([parse_file("d.tea", DRIVE.replace("'H0003'", "FH").encode())], {"X": "X"})
     assert values(found, "X")["drive.filter_1.f"] == 455.0
     # Without heads a word in letters is none: the file says no more than that the cell may be one.
-    assert values(read([opened("d.csv", b"p1460;EACH;5\n")], {"X": "X"}), "X") == {"drive.K_p": 5.0}
+    assert values(read_values([parse_file("d.csv", b"p1460;EACH;5\n")], {"X": "X"}), "X") == {"drive.K_p": 5.0}
 
 
 def test_a_condition_that_cannot_be_read_is_named() -> None:
-    found = read([opened("d.tea", DRIVE.replace("'H0003'", "0101B").encode())], {"X": "X"})
+    found = read_values([parse_file("d.tea", DRIVE.replace("'H0003'", "0101B").encode())], {"X": "X"})
     said = "p1656 is '0101B' in d.tea:16, which cannot be read; --assume p1656.0=1"
     assert said in reasons(found)["p1658"]
-    found = read([opened("d.tea", DRIVE.replace("'H0003'", "0101B").encode())], {"X": "X"}, assume={"p1656.0": "1"})
+    found = read_values(
+        [parse_file("d.tea", DRIVE.replace("'H0003'", "0101B").encode())], {"X": "X"}, assume={"p1656.0": "1"}
+    )
     assert values(found, "X")["drive.filter_1.f"] == 455.0
 
 
 def test_a_value_by_a_condition_names_the_condition() -> None:
     text = NC.replace("N32900 $MA_DYN_MATCH_ENABLE[AX1]=1", "N32900 $MA_DYN_MATCH_ENABLE[AX1]=0")
-    (case,) = (each for each in read([opened("nc.tea", text.encode())], {"X": "X1"}).taken
+    (case,) = (each for each in read_values([parse_file("nc.tea", text.encode())], {"X": "X1"}).taken
                if each.parameter == "drive.T_dyn")  # fmt: skip
     line = text[: text.index("N32900")].count("\n") + 1
     assert (case.number, case.text, case.unit, case.value) == ("MD32900", "0", "", 0.0)
     assert case.source == f"MD32900 = 0 (nc.tea:{line}): MD32910 does not act"
-    assumed = read([opened("nc.tea", NC.encode())], {"X": "X1"}, assume={"DYN_MATCH_ENABLE": "0"})
+    assumed = read_values([parse_file("nc.tea", NC.encode())], {"X": "X1"}, assume={"DYN_MATCH_ENABLE": "0"})
     (case,) = (each for each in assumed.taken if each.parameter == "drive.T_dyn")
     assert case.source == "DYN_MATCH_ENABLE = 0 (assumed): MD32910 does not act"
 
@@ -229,18 +231,18 @@ def test_a_value_by_a_condition_names_the_condition() -> None:
 @pytest.mark.parametrize("name", ["FOO", "MD32200", "MD32620", "p1656.7", "p1460"])
 def test_what_no_value_depends_on_is_not_assumed(name: str) -> None:
     with pytest.raises(InputError, match=rf"{name} is nothing that a value .* assumed of .*FFW_MODE, .*p1656\.0"):
-        read([opened("nc.tea", NC.encode())], {"X": "X1"}, assume={name: "1"})
+        read_values([parse_file("nc.tea", NC.encode())], {"X": "X1"}, assume={name: "1"})
 
 
 @pytest.mark.parametrize("name", ["MD10220", "SCALING_SYSTEM_IS_METRIC", "MD10230[9]", "p1656", "p115[1]", "p1521"])
 def test_what_values_depend_on_is_assumed(name: str) -> None:
-    read([opened("nc.tea", NC.encode())], {"X": "X1"}, assume={name: "1"})
+    read_values([parse_file("nc.tea", NC.encode())], {"X": "X1"}, assume={name: "1"})
 
 
 def test_an_axis_of_the_control_is_one_axis() -> None:
     for theirs in ("X1", "x1", "AX1"):
         with pytest.raises(InputError, match=f"X=X1 and Z={theirs}: the same axis of the control, given to two axes"):
-            read([opened("nc.tea", NC.encode())], {"X": "X1", "Z": theirs})
+            read_values([parse_file("nc.tea", NC.encode())], {"X": "X1", "Z": theirs})
 
 
 @pytest.mark.parametrize(
@@ -254,9 +256,9 @@ def test_an_axis_of_the_control_is_one_axis() -> None:
     ],
 )
 def test_values_far_outside_of_what_is_usual(change: tuple[str, str], said: str) -> None:
-    assert read([opened("nc.tea", NC.encode())], {"X": "X1"}).doubts == []
+    assert read_values([parse_file("nc.tea", NC.encode())], {"X": "X1"}).doubts == []
     assert change[0] in NC
-    (doubt,) = read([opened("nc.tea", NC.replace(*change).encode())], {"X": "X1"}).doubts
+    (doubt,) = read_values([parse_file("nc.tea", NC.replace(*change).encode())], {"X": "X1"}).doubts
     assert doubt.code == "value-unusual"
     assert said in doubt.text
 
@@ -274,18 +276,19 @@ def test_usual_ranges() -> None:
 def test_no_torque_is_no_limit() -> None:
     text = DRIVE.replace("p1520[0]=80", "p1520[0]=0").replace("p1521[0]=-80", "p1521[0]=0")
     assert (
-        reasons(read([opened("d.tea", text.encode())], {"X": "X"}))["p1520"] == "a drive without torque moves nothing"
+        reasons(read_values([parse_file("d.tea", text.encode())], {"X": "X"}))["p1520"]
+        == "a drive without torque moves nothing"
     )
 
 
 def test_no_file_of_a_control() -> None:
     with pytest.raises(InputError, match=r"archives/rnd\.arc: holds no parameters"):
-        opened("rnd.arc", b"a", PurePath("archives/rnd.arc"))
+        parse_file("rnd.arc", b"a", PurePath("archives/rnd.arc"))
     for data in (b"", b"a,b\nc,d\n", bytes(range(256)) * 20, b"name: machine\n", b"<a></a>"):
         with pytest.raises(InputError, match="holds no parameters of a control"):
-            opened("file", data)
+            parse_file("file", data)
 
 
 def test_files_of_several_controls() -> None:
     with pytest.raises(InputError, match="files of several controls: linuxcnc, sinumerik"):
-        read([opened("a", NC.encode()), opened("b", INI.encode())], {"X": "X1"})
+        read_values([parse_file("a", NC.encode()), parse_file("b", INI.encode())], {"X": "X1"})

@@ -12,9 +12,9 @@ import pytest
 
 import feedsim as fs
 from control_helpers import reasons, values
-from feedsim.files.control.formats import opened
-from feedsim.files.control.reading import read
-from feedsim.files.control.writing import changed
+from feedsim.files.control.formats import parse_file
+from feedsim.files.control.reading import read_values
+from feedsim.files.control.writing import change_files
 from feedsim.foundation.errors import InputError
 
 
@@ -43,9 +43,9 @@ def ini(kinematics: str, coordinates: str, joints: int = 6, section: str = "JOIN
 def test_joints_are_counted_along_the_coordinates_of_the_kinematics(
     kinematics: str, coordinates: str, joints: Mapping[str, int]
 ) -> None:
-    archive = opened("mill.ini", ini(kinematics, coordinates))
+    archive = parse_file("mill.ini", ini(kinematics, coordinates))
     for letter, joint in joints.items():
-        assert values(read([archive], {"X": letter}), "X") == {"max_speed": pytest.approx((10 + joint) * 1e-3)}
+        assert values(read_values([archive], {"X": letter}), "X") == {"max_speed": pytest.approx((10 + joint) * 1e-3)}
 
 
 @pytest.mark.parametrize(
@@ -59,20 +59,23 @@ def test_joints_are_counted_along_the_coordinates_of_the_kinematics(
     ],
 )
 def test_a_joint_that_is_not_known_is_asked_for(kinematics: str, coordinates: str, letter: str, reason: str) -> None:
-    archive = opened("mill.ini", ini(kinematics, coordinates))
+    archive = parse_file("mill.ini", ini(kinematics, coordinates))
     with pytest.raises(InputError, match=reason):
-        read([archive], {"X": letter})
-    assert values(read([archive], {"X": "JOINT_3"}), "X") == {"max_speed": pytest.approx(13e-3)}
+        read_values([archive], {"X": letter})
+    assert values(read_values([archive], {"X": "JOINT_3"}), "X") == {"max_speed": pytest.approx(13e-3)}
 
 
 GANTRY = ini("trivkins coordinates=XYYZ", "X Y Y Z", 4, more="[JOINT_1]\nBACKLASH=0.01\n[JOINT_2]\nBACKLASH=0.02\n")
 
 
 def test_both_joints_of_a_gantry_count() -> None:
-    found = read([opened("g.ini", GANTRY)], {"Y": "Y"})
+    found = read_values([parse_file("g.ini", GANTRY)], {"Y": "Y"})
     assert values(found, "Y") == {"max_speed": pytest.approx(11e-3)}
     assert "several values" in reasons(found)["BACKLASH"]
-    assert values(read([opened("g.ini", GANTRY)], {"Y": "JOINT_2"}), "Y")["drive.backlash_compensation.value"] == 20e-6
+    assert (
+        values(read_values([parse_file("g.ini", GANTRY)], {"Y": "JOINT_2"}), "Y")["drive.backlash_compensation.value"]
+        == 20e-6
+    )
 
 
 LIMITS = """[KINS]
@@ -112,7 +115,7 @@ MAX_VELOCITY = 1
 def test_of_several_limits_the_tightest_acts(
     of_all: str, of_axis: str, parameter: str, expected: float, note: str
 ) -> None:
-    found = read([opened("m.ini", LIMITS.format(of_all, of_axis).encode())], {"X": "X"})
+    found = read_values([parse_file("m.ini", LIMITS.format(of_all, of_axis).encode())], {"X": "X"})
     assert values(found, "X")[parameter] == pytest.approx(expected)
     assert any(note in finding.text for finding in found.notes) == bool(note)
 
@@ -125,13 +128,13 @@ def test_of_several_limits_the_tightest_acts(
     ],
 )
 def test_limits_that_cannot_be_compared_are_refused(of_axis: str, number: str, reason: str) -> None:
-    found = read([opened("m.ini", LIMITS.format("", of_axis).encode())], {"X": "X"})
+    found = read_values([parse_file("m.ini", LIMITS.format("", of_axis).encode())], {"X": "X"})
     assert reasons(found)[number] == reason
 
 
 def test_a_default_of_linuxcnc_is_not_passed_over() -> None:
     text = LIMITS.format("", "MAX_VELOCITY = 1").replace("MAX_VELOCITY = 50\n", "")
-    found = read([opened("m.ini", text.encode())], {"X": "X"})
+    found = read_values([parse_file("m.ini", text.encode())], {"X": "X"})
     assert reasons(found)["MAX_VELOCITY"] == "[JOINT_0] has no MAX_VELOCITY, and LinuxCNC's default acts"
 
 
@@ -145,15 +148,19 @@ def test_a_default_of_linuxcnc_is_not_passed_over() -> None:
 )
 def test_limits_are_written_where_they_act(new: float, lines: Sequence[tuple[str, str]]) -> None:
     text = LIMITS.format("", "MAX_VELOCITY = 1")
-    made = changed([opened("m.ini", text.encode())], {"X": "X"}, {"X": {"max_speed": new}}).contents["m.ini"].decode()
+    made = (
+        change_files([parse_file("m.ini", text.encode())], {"X": "X"}, {"X": {"max_speed": new}})
+        .contents["m.ini"]
+        .decode()
+    )
     pairs = zip(text.splitlines(), made.splitlines(), strict=True)
     assert [pair for pair in pairs if pair[0] != pair[1]] == lines
-    assert values(read([opened("m.ini", made.encode())], {"X": "X"}), "X")["max_speed"] == pytest.approx(new)
+    assert values(read_values([parse_file("m.ini", made.encode())], {"X": "X"}), "X")["max_speed"] == pytest.approx(new)
 
 
 def test_a_limit_of_all_axes_is_not_written() -> None:
-    archive = opened("m.ini", LIMITS.format("MAX_LINEAR_VELOCITY = .5", "").encode())
-    made = changed([archive], {"X": "X"}, {"X": {"max_speed": 0.02}})
+    archive = parse_file("m.ini", LIMITS.format("MAX_LINEAR_VELOCITY = .5", "").encode())
+    made = change_files([archive], {"X": "X"}, {"X": {"max_speed": 0.02}})
     assert made.contents == {}
     assert [change.reason for change in made.changes] == ["[TRAJ] limits all axes: type the value"]
 
@@ -162,9 +169,9 @@ def test_a_limit_of_all_axes_is_not_written() -> None:
     ("coordinates", "letter", "joint"), [("X Y Z", "X", 0), ("X Z", "Z", 2), ("X Y Z A", "AXIS_1", 1)]
 )
 def test_axes_of_older_releases_are_joints(coordinates: str, letter: str, joint: int) -> None:
-    archive = opened("mill.ini", ini("", coordinates, section="AXIS"))
+    archive = parse_file("mill.ini", ini("", coordinates, section="AXIS"))
     assert archive.form == "INI file of LinuxCNC up to 2.7"
-    assert values(read([archive], {"X": letter}), "X") == {"max_speed": pytest.approx((10 + joint) * 1e-3)}
+    assert values(read_values([archive], {"X": letter}), "X") == {"max_speed": pytest.approx((10 + joint) * 1e-3)}
 
 
 @pytest.mark.parametrize(
@@ -175,20 +182,20 @@ def test_axes_of_older_releases_are_joints(coordinates: str, letter: str, joint:
     ],
 )
 def test_checking_units_takes_no_value_that_is_wrong_otherwise(change: tuple[str, str], reason: str) -> None:
-    archive = opened("mill.ini", ini("trivkins", "X Y Z").replace(change[0].encode(), change[1].encode()))
-    assert reasons(read([archive], {"X": "X"}, checked=["all"]))["MAX_VELOCITY"] == reason
+    archive = parse_file("mill.ini", ini("trivkins", "X Y Z").replace(change[0].encode(), change[1].encode()))
+    assert reasons(read_values([archive], {"X": "X"}, checked=["all"]))["MAX_VELOCITY"] == reason
 
 
 @pytest.mark.parametrize("unit", ["inch", "0.03937007874016"])
 def test_units_by_name_and_by_number(unit: str) -> None:
-    archive = opened("mill.ini", ini("trivkins", "X Y Z").replace(b"UNITS = mm", f"UNITS = {unit}".encode()))
-    assert values(read([archive], {"X": "X"}), "X") == {"max_speed": pytest.approx(0.254)}
+    archive = parse_file("mill.ini", ini("trivkins", "X Y Z").replace(b"UNITS = mm", f"UNITS = {unit}".encode()))
+    assert values(read_values([archive], {"X": "X"}), "X") == {"max_speed": pytest.approx(0.254)}
 
 
 def test_a_section_that_is_damaged_does_not_go_on_with_the_one_before() -> None:
     text = ini("trivkins", "X Y Z", 1) + b"[HMOT-7I76]\nBACKLASH = 5\n[JOINT_1\nMAX_ACCELERATION = 7\n"
-    archive = opened("mill.ini", text)
-    assert values(read([archive], {"X": "X"}), "X") == {"max_speed": pytest.approx(0.01)}
+    archive = parse_file("mill.ini", text)
+    assert values(read_values([archive], {"X": "X"}), "X") == {"max_speed": pytest.approx(0.01)}
     assert "a section without its closing bracket" in {line.reason for line in archive.odd}
 
 
@@ -255,5 +262,5 @@ def test_values_are_written_into_the_file_that_has_them(tmp_path: Path) -> None:
     from feedsim.jobs.parameters import NO_WATCH
 
     main = laid(tmp_path, {"main.ini": HEAD + "[JOINT_1]\n#INCLUDE a.inc\n", "a.inc": JOINT.format(30)})
-    made = changed(read_files([main], NO_WATCH), {"Z": "Z"}, {"Z": {"max_acceleration": 0.2, "max_speed": 0.03}})
+    made = change_files(read_files([main], NO_WATCH), {"Z": "Z"}, {"Z": {"max_acceleration": 0.2, "max_speed": 0.03}})
     assert made.contents == {"a.inc": b"MAX_VELOCITY = 30\nMAX_ACCELERATION = 200\n"}

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import pytest
 
 from feedsim.files.control.archive import Archive
-from feedsim.files.control.formats import opened
-from feedsim.files.control.reading import Reading, Value, read
-from feedsim.files.control.writing import changed
+from feedsim.files.control.formats import parse_file
+from feedsim.files.control.reading import Reading, Value, read_values
+from feedsim.files.control.writing import change_files
 from feedsim.foundation.errors import InputError
 
 LATIN = "; Sch\xe4rfe der Achsen, \xb5m\n"
@@ -164,7 +164,7 @@ FORMS = [
 def file_of(case: Case, form: tuple[str, str, str]) -> tuple[Archive, bytes]:
     encoding, ends, mark = form
     data = (mark + case.text.replace("\n", ends)).encode(encoding)
-    return opened(case.name, data), data
+    return parse_file(case.name, data), data
 
 
 def values_of(reading: Reading, axis: str) -> dict[str, Value]:
@@ -175,7 +175,7 @@ def values_of(reading: Reading, axis: str) -> dict[str, Value]:
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_no_wrong_value(case: Case, form: tuple[str, str, str]) -> None:
     archive, data = file_of(case, form)
-    reading = read([archive], case.axes, places=case.places)
+    reading = read_values([archive], case.axes, places=case.places)
     for axis, expected in case.values.items():
         assert values_of(reading, axis) == pytest.approx(expected, rel=1e-12)
     assert archive.text.encode(archive.encoding) == data
@@ -185,10 +185,12 @@ def test_no_wrong_value(case: Case, form: tuple[str, str, str]) -> None:
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_what_was_read_is_written_back_as_it_stands(case: Case, form: tuple[str, str, str]) -> None:
     archive, data = file_of(case, form)
-    reading = read([archive], case.axes, places=case.places)
-    same = changed([archive], case.axes, {axis: values_of(reading, axis) for axis in case.axes}, places=case.places)
+    reading = read_values([archive], case.axes, places=case.places)
+    same = change_files(
+        [archive], case.axes, {axis: values_of(reading, axis) for axis in case.axes}, places=case.places
+    )
     assert same.contents == {}
-    new = changed(
+    new = change_files(
         [archive], case.axes, {axis: case.wanted if axis == "X" else {} for axis in case.axes}, places=case.places
     )
     old_text, new_text = case.change
@@ -198,7 +200,7 @@ def test_what_was_read_is_written_back_as_it_stands(case: Case, form: tuple[str,
         expected = expected.replace("[0,AX1]=.95".encode(encoding), "[0,AX1]=0.9".encode(encoding))
     assert expected != data
     assert new.contents == {case.name: expected}
-    again = read([opened(case.name, expected)], case.axes, places=case.places)
+    again = read_values([parse_file(case.name, expected)], case.axes, places=case.places)
     for parameter, value in case.wanted.items():
         assert values_of(again, "X")[parameter] == pytest.approx(value, rel=1e-9)
 
@@ -216,7 +218,7 @@ def test_what_was_read_is_written_back_as_it_stands(case: Case, form: tuple[str,
 )
 def test_what_is_left_open_is_refused(case: Case, axis: str, number: str, reason: str) -> None:
     archive, _ = file_of(case, FORMS[0])
-    reading = read([archive], case.axes, places=case.places)
+    reading = read_values([archive], case.axes, places=case.places)
     refused = {(item.axis, item.name.number): item.reason for item in reading.refused}
     assert reason in refused[axis, number]
 
@@ -233,14 +235,16 @@ def test_a_second_value_in_any_form_is_seen(line: str) -> None:
     """The last one holds in a control; whoever reads the first one alone takes a wrong value."""
     text = f"N32200 $MA_POSCTRL_GAIN[0,AX1]=5\n{line}\n"
     (refused,) = [
-        item for item in read([opened("nc.tea", text.encode())], {"X": "AX1"}).refused if item.name.number == "MD32200"
+        item
+        for item in read_values([parse_file("nc.tea", text.encode())], {"X": "AX1"}).refused
+        if item.name.number == "MD32200"
     ]
     assert "several values" in refused.reason
 
 
 def test_a_comparison_is_no_value() -> None:
     text = "IF $MA_POSCTRL_GAIN[0,AX1]==5\nN32200 $MA_POSCTRL_GAIN[0,AX1]=3\nENDIF\nN32300 $MA_MAX_AX_ACCEL[AX1]=2\n"
-    reading = read([opened("nc.tea", text.encode())], {"X": "AX1"})
+    reading = read_values([parse_file("nc.tea", text.encode())], {"X": "AX1"})
     assert values_of(reading, "X") == {"max_acceleration": 2.0}
     assert [item.reason for item in reading.refused if item.name.number == "MD32200"] == ["below an IF"]
 
@@ -270,7 +274,7 @@ ASSIGNED = "N10 IF R1==7\nN20 $MA_MAX_AX_ACCEL[0,AX1]=4\nENDIF\n$MA_BACKLASH[0,A
 def test_what_programs_set_is_no_value_of_an_archive(archive: str, program: str) -> None:
     """Values of the machine data are taken all the same, and what only a program sets is refused with that reason."""
     text = archive.format(data=DATA, program=ASSIGNED)
-    reading = read([opened("a.arc", text.encode())], {"X": "AX1"}, checked=["all"])
+    reading = read_values([parse_file("a.arc", text.encode())], {"X": "AX1"}, checked=["all"])
     assert values_of(reading, "X") == {"drive.K_v": pytest.approx(5000 / 60), "max_acceleration": 6.0}
     refused = {item.name.number: item.reason for item in reading.refused}
     assert refused["MD32450"] == f"only the program {program} sets it, when it runs"
@@ -279,26 +283,29 @@ def test_what_programs_set_is_no_value_of_an_archive(archive: str, program: str)
 
 def test_a_condition_that_only_a_program_sets_is_missing() -> None:
     text = "%_N_AX_TEA\nN32610 $MA_VELO_FFW_WEIGHT[0,AX1]=0.9\n%_N_A_SPF\n$MA_FFW_MODE[AX1]=3\n"
-    refused = {item.name.number: item.reason for item in read([opened("a.arc", text.encode())], {"X": "AX1"}).refused}
+    refused = {
+        item.name.number: item.reason
+        for item in read_values([parse_file("a.arc", text.encode())], {"X": "AX1"}).refused
+    }
     assert refused["MD32610"].endswith("only the program _N_A_SPF sets it, when it runs")
 
 
 @pytest.mark.parametrize("name", ["slow.spf", "PART.MPF"])
 def test_a_program_by_itself_holds_no_machine_data(name: str) -> None:
     with pytest.raises(InputError, match="only programs set machine data here"):
-        opened(name, ASSIGNED.encode())
+        parse_file(name, ASSIGNED.encode())
 
 
 def test_a_value_below_an_if_is_not_taken_by_checking_units() -> None:
     text = "IF R1==1\nN32200 $MA_POSCTRL_GAIN[0,AX1]=3\nENDIF\n"
-    (refused,) = read([opened("nc.tea", text.encode())], {"X": "AX1"}, checked=["all"]).refused
+    (refused,) = read_values([parse_file("nc.tea", text.encode())], {"X": "AX1"}, checked=["all"]).refused
     assert refused.reason == "below an IF"
 
 
 def test_axes_are_named_in_another_file_of_the_same_control() -> None:
-    names = opened("nc.tea", b'N10000 $MN_AXCONF_MACHAX_NAME_TAB[1]="Y1"\n')
-    data = opened("ax.tea", DATA.replace("AX1", "AX2").encode())
-    assert values_of(read([names, data], {"Y": "Y1"}), "Y")["max_acceleration"] == 6.0
+    names = parse_file("nc.tea", b'N10000 $MN_AXCONF_MACHAX_NAME_TAB[1]="Y1"\n')
+    data = parse_file("ax.tea", DATA.replace("AX1", "AX2").encode())
+    assert values_of(read_values([names, data], {"Y": "Y1"}), "Y")["max_acceleration"] == 6.0
 
 
 @pytest.mark.parametrize(
@@ -308,13 +315,15 @@ def test_axes_are_named_in_another_file_of_the_same_control() -> None:
     ],
 )  # fmt: skip
 def test_bits_are_those_of_a_whole_number(text: str, value: float | None) -> None:
-    reading = read([opened("d.tea", f"{text}\np1657=1\np1658=455\n".encode())], {"X": "X"}, places={"X": ["drive"]})
+    reading = read_values(
+        [parse_file("d.tea", f"{text}\np1657=1\np1658=455\n".encode())], {"X": "X"}, places={"X": ["drive"]}
+    )
     assert values_of(reading, "X").get("drive.filter_1.f") == value
 
 
 def test_a_point_that_may_group_thousands_is_refused() -> None:
     table = "Parameter;Wert\np1460[0];1.250\np1462[0];12,5\np316[0];1.6\n"
-    reading = read([opened("p.csv", table.encode())], {"X": "p"})
+    reading = read_values([parse_file("p.csv", table.encode())], {"X": "p"})
     assert values_of(reading, "X") == {"drive.K_t": pytest.approx(1.6 / 2**0.5)}
     assert {item.name.number: item.reason for item in reading.refused} == {
         "p1460": "the table has decimal commas, so that its point may group thousands", "p1462": "no number"
@@ -324,5 +333,5 @@ def test_a_point_that_may_group_thousands_is_refused() -> None:
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_the_unit_of_a_column_is_read_in_every_encoding(encoding: str) -> None:
     table = "Paramètre;Valeur;Unité\np1462[0];5;s\np316[0];1.6;Nm/A\n"
-    (refused,) = read([opened("p.csv", table.encode(encoding))], {"X": "p"}).refused
+    (refused,) = read_values([parse_file("p.csv", table.encode(encoding))], {"X": "p"}).refused
     assert refused.reason == "the file has it in 's', the table of names in ms"

@@ -9,7 +9,7 @@ import pytest
 
 import feedsim as fs
 from feedsim.estimation.identify.read import Provenance
-from feedsim.estimation.identify.stages import Asked
+from feedsim.estimation.identify.stages import AxisRequest
 from feedsim.foundation.errors import InputError
 from feedsim.linear.judgement import Bristles
 from feedsim.report.provenance import axis_parameters
@@ -149,7 +149,7 @@ def test_identification_falls_back_to_values_of_its_own_law(law: str, shared: bo
     centre = SCENARIOS / "machines" / "test_centre"
     machine = fs.load_machine(centre, [f"axes.Z.friction={gms()}"])
     trace = Provenance(Path("log.csv"), "", "Z", {}, pitch=0.02)
-    fallback = Asked(law=law).with_traces([trace], machine).fallback
+    fallback = AxisRequest(law=law).with_traces([trace], machine).fallback
     assert ("sigma_0" in fallback, "spread" in fallback) == (shared, shared)
     assert (fallback["F_C"], fallback["sigma_2"]) == (1.6, 0.006)
 

@@ -16,9 +16,9 @@ from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Base, load_machine
 from feedsim.scenario.loads import ForceTable, ToolLoad
 from feedsim.simulation import cosim, judge, nc
-from feedsim.simulation.cosim.loads import Acting
+from feedsim.simulation.cosim.loads import ActingLoad
 from feedsim.simulation.cosim.schedule import REPORTED_EVERY
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def run(file: Path, fmus: Path, *overrides: str, native: bool | None = None) -> JudgedRun:
-    return judged(cosim.run(scenario.load(file, list(overrides)), fmus=fmus, native=native))
+    return judge_run(cosim.run(scenario.load(file, list(overrides)), fmus=fmus, native=native))
 
 
 def warnings_ahead(file: Path, fmus: Path, *overrides: str) -> tuple[Finding, ...]:
@@ -71,7 +71,7 @@ def test_means_are_those_of_the_course(held: bool) -> None:
         share = 0.0 if held else (t - time[row]) / (time[row + 1] - time[row])
         return float((1 - share) * values[row] + share * values[row + 1])
 
-    found = Acting("loads.0", load, time, values).means(edges)
+    found = ActingLoad("loads.0", load, time, values).means(edges)
     for i, mean in enumerate(found):
         a, b = edges[i], edges[i + 1]
         kinks = [t for t in time if a < t < b]
@@ -81,7 +81,7 @@ def test_means_are_those_of_the_course(held: bool) -> None:
 
 def test_a_constant_is_exactly_itself() -> None:
     load = ToolLoad(direction="X", table=ForceTable(time=(0.0, 9.0), values=(0.1, 0.1)))
-    acting = Acting("loads.0", load, np.array([0.0, 9.0]), np.array([0.1, 0.1]))
+    acting = ActingLoad("loads.0", load, np.array([0.0, 9.0]), np.array([0.1, 0.1]))
     assert set(acting.means(np.arange(5000) * 125e-6).tolist()) == {0.1}
 
 

@@ -20,7 +20,7 @@ from feedsim.simulation import cosim
 from feedsim.simulation.cosim import logged
 from feedsim.simulation.cosim.recording import recorded_columns
 from feedsim.simulation.cosim.run import logged_axes
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from report_helpers import write_run
 from scenario_helpers import MACHINE
 from scenario_helpers import scenario as described
@@ -250,7 +250,7 @@ def test_every_recorded_signal_of_an_axis_can_be_logged() -> None:
 def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path) -> None:
     settings = "logging: {noise: {i_q: 1 %}, delay: {i_q: 0.3 ms}, quantisation: {x_a: 1 nm}, seed: 5}\n"
     loaded = load(tmp_path, SHORT + settings + "recording: {interval: 125 us}\n")
-    run = judged(cosim.run(loaded, fmus=fmus))
+    run = judge_run(cosim.run(loaded, fmus=fmus))
     assert run.log is not None
     assert run.fine is not None
     assert run.log.names == ("Z.x_s", "Z.x_a", "Z.n_a", "Z.i_q")
@@ -286,10 +286,10 @@ def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path
 
 
 def test_without_logging_nothing_is_logged_and_an_older_log_goes(tmp_path: Path, fmus: Path) -> None:
-    first = judged(cosim.run(load(tmp_path, SHORT + "logging: {}"), fmus=fmus))
+    first = judge_run(cosim.run(load(tmp_path, SHORT + "logging: {}"), fmus=fmus))
     write_run(first, {}, tmp_path / "out")
     assert (tmp_path / "out" / "log.csv").is_file()
-    run = judged(cosim.run(load(tmp_path, SHORT), fmus=fmus))
+    run = judge_run(cosim.run(load(tmp_path, SHORT), fmus=fmus))
     assert (run.log, run.fine) == (None, None)
     for name in run.trace:
         np.testing.assert_array_equal(run.trace[name], first.trace[name])
@@ -306,7 +306,7 @@ def test_strokes_through_the_whole_system_show_the_stationary_friction_in_the_lo
         f"name: s\nmachine: {MACHINE}\nmotions:\n  - {{kind: constant_speed, axis: Z, jerk: 10 m/s^3,"
         " speeds: [500 mm/min, 5 m/min]}\nlogging: {}\nrecording: {variables: [Z.x_a]}\n",
     )
-    run = judged(cosim.run(loaded, fmus=fmus))
+    run = judge_run(cosim.run(loaded, fmus=fmus))
     geometry = run.program.segments[0].geometry
     assert isinstance(geometry, Strokes)
     assert run.log is not None

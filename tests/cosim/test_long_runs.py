@@ -15,14 +15,14 @@ from feedsim import scenario
 from feedsim.files.trace import Table, Trace, least_and_largest, read_csv, release, stretches, write_csv
 from feedsim.files.trace import trace as table
 from feedsim.foundation.errors import InputError, OutputError, SimulationError
-from feedsim.foundation.outputs import replacing
+from feedsim.foundation.outputs import allow_replacement
 from feedsim.motions import circular
-from feedsim.motions.kind import Held, Joined
+from feedsim.motions.kind import HeldPoints, JoinedPoints
 from feedsim.report import run as report
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim import recording, schedule
 from feedsim.simulation.cosim.unit import Log
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.simulation.nc import program
 from feedsim.simulation.nc import program as spline
 from report_helpers import write_run
@@ -117,7 +117,7 @@ def test_long_traces_are_written_like_short_ones(tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize("per_point", [1, 2, 3])
 def test_spline_solved_in_blocks_is_the_same_to_the_bit(per_point: int) -> None:
     points = 0.8 + np.cumsum(np.random.default_rng(per_point).normal(size=3000)) * 1e-4
-    parts = Joined([points[:1], points[1:700], Held(float(points[699]), 5), points[705:]])
+    parts = JoinedPoints([points[:1], points[1:700], HeldPoints(float(points[699]), 5), points[705:]])
     points = parts[0 : len(parts)]
     instants = np.arange((len(points) + 40) * per_point)
     whole = spline.LongSpline(points, block=10**6)(instants, per_point)
@@ -132,10 +132,13 @@ def test_same_run_stretch_by_stretch(fmus: Path, everything_is_long: None, monke
     )  # fmt: skip
     loaded = scenario.load(CIRCLE, [*SHORT, *settings])
     found: list[Trace] = []
-    runs = [judged(cosim.run(loaded, fmus=fmus, sink=found.append)), judged(cosim.run(loaded, fmus=fmus, native=False))]
+    runs = [
+        judge_run(cosim.run(loaded, fmus=fmus, sink=found.append)),
+        judge_run(cosim.run(loaded, fmus=fmus, native=False)),
+    ]
     long_setpoints = nc.plan(loaded)
     monkeypatch.undo()
-    short = judged(cosim.run(loaded, fmus=fmus))
+    short = judge_run(cosim.run(loaded, fmus=fmus))
     for axis in loaded.machine.axes:
         np.testing.assert_array_equal(long_setpoints.x_s[axis], short.program.x_s[axis])
         np.testing.assert_array_equal(long_setpoints.n_ffw[axis], short.program.n_ffw[axis])
@@ -173,7 +176,7 @@ def test_units_are_asked_for_what_is_recorded_alone(fmus: Path, monkeypatch: pyt
 
 
 def test_residual_is_recorded_where_it_is_asked_for(fmus: Path) -> None:
-    run = judged(cosim.run(scenario.load(CIRCLE, [*SHORT, "recording.variables=['?.residual']"]), fmus=fmus))
+    run = judge_run(cosim.run(scenario.load(CIRCLE, [*SHORT, "recording.variables=['?.residual']"]), fmus=fmus))
     assert list(run.trace) == ["X.residual", "Y.residual", "Z.residual"]
     assert run.trace.unit("X.residual") == "J"
     assert run.trace["X.residual"][0] == 0.0
@@ -200,7 +203,7 @@ def test_what_failed_leaves_its_rows(native: bool | None, fmus: Path, tmp_path: 
         if done * 125e-6 > stopped:
             raise Stop
 
-    partial = report.growing(tmp_path / "out")
+    partial = report.growing_result(tmp_path / "out")
     with pytest.raises(Stop), partial:
         cosim.run(loaded, fmus=fmus, native=native, progress=progress, sink=partial)
     assert [file.name for file in (tmp_path / "out").iterdir()] == ["result.partial.csv"]
@@ -225,8 +228,8 @@ def test_rows_up_to_the_failing_cycle(native: bool | None, fmus: Path) -> None:
 def test_finished_run_has_no_partial_file(fmus: Path, tmp_path: Path) -> None:
     (tmp_path / "result.partial.csv").write_text("of another run")
     loaded = scenario.load(CIRCLE, [*SHORT])
-    with report.growing(tmp_path) as partial:
-        run = judged(cosim.run(loaded, fmus=fmus, sink=partial))
+    with report.growing_result(tmp_path) as partial:
+        run = judge_run(cosim.run(loaded, fmus=fmus, sink=partial))
         write_run(run, {}, tmp_path, partial)
     assert not partial.path.exists()
     write_csv(tmp_path / "afterwards.csv", run.trace)
@@ -257,10 +260,10 @@ def test_rows_stay_where_results_cannot_be_written(
     loaded = scenario.load(CIRCLE, [*SHORT])
     for earlier in ("result.csv", "report.html"):
         (tmp_path / earlier).write_text(f"old {earlier}")
-    partial = report.growing(tmp_path)
-    run = judged(cosim.run(loaded, fmus=fmus, sink=partial))
+    partial = report.growing_result(tmp_path)
+    run = judge_run(cosim.run(loaded, fmus=fmus, sink=partial))
     _failing(monkeypatch, name, tmp_path, away=away)
-    with replacing(), pytest.raises(OutputError, match="Permission denied"), partial:
+    with allow_replacement(), pytest.raises(OutputError, match="Permission denied"), partial:
         write_run(run, {}, tmp_path, partial)
     monkeypatch.undo()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["report.html", "result.csv", "result.partial.csv"]
@@ -275,11 +278,11 @@ def test_run_that_never_begins_takes_no_rows_away(fmus: Path, tmp_path: Path) ->
     kept, target = tmp_path / "result.partial.csv", tmp_path / "elsewhere.csv"
     target.write_text("of another run")
     kept.symlink_to(target)
-    with pytest.raises(InputError), report.growing(tmp_path) as partial:
+    with pytest.raises(InputError), report.growing_result(tmp_path) as partial:
         cosim.run(scenario.load(CIRCLE, [*SHORT]), fmus=tmp_path / "none", sink=partial)
     assert kept.read_text() == "of another run"
     assert not partial.has_rows
-    partial = report.growing(tmp_path)
+    partial = report.growing_result(tmp_path)
     cosim.run(scenario.load(CIRCLE, [*SHORT]), fmus=fmus, sink=partial)
     assert partial.has_rows
     assert kept.read_text().startswith("time [s],")
@@ -298,7 +301,7 @@ def peak(turns):
     settings = [f"motions.0.turns={turns}", "motions.0.radius=5 mm", "recording.interval=250 us", "evaluate=[]"]
     loaded = scenario.load(sys.argv[1], settings)
     tracemalloc.reset_peak()
-    with report.growing(sys.argv[2]) as partial:
+    with report.growing_result(sys.argv[2]) as partial:
         run = cosim.run(loaded, fmus=Path(sys.argv[3]), sink=partial)
     assert len(run.trace) > 2500 * turns
     return tracemalloc.get_traced_memory()[1]

@@ -26,7 +26,7 @@ from feedsim.simulation.cosim.operations import set_real
 from feedsim.simulation.cosim.schedule import REPORTED_EVERY, Cycle, Loop, Progress
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Port
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from feedsim.simulation.nc.excitation import multisine
 from feedsim_packager import toolchain
 from feedsim_packager.native import build as build_library
@@ -56,8 +56,8 @@ def folder(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def both(folder: Path, name: str, *overrides: str, **options: Any) -> tuple[JudgedRun, JudgedRun]:
     loaded = scenario.load(SCENARIOS / f"{name}.yaml", list(overrides))
-    native = judged(cosim.run(loaded, fmus=folder, native=True, **options))
-    python = judged(cosim.run(loaded, fmus=folder, native=False, **options))
+    native = judge_run(cosim.run(loaded, fmus=folder, native=True, **options))
+    python = judge_run(cosim.run(loaded, fmus=folder, native=False, **options))
     assert native.native
     assert not python.native
     return native, python
@@ -166,7 +166,7 @@ def test_failed_step_is_told_alike(substeps: int, folder: Path) -> None:
     overrides = [f"machine.axes.Z.drive.{e}" for e in ("K_p=1e300 N.m.s/rad", "M_max=1e308 N.m", "u_max=1e308 V")]
     overrides += [*SHORT["z_positioning"], "machine.axes.Z.drive.ideal_current_loop=true"]
     loaded = scenario.load(SCENARIOS / "z_positioning.yaml", [*overrides, f"coupling.substeps={substeps}"])
-    native, python = messages(lambda native: judged(cosim.run(loaded, fmus=folder, native=native)), SimulationError)
+    native, python = messages(lambda native: judge_run(cosim.run(loaded, fmus=folder, native=native)), SimulationError)
     assert native == python
     assert "s failed: " in native
 
@@ -183,7 +183,9 @@ def test_refused_input_is_told_alike_with_the_time(unit: str, variable: str, aft
         with System(loaded.machine, folder) as system:
             cycle = Cycle(system, SCHEMES["extrapolated"], 125e-6, 2)
             send = set_real(Port(system.units[unit], [variable]), values)
-            loop = Loop(cycle, [] if after else send, send if after else [], exchange.chosen(native, folder)[0])
+            loop = Loop(
+                cycle, [] if after else send, send if after else [], exchange.choose_native_loop(native, folder)[0]
+            )
             system.initialise(program, stop=1.0)
             loop.run(1000)
 
@@ -251,7 +253,7 @@ def run_short(folder: Path, **options: Any) -> JudgedRun:
         SCENARIOS / "z_positioning.yaml", ["motions=[{kind: dwell, duration: 20 ms}]", "evaluate=[]"]
     )
     with patch.dict(os.environ, FEEDSIM_FMUS=str(folder)):
-        return judged(cosim.run(loaded, **options))
+        return judge_run(cosim.run(loaded, **options))
 
 
 def test_archives_from_elsewhere_use_the_built_loop(folder: Path, tmp_path: Path) -> None:

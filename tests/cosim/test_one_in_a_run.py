@@ -13,8 +13,8 @@ from feedsim.cli import main
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation import nc
-from feedsim.simulation.cosim import executed, run
-from feedsim.simulation.judge import JudgedRun, check, judged
+from feedsim.simulation.cosim import describe_programs, run
+from feedsim.simulation.judge import JudgedRun, check, judge_run
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 SHORT = ("motions.0.by.Z=1 mm", "motions.1.duration=0.05 s", "recording.interval=125 us")
@@ -34,7 +34,7 @@ def both(scenario: str, *changes: str, native: bool | None = None) -> tuple[Judg
     apart = load_scenario(file, changes)
     program = nc.plan(apart)
     one = load_scenario(file, [*changes, ONE])
-    return judged(run(apart, program=program, native=native)), judged(run(one, program=program, native=native))
+    return judge_run(run(apart, program=program, native=native)), judge_run(run(one, program=program, native=native))
 
 
 def assert_same(apart: JudgedRun, one: JudgedRun) -> None:
@@ -78,7 +78,7 @@ def test_loads_logs_and_feedforward() -> None:
     apart, one = (load_scenario(SCENARIOS / "z_positioning.yaml", [*changes, *more]) for more in ((), (ONE,)))
     program = nc.plan(apart)
     torque = {"Z": np.sin(np.arange((len(program.time) - 1) * 8 + 1) * 0.01)}
-    found = [judged(run(each, program=program, torque_feedforward=torque)) for each in (apart, one)]
+    found = [judge_run(run(each, program=program, torque_feedforward=torque)) for each in (apart, one)]
     assert_same(*found)
     assert found[1].loads[0].given > 0
     for log in ("fine", "log"):
@@ -120,10 +120,10 @@ def test_what_the_unit_says_is_told_with_the_part() -> None:
 
 def test_whose_program_is_executed_is_told(fmus: Path, tmp_path: Path) -> None:
     plan = load_scenario(SCENARIOS / "z_positioning.yaml", [ONE])
-    assert executed(plan.machine, fmus, plan.coupling) == []
+    assert describe_programs(plan.machine, fmus, plan.coupling) == []
     other = tmp_path / "machine.fmu"
     with ZipFile(fmus / "machine.fmu") as given, ZipFile(other, "w") as changed:
         for name in given.namelist():
             changed.writestr(name, given.read(name) + (b"x" if name.startswith("binaries/") else b""))
-    (told,) = executed(plan.machine, tmp_path, plan.coupling)
+    (told,) = describe_programs(plan.machine, tmp_path, plan.coupling)
     assert told.startswith(f"executes {other} as machine: binaries/")

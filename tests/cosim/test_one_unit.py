@@ -28,7 +28,7 @@ from feedsim.scenario import Scenario
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation.cosim.run import run
 from feedsim.simulation.cosim.whole import pack_whole
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from feedsim.simulation.nc import Program, plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,7 +61,7 @@ def packed(folder: Path, fmus: Path, name: str, *changes: str) -> Packed:
     program = plan(scenario)
     archive = folder / "machine.fmu"
     pack_whole(fmus / "machine.fmu", archive, scenario.machine, coupling=scenario.coupling, program=program)
-    return Packed(scenario, judged(run(scenario, program=program, fmus=fmus)), archive)
+    return Packed(scenario, judge_run(run(scenario, program=program, fmus=fmus)), archive)
 
 
 def callbacks(said: list[str]) -> fmi2CallbackFunctions:

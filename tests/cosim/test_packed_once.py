@@ -24,7 +24,7 @@ def packs(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
         return original(*given, **named)  # type: ignore[arg-type]
 
     monkeypatch.setattr(plant, "pack", counted)
-    monkeypatch.setattr(plant, "_PACKED", {})
+    monkeypatch.setattr(plant, "_PACKED_ARCHIVES", {})
     return made
 
 
@@ -58,6 +58,6 @@ def test_bounded(packs: list[Path], fmus: Path) -> None:
     for i in range(plant.MAX_PACKED_PLANTS + 2):
         guid(folder, fmus, f"machine.name=M{i}")
     assert len(packs) == plant.MAX_PACKED_PLANTS + 2
-    assert len(plant._PACKED) == plant.MAX_PACKED_PLANTS
+    assert len(plant._PACKED_ARCHIVES) == plant.MAX_PACKED_PLANTS
     guid(folder, fmus, f"machine.name=M{plant.MAX_PACKED_PLANTS + 1}")  # one of the latest
     assert len(packs) == plant.MAX_PACKED_PLANTS + 2

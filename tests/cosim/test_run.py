@@ -17,7 +17,7 @@ from feedsim.simulation.cosim import unpacked
 from feedsim.simulation.cosim.operations import Interpreter, do_step
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unpacked import STORE
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 # A short reversal of all axes at once: every unit works, every branch of the friction is passed.
@@ -39,7 +39,7 @@ def short(tmp_path: Path) -> Path:
 
 
 def run(file: Path, fmus: Path, *overrides: str) -> JudgedRun:
-    return judged(cosim.run(scenario.load(file, list(overrides)), fmus=fmus))
+    return judge_run(cosim.run(scenario.load(file, list(overrides)), fmus=fmus))
 
 
 def test_two_runs_are_bit_identical(short: Path, fmus: Path) -> None:

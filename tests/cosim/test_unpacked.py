@@ -207,7 +207,7 @@ def test_the_bytes_of_an_archive_at_rest_are_read_once(
     for _ in range(2):  # just written: its times do not yet tell its states apart
         Archive(file).close()
     assert len(read) == 2
-    monkeypatch.setattr(unpacked, "RESTED", -(10**12))
+    monkeypatch.setattr(unpacked, "MIN_FILE_AGE", -(10**12))
     for _ in range(3):
         Archive(file).close()
     assert len(read) == 3

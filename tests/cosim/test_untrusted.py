@@ -140,7 +140,7 @@ def test_a_document_type_in_any_encoding(friction: dict[str, bytes], tmp_path: P
 
 def test_more_than_it_may_unpack_to(friction: dict[str, bytes], tmp_path: Path) -> None:
     """Zeros deflate to a thousandth; what no run needs may be as large as it likes."""
-    zeros = bytes(unpacked.FREE + 1)
+    zeros = bytes(unpacked.FREE_BYTES + 1)
     said = refusal(write(tmp_path / "bomb.fmu", friction | {"resources/zeros": zeros}))
     assert "unpacks to" in said
     with Archive(write(tmp_path / "source.fmu", friction | {"sources/zeros": zeros})) as archive:

@@ -11,7 +11,7 @@ from scipy import signal, stats
 
 from feedsim.estimation import least_squares
 from feedsim.estimation.identify.result import Estimate, Status
-from feedsim.estimation.least_squares import Covariance, correlation_length, stretched
+from feedsim.estimation.least_squares import Covariance, correlated_middle, correlation_length
 
 ROWS, RUNS, POLE = 2000, 400, 0.9
 
@@ -27,8 +27,8 @@ def test_examples_of_docstrings() -> None:
      (1.0, math.nan, True, True)],
 )  # fmt: skip
 def test_the_rule(value: float, half: float, determined: bool, shows: bool) -> None:
-    assert least_squares.determined(value, half) is determined
-    assert least_squares.shows(value, half) is shows
+    assert least_squares.is_determined(value, half) is determined
+    assert least_squares.is_significant(value, half) is shows
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_the_covariance_is_the_scatter_of_many_fits() -> None:
     values = np.linalg.solve(normal, matrix.T @ noise.T).T
     told = []
     for each, own in zip(noise, values, strict=True):
-        middle = stretched(matrix, each - matrix @ own, 0.0, correlation_length)
+        middle = correlated_middle(matrix, each - matrix @ own, 0.0, correlation_length)
         told.append(Covariance.of(normal, hermitian=True).by(middle))
     scatter = np.std(values, axis=0)
     # 400 fits tell a standard deviation to 3.5 %; the fit takes two values of some 105 independent ones.

@@ -25,10 +25,10 @@ from feedsim.foundation.errors import SimulationError
 from feedsim.report import run as report
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim import worker
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from foreign import acme
 
-pytestmark = pytest.mark.skipif(not worker.AVAILABLE, reason="this system has no worker process")
+pytestmark = pytest.mark.skipif(not worker.WORKERS_AVAILABLE, reason="this system has no worker process")
 ROOT = Path(__file__).resolve().parents[2]
 AT = 0.05  # s, when the unit fails
 # Kinds of faulty.c, in its order.
@@ -158,7 +158,7 @@ def nothing_left(folder: Path) -> None:
 def test_a_run_says_who_and_when(fault: str, native: bool, place: Callable[[str], Path], fmus: Path) -> None:
     folder, (how, rows) = place(fault), FAULTS[fault]
     plan = scenario.load(folder / "s.yaml")
-    partial = report.growing(folder)
+    partial = report.growing_result(folder)
     with pytest.raises(SimulationError) as raised, partial:
         cosim.run(plan, fmus=fmus, native=native, sink=partial)
     said = str(raised.value)
@@ -302,9 +302,9 @@ import pickle, sys
 from feedsim import scenario
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim import worker
-from feedsim.simulation.judge import judged
-worker.AVAILABLE = False
-run = judged(cosim.run(scenario.load(sys.argv[1], [sys.argv[2]])))
+from feedsim.simulation.judge import judge_run
+worker.WORKERS_AVAILABLE = False
+run = judge_run(cosim.run(scenario.load(sys.argv[1], [sys.argv[2]])))
 with open(sys.argv[3], "wb") as file:
     pickle.dump((run.trace, run.warnings), file)
 """
@@ -312,7 +312,7 @@ with open(sys.argv[3], "wb") as file:
 
 def test_healthy_units_give_the_same_bits_here_and_in_a_worker(place: Callable[[str], Path], fmus: Path) -> None:
     folder, healthy = place("crash"), "machine.axes.X.friction.parameters.At=1000"
-    watched = judged(cosim.run(scenario.load(folder / "s.yaml", [healthy]), fmus=fmus))
+    watched = judge_run(cosim.run(scenario.load(folder / "s.yaml", [healthy]), fmus=fmus))
     environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master")}
     command = [sys.executable, "-c", HERE, str(folder / "s.yaml"), healthy, str(folder / "here.pickle")]
     subprocess.run(command, env=environment, check=True)

@@ -144,7 +144,7 @@ def test_the_sum_is_of_the_whole_archive(libraries: Libraries, tmp_path: Path) -
         path = acme.archive(tmp_path / "wrapped.fmu", "friction", libraries.friction, acme.FRICTION)
         with zipfile.ZipFile(path, "a") as package:
             package.writestr("resources/program.py", program)
-        sums.add(exchange.executing(path, "friction of X")[0])
+        sums.add(exchange.describe_archive_programs(path, "friction of X")[0])
     assert len(sums) == 2
 
 
@@ -191,4 +191,4 @@ def test_archives_that_are_named_apart(
     digest = hashlib.sha256(base.read_bytes()).hexdigest()
     said = capsys.readouterr().err
     assert f"executes {base} as the packed plant's trial: binaries/{folders()[0]}/plant.so; SHA-256 {digest}" in said
-    assert exchange.executing(fmus / "friction.fmu", "friction law") == []
+    assert exchange.describe_archive_programs(fmus / "friction.fmu", "friction law") == []

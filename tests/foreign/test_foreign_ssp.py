@@ -14,7 +14,7 @@ import pytest
 from feedsim import scenario
 from feedsim.foundation.errors import InputError
 from feedsim.simulation import cosim, ssp
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from foreign import acme
 from foreign.conftest import Libraries
 from foreign.test_foreign_units import MOTION, mapped, other_name, renamed, settings_of
@@ -40,7 +40,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
 
 
 def warnings_of(file: Path) -> str:
-    with ssp.opened(file) as found:
+    with ssp.open_system(file) as found:
         return "\n".join(map(str, found.warnings))
 
 
@@ -64,7 +64,7 @@ def test_another_makers_units_travel_along(acme_ssp: Path, fmus: Path) -> None:
     assert 'endConnector="PosActual"' in text
     assert '<ssd:Connector name="PosActual" kind="input">' in text
     assert 'name="Coulomb"' in files["resources/friction_X.ssv"].decode()
-    assert same(run_ssp(acme_ssp), judged(cosim.run(scenario.load(acme_ssp.with_name("s.yaml")), fmus=fmus)))
+    assert same(run_ssp(acme_ssp), judge_run(cosim.run(scenario.load(acme_ssp.with_name("s.yaml")), fmus=fmus)))
 
 
 def test_a_plain_file_whose_drive_is_not_ours(acme_ssp: Path, tmp_path: Path) -> None:
@@ -221,4 +221,4 @@ def test_units_that_declare_no_units_of_measurement(libraries: Libraries, fmus: 
         content for name, content in contents(tmp_path / "s.ssp").items() if name.endswith((".ssd", ".ssv"))
     )
     assert b'unit="1"' not in written
-    assert same(run_ssp(tmp_path / "s.ssp"), judged(cosim.run(plan, fmus=fmus)))
+    assert same(run_ssp(tmp_path / "s.ssp"), judge_run(cosim.run(plan, fmus=fmus)))

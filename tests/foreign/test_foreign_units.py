@@ -18,7 +18,7 @@ from feedsim.scenario.study import load_study
 from feedsim.simulation import cosim, judge
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.roles import start_value
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from foreign import acme
 from foreign.conftest import Libraries
 from ssp_helpers import SHORT, short_scenario
@@ -118,7 +118,7 @@ def exact(run: JudgedRun) -> Floats:
 def test_the_motion_is_that_of_the_two_laws(units: Path, fmus: Path, substeps: int, native: bool) -> None:
     """Rounding alone is between the two: 500 cycles of some 30 operations, each within 1.1e-16, in a loop that forgets
     within 50 ms, leave below 1e-12 of the largest value."""
-    done = judged(
+    done = judge_run(
         cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus, native=native)
     )
     for name, wanted in held(done, substeps).items():
@@ -130,7 +130,7 @@ def test_the_exchange_is_of_first_order(units: Path, fmus: Path) -> None:
     """Against friction that acts at every instant: halving the exchange step halves the error."""
     errors = []
     for substeps in (4, 8, 16):
-        done = judged(cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus))
+        done = judge_run(cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus))
         errors.append(float(np.max(np.abs(done.trace["X.x_a"] - exact(done)))))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 1) < 0.1), (errors, orders)
@@ -139,7 +139,7 @@ def test_the_exchange_is_of_first_order(units: Path, fmus: Path) -> None:
 def test_what_is_recorded_and_told(units: Path, fmus: Path) -> None:
     """Columns are in SI units; what stands for no variable is no column; a run says what it cannot know, once."""
     loaded = scenario.load(units / "s.yaml", [*mapped(units), "recording.variables=null"])
-    done = judged(cosim.run(loaded, fmus=fmus))
+    done = judge_run(cosim.run(loaded, fmus=fmus))
     own = [name for name in done.trace if name.startswith("X.")]
     assert own == [f"X.{each}" for each in ("x_s", "n_ffw", "x_a", "n_a", "M_a", "n_s", "torque_limited", "M_fr")]
     assert [done.trace.unit(f"X.{name}") for name in ("M_a", "n_s", "M_fr")] == ["N.m", "rad/s", "N.m"]
@@ -158,7 +158,7 @@ def test_what_is_recorded_and_told(units: Path, fmus: Path) -> None:
 
 def test_a_limit_of_another_drive_is_told(units: Path, fmus: Path) -> None:
     settings = [*mapped(units), "machine.axes.X.drive.parameters.Limit=30", "recording.variables=[X.x_a]"]
-    done = judged(cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus))
+    done = judge_run(cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus))
     assert ("torque-clipped", "X") in [(finding.code, finding.place) for finding in done.warnings]
 
 
@@ -174,7 +174,7 @@ def test_an_input_that_no_signal_is_given_to_can_be_held(units: Path, fmus: Path
     by = {}
     for value in ("50", "'0.5'", "'50 %'"):
         settings = [*mapped(units), f"machine.axes.X.drive.parameters.Override={value}"]
-        by[value] = judged(cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus))
+        by[value] = judge_run(cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus))
         assert not any("Override" in finding.text for finding in by[value].warnings)
     assert all(np.array_equal(by["50"].trace["X.x_a"], other.trace["X.x_a"]) for other in by.values())
     assert not np.array_equal(
@@ -243,7 +243,7 @@ def test_a_shipped_unit_under_other_names_gives_the_same_bits(
     plain = scenario.load(file)
     copies = {kind: renamed(fmus, tmp_path, kind) for kind in kinds}
     settings = settings_of(plain, "Z", copies.get("controller"), copies.get("friction"))
-    one, other = judged(cosim.run(plain, fmus=fmus)), judged(cosim.run(scenario.load(file, settings), fmus=fmus))
+    one, other = judge_run(cosim.run(plain, fmus=fmus)), judge_run(cosim.run(scenario.load(file, settings), fmus=fmus))
     assert list(one.trace) == list(other.trace)
     for name in one.trace:
         assert one.trace.unit(name) == other.trace.unit(name)
@@ -256,8 +256,8 @@ def test_every_scheme_serves_a_unit_that_can_do_all(fmus: Path, tmp_path: Path, 
     file = short_scenario(tmp_path, text=SHORT)
     settings = settings_of(scenario.load(file), "Z", None, renamed(fmus, tmp_path, "friction"))
     chosen = f"coupling.scheme={scheme}"
-    one = judged(cosim.run(scenario.load(file, [chosen]), fmus=fmus))
-    other = judged(cosim.run(scenario.load(file, [chosen, *settings]), fmus=fmus))
+    one = judge_run(cosim.run(scenario.load(file, [chosen]), fmus=fmus))
+    other = judge_run(cosim.run(scenario.load(file, [chosen, *settings]), fmus=fmus))
     assert all(np.array_equal(one.trace[name], other.trace[name]) for name in one.trace)
 
 

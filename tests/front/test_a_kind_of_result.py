@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Figure, FigureTable
 from feedsim.cli.commands import finish
 from feedsim.files.trace import Array, Trace
-from feedsim.foundation.arguments import Call, calling
+from feedsim.foundation.arguments import Call, call_context
 from feedsim.foundation.errors import Finding, InputError, OutputError
 from feedsim.jobs.parameters import command_line
 from feedsim.jobs.result import Kind, Result
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.content import FOLDER, Picture, Report, Step
-from feedsim.report.formatting import SIMULATED
+from feedsim.report.formatting import SIMULATED_COLOUR
 
 KIND = Kind("spectrum", ("lines.csv",), keeps=("*.yaml",))
 
@@ -50,7 +50,7 @@ def result_of(spectrum: Spectrum, begun: list[str]) -> Result[Spectrum]:
     def report() -> Report:
         begun.append("report")
         panel = Panel(
-            "", Axis("f", "Hz"), Axis("x", "µm"), [Curve("x", spectrum.frequency, spectrum.amplitude, SIMULATED)]
+            "", Axis("f", "Hz"), Axis("x", "µm"), [Curve("x", spectrum.frequency, spectrum.amplitude, SIMULATED_COLOUR)]
         )
         return Report(
             "Spectrum of Z", "1 axis", answer=["The highest line is at 20 Hz.", "It is the table's."],
@@ -63,9 +63,9 @@ def result_of(spectrum: Spectrum, begun: list[str]) -> Result[Spectrum]:
             main=[Picture("spectrum", "Spectrum", "Amplitude.", Chart([panel]))], footer="",
         )  # fmt: skip
 
-    def figures() -> Named:
+    def figures() -> FigureTable:
         begun.append("figures")
-        return Named({"Z.highest": Figure(spectrum.highest, "Hz", "highest line")})
+        return FigureTable({"Z.highest": Figure(spectrum.highest, "Hz", "highest line")})
 
     return Result(
         KIND, spectrum, report, figures=figures, details={"lines": len(spectrum)},
@@ -81,7 +81,7 @@ def begun() -> list[str]:
 @pytest.fixture
 def result(begun: list[str]) -> Result[Spectrum]:
     trace = Trace(np.arange(3.0), {"Z.x_a": np.zeros(3)}, {"Z.x_a": "m"})
-    with calling(Call({"figures": ()}, command_line)):
+    with call_context(Call({"figures": ()}, command_line)):
         return result_of(Spectrum(np.array([10.0, 20.0]), np.array([1.0, 3.0]), trace), begun)
 
 

@@ -29,7 +29,7 @@ from feedsim.scenario.structure.checks import load_structure
 from feedsim.scenario.study import load_study
 from feedsim.simulation import judge, ssp
 from feedsim.simulation.cosim.archive import Archive, folders
-from feedsim.simulation.cosim.roles import foreign
+from feedsim.simulation.cosim.roles import connect_foreign_unit
 from feedsim.structure.matrices import build as market
 from feedsim.structure.matrices import calculix
 from feedsim.structure.modes import read_modes
@@ -68,7 +68,7 @@ def _open_archive(path: Path) -> None:
         with suppress(FeedsimError):
             archive.library()
         if "x_s" not in archive.variables and "tool.F_X" not in archive.variables:  # not one of ours
-            foreign(DRIVE, "Z", unit, archive)
+            connect_foreign_unit(DRIVE, "Z", unit, archive)
 
 
 class _Names:
@@ -82,7 +82,7 @@ class _Names:
 
 
 def _judge(path: Path) -> None:
-    with ssp.opened(path) as found:
+    with ssp.open_system(path) as found:
         check_evaluation(found.scenario, found.program)
         judge.check(found.scenario, found.program, fmus=found.fmus)
 
@@ -94,11 +94,11 @@ def _poses(path: Path) -> None:
 
 def read_control(path: Path) -> None:
     """A file of a control, and the values of its first axis or list."""
-    archive = formats.opened(path.name, path.read_bytes(), path)
+    archive = formats.parse_file(path.name, path.read_bytes(), path)
     axes = [entry.axis for entry in archive.entries if entry.axis] or list(archive.places)
     if axes:
         with suppress(FeedsimError):
-            reading.read([archive], {"X": axes[0]}, checked=["all"])
+            reading.read_values([archive], {"X": axes[0]}, checked=["all"])
 
 
 def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:

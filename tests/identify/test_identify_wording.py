@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim.estimation.identify.parameters import EXCESS
-from feedsim.estimation.identify.uncertainty import GOES_WITH, doubts, verdict
+from feedsim.estimation.identify.uncertainty import GOES_WITH, verdict, warn_undetermined
 from identification_helpers import TRUE, estimates, stationary
 
 
@@ -78,7 +78,7 @@ def test_each_reason_is_said_once() -> None:
     }
     said = ("sigma_1: its 95 % interval is +-135 % of the value", "M_0 and asymmetry: one direction only",
             "gamma: its 95 % interval is +-278 % of the value")  # fmt: skip
-    found = doubts(held, None)
+    found = warn_undetermined(held, None)
     assert {finding.code for finding in found} == {"parameter-undetermined"}
     assert tuple(finding.text for finding in found) == said
     assert [finding.place for finding in found] == ["sigma_1", "M_0, asymmetry", "gamma"]
@@ -86,5 +86,5 @@ def test_each_reason_is_said_once() -> None:
     first = stationary(estimates())
     load = replace(first.estimates["M_0"], status="undetermined", reason="one direction only")
     prior = replace(first, estimates={**first.estimates, "M_0": load})
-    left = tuple(finding.text for finding in doubts(held, prior))
+    left = tuple(finding.text for finding in warn_undetermined(held, prior))
     assert left == (said[0], "asymmetry: one direction only", said[2])

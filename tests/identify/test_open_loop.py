@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.estimation.identify.friction_file import drift_texts
-from feedsim.estimation.identify.open_loop import balanced, first_deflection, first_speed, reached, substeps
+from feedsim.estimation.identify.open_loop import balance_loads, first_deflection, first_speed, simulate_angle, substeps
 from feedsim.estimation.identify.parameters import FRICTION_NAMES, NO_EFFECT
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Balance, Estimate
@@ -94,7 +94,7 @@ OFF = {"F_C": 1.6 * 1.04, "F_S": 2.1 + 0.04 * 1.6, "M_0": 0.24}
 
 def found(records: Record | list[Record], law: FrictionLaw, given: Mapping[str, Estimate], **options: Any) -> Balance:
     records = [records] if isinstance(records, Record) else records
-    return balanced(records, law, given, **options)
+    return balance_loads(records, law, given, **options)
 
 
 def assert_true(balance: Balance, relative: float) -> None:
@@ -219,7 +219,7 @@ def test_a_drift_that_the_record_does_not_determine_is_not_used(general: Record,
     assert text.startswith("a drift of M_0 is not determined, and not used: ")
     values = {name: each.value for name, each in balance.estimates.items()} | {"delay": HELD}
     assert record.angle is not None
-    left = float(np.sqrt(np.mean((record.angle - reached(record, law, values)) ** 2)))
+    left = float(np.sqrt(np.mean((record.angle - simulate_angle(record, law, values)) ** 2)))
     assert balance.position[1] == pytest.approx(left, rel=1e-6)
 
 
@@ -352,7 +352,7 @@ def test_a_motion_that_is_no_number(general: Record, law: FrictionLaw, monkeypat
 
     monkeypatch.setattr(law, "free_axis", runs_off)
     given = estimates(OFF)
-    assert_refused(balanced([general], law, given), given, "no finite number at 0.5 s")
+    assert_refused(balance_loads([general], law, given), given, "no finite number at 0.5 s")
 
 
 @pytest.mark.parametrize("name", [*FRICTION_NAMES, "M_0", "J"])

@@ -286,7 +286,9 @@ def random_course(seed: int) -> Callable[[float], float]:
     once, even = random.standard_normal(2)
     ages = np.linspace(0.0, 1.0, 1001)
     walk = np.concatenate([[0.0], np.cumsum(random.standard_normal(1000)) / np.sqrt(1000)])
-    return lambda age: drift.WARMS / np.sqrt(3) * (once * (age > 0) + even * age + float(np.interp(age, ages, walk)))
+    return lambda age: (
+        drift.WARMING_DEVIATION / np.sqrt(3) * (once * (age > 0) + even * age + float(np.interp(age, ages, walk)))
+    )
 
 
 @pytest.mark.statistics

@@ -15,7 +15,7 @@ from feedsim.report.live_page import write
 from feedsim.report.live_page.content import content
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim import fmus_directory
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from live_page.test_page_numbers import SAME, settings
 from machine_helpers import write_machine, write_scenario
 from page_helpers import NODE, answers, without_loops
@@ -50,7 +50,7 @@ def test_machines_of_other_axes_compute_a_run(name: str, tmp_path: Path) -> None
     state = [knob["value"] for knob in data["knobs"]]
     page = answers(data, [{"state": state, "keep": keep}], tmp_path)[0]
     assert "problem" not in page
-    run = judged(cosim.run(given, program=program))
+    run = judge_run(cosim.run(given, program=program))
     for column in keep:
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
         assert np.ptp(run.trace[column]) >= 0
@@ -80,7 +80,7 @@ def test_a_plant_that_follows_its_pose_is_computed_and_its_end_is_said(tmp_path:
     data = content(given, program).data
     state = [knob["value"] for knob in data["knobs"]]
     page = answers(data, [{"state": state, "keep": ["Z.x_a"]}], tmp_path)[0]
-    run = judged(cosim.run(given, program=program))
+    run = judge_run(cosim.run(given, program=program))
     assert np.abs(np.array(page["trace"]["Z.x_a"]) - run.trace["Z.x_a"]).max() <= SAME
     assert "pose-grid-left" in [finding.code for finding in run.warnings]
     assert sorted(page["warnings"]) == without_loops(run.warnings)
@@ -91,7 +91,7 @@ def test_a_page_that_is_too_large_is_refused_with_its_size(tmp_path: Path, monke
     out = tmp_path / "page.html"
     given = scenario.load(SCENARIOS / "one_axis.yaml")
     with pytest.raises(InputError, match=r"its page takes 0\.\d+ MB; allowed are 0\.2 MB"):
-        write(judged(cosim.run(given)), out)
+        write(judge_run(cosim.run(given)), out)
     assert not out.exists()
 
 
@@ -112,7 +112,7 @@ def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -
     assert len(state) == len(wanted)
     keep = ["X.x_a", "tcp.x_X"]
     page = answers(data, [{"state": state, "keep": keep}], tmp_path)[0]
-    run = judged(cosim.run(scenario.load(file, [*indirect, *settings(data, state)])))
+    run = judge_run(cosim.run(scenario.load(file, [*indirect, *settings(data, state)])))
     for column in keep:
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
     assert sorted(page["warnings"]) == without_loops(run.warnings)
@@ -138,7 +138,7 @@ def test_the_play_of_a_transmission_is_a_knob(tmp_path: Path) -> None:
             for key, knob in zip(keys, data["knobs"], strict=True)]  # fmt: skip
     keep = ["X.x_a", "X.n_a"]
     page = answers(data, [{"state": play, "keep": keep}], tmp_path)[0]
-    run = judged(cosim.run(scenario.load(SCENARIOS / "one_axis.yaml", [*machine, *settings(data, play)])))
+    run = judge_run(cosim.run(scenario.load(SCENARIOS / "one_axis.yaml", [*machine, *settings(data, play)])))
     for column in keep:  # impacts make more of the last bit than SAME
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= 1e-9
     assert sorted(page["warnings"]) == without_loops(run.warnings)
@@ -161,10 +161,10 @@ def test_what_no_page_is_made_of(changes: list[str], wanted: list[str], said: st
 def test_a_module_of_other_sources_is_refused(tmp_path: Path) -> None:
     guid = "0123456789abcdef-0123456789abcdef"
     with pytest.raises(InputError, match="there is no module"):
-        module.read(tmp_path, guid)
+        module.read_page_module(tmp_path, guid)
     (tmp_path / "machine.wasm").write_bytes(MODULE.read_bytes())
     with pytest.raises(InputError, match="is of other sources"):
-        module.read(tmp_path, guid)
+        module.read_page_module(tmp_path, guid)
     (tmp_path / "machine.wasm").write_bytes(b"\0asm\1\0\0\0")
     with pytest.raises(InputError, match="no WebAssembly module that feedsim made"):
-        module.read(tmp_path, guid)
+        module.read_page_module(tmp_path, guid)

@@ -24,7 +24,7 @@ from feedsim.report.formatting import typeset
 from feedsim.report.live_page.content import content, rows, segments
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim import fmus_directory
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure import checked_modes
 from page_browsers import FIGURES, Firefox, Opened, address_of, number_of
 from page_helpers import NODE, answers, without_loops
@@ -99,7 +99,7 @@ def expected(name: str) -> tuple[dict[str, Any], list[Expected]]:
         try:
             asked = scenario.load(SCENARIOS / f"{name}.yaml", changes)
             program = nc.plan(asked)
-            run = judged(cosim.run(asked, program=program))
+            run = judge_run(cosim.run(asked, program=program))
             moved = [axis for axis in asked.machine.axes if any(axis in motion.axes for motion in asked.motions)]
             positions = {f"{axis}.x_a": np.array(run.trace[f"{axis}.x_a"]) for axis in moved}
             warnings, causes = tuple(without_loops(run.warnings)), diagnoses(run)
@@ -181,7 +181,7 @@ def test_random_states_in_a_browser(browser: Any, name: str, tmp_path: Path) -> 
 def test_a_page_in_firefox_is_a_run(firefox: Firefox, files: dict[str, Path]) -> None:
     for name, file in files.items():
         firefox.open(file)
-        run = judged(cosim.run(scenario.load(SCENARIOS / f"{name}.yaml")))
+        run = judge_run(cosim.run(scenario.load(SCENARIOS / f"{name}.yaml")))
         figures = evaluate(run)
         for key, text in firefox.run(FIGURES):
             if text == "not determined":

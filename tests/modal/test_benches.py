@@ -11,8 +11,8 @@ from scipy.linalg import eigh
 from scipy.signal import cont2discrete, lfilter
 
 from feedsim.cli import main
-from feedsim.estimation.modal.estimate import estimated
-from feedsim.estimation.modal.rational import fitted, least, scatter
+from feedsim.estimation.modal.estimate import estimate_responses
+from feedsim.estimation.modal.rational import find_minimum, fit_responses, scatter
 from feedsim.files.trace import Trace, write_csv
 from feedsim.files.trace.trace import Array
 
@@ -65,7 +65,7 @@ def test_a_drift_of_the_angle_leaves_the_lines(kind: str) -> None:
     """A creeping angle has no part in lines of a periodic excitation: their response within 0.5 % of that without."""
     u = excitation(kind, np.random.default_rng(3))
     (y,) = angles(u, np.array([0.005, 0.005]), np.array([500.0]), 0.02, [0.0])
-    found = [estimated([u], {"motor": [y + d]}, 1 / RATE, period=PERIOD) for d in (0.0 * y, drift(len(y)))]
+    found = [estimate_responses([u], {"motor": [y + d]}, 1 / RATE, period=PERIOD) for d in (0.0 * y, drift(len(y)))]
     within = (found[0].frequency < 250) & (found[0].frequency > 10)
     ratio = found[1].values["motor"][within] / found[0].values["motor"][within]
     assert np.quantile(np.abs(ratio - 1), 0.9) < 5e-3
@@ -86,7 +86,7 @@ def test_two_inertias_of_any_ratio(ratio: float, kind: str) -> None:
         own = angles(u, np.array([motor, ratio * motor]), np.array([stiffness]), 0.02, [0.12e-3, 0.32e-3])
         steps = [np.round((y + drift(len(y))) / 6e-6) * 6e-6 for y in own]
         measured = u + 0.01 * rng.standard_normal(len(u))
-        result = estimated([measured], {"motor": [steps[0]], "load": [-steps[1]]}, 1 / RATE,
+        result = estimate_responses([measured], {"motor": [steps[0]], "load": [-steps[1]]}, 1 / RATE,
                            period=None if kind == "noise" else PERIOD, orders={"motor": 2, "load": 2})  # fmt: skip
         used = (result.frequency > 11) & (result.frequency < 200)
         s = 2j * np.pi * result.frequency[used]
@@ -96,7 +96,7 @@ def test_two_inertias_of_any_ratio(ratio: float, kind: str) -> None:
             {name: value[used] for name, value in result.relative.items()},
         )
 
-    fit = fitted(*responses(kind))
+    fit = fit_responses(*responses(kind))
     mode = min(fit.modes, key=lambda one: abs(one.frequency - peak))
     assert mode.frequency == pytest.approx(peak, rel=0.01)
     assert mode.residues["motor"] / fit.rigid["motor"] == pytest.approx(ratio, rel=0.03)
@@ -149,7 +149,7 @@ def test_a_dip_and_its_interval_without_a_model() -> None:
         rng = np.random.default_rng(seed)
         noisy = G * (1 + 0.05 * (rng.standard_normal(len(G)) + 1j * rng.standard_normal(len(G))))
         for name, values, true in (("dip", noisy, dip), ("peak", 1 / noisy, 76.3)):
-            found, sigma = least(frequency, values, true * 1.01)
+            found, sigma = find_minimum(frequency, values, true * 1.01)
             assert found == pytest.approx(true, rel=0.01)
             inside[name] += abs(found - true) < 1.96 * sigma
     assert min(inside.values()) >= 36
@@ -157,8 +157,8 @@ def test_a_dip_and_its_interval_without_a_model() -> None:
 
 def test_lines_that_show_no_dip_have_none() -> None:
     frequency = np.arange(11.0, 200.0)
-    assert all(np.isnan(least(frequency, 1 + 0.01j * frequency, 80.0)))
-    assert all(np.isnan(least(frequency[:5], np.ones(5, dtype=complex), 12.0)))
+    assert all(np.isnan(find_minimum(frequency, 1 + 0.01j * frequency, 80.0)))
+    assert all(np.isnan(find_minimum(frequency[:5], np.ones(5, dtype=complex), 12.0)))
 
 
 def test_scatter_is_that_of_the_noise() -> None:

@@ -14,8 +14,8 @@ from scipy.io import loadmat
 from scipy.signal import cont2discrete, lfilter
 
 from feedsim.cli import main
-from feedsim.estimation.modal.estimate import estimated, period_of
-from feedsim.estimation.modal.rational import Fitted, Mode, fitted
+from feedsim.estimation.modal.estimate import estimate_responses, period_of
+from feedsim.estimation.modal.rational import Mode, RationalFit, fit_responses
 from feedsim.files.trace import Trace, write_csv
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.files.trace.response_files import write_response
@@ -59,7 +59,7 @@ def test_modes_and_their_number_come_back(modes: list[tuple[float, float, float,
         return 0.02 * (rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency)))
 
     values = {name: each * (1 + noise()) for name, each in true.items()}
-    found = fitted(frequency, values, {name: np.full(len(frequency), 0.02) for name in values})
+    found = fit_responses(frequency, values, {name: np.full(len(frequency), 0.02) for name in values})
     assert len(found.modes) == len(modes)
     for own, (f, D, motor, scale) in zip(found.modes, modes, strict=True):
         assert own.frequency == pytest.approx(f, rel=0.02)
@@ -84,9 +84,11 @@ def test_modes_and_their_number_come_back(modes: list[tuple[float, float, float,
 def test_modes_that_lines_do_not_show(further: tuple[float, float, float, float], why: str) -> None:
     """Beside a mode of 62 Hz that they do show, and which stays without a word."""
     frequency = np.arange(5.0, 220.0)
-    fit = fitted(frequency, closed_form(frequency, ONE), {name: np.zeros(215) for name in ("motor", "scale")}, 1)
+    fit = fit_responses(frequency, closed_form(frequency, ONE), {name: np.zeros(215) for name in ("motor", "scale")}, 1)
     assert fit.implausible(frequency) == []
-    assert len(fitted(frequency, {"motor": fit.response("motor", frequency)}, {"motor": np.zeros(215)}).modes) == 1
+    assert (
+        len(fit_responses(frequency, {"motor": fit.response("motor", frequency)}, {"motor": np.zeros(215)}).modes) == 1
+    )
     own = Mode(*further[:2], 0.0, 0.0, {"motor": 50 * further[2], "scale": 50 * further[3]})
     two = replace(
         fit, modes=tuple(sorted((*fit.modes, own), key=lambda mode: mode.frequency)), parameters=with_mode(own, fit)
@@ -97,7 +99,7 @@ def test_modes_that_lines_do_not_show(further: tuple[float, float, float, float]
     assert two.without(own) == pytest.approx(fit.parameters)
 
 
-def with_mode(mode: Mode, fit: Fitted) -> Array:
+def with_mode(mode: Mode, fit: RationalFit) -> Array:
     """The parameters of a fit with one mode, and those of a second one."""
     x = fit.parameters
     poles = [*x[:3], np.log(2 * np.pi * mode.frequency), np.log(mode.damping)]
@@ -109,11 +111,11 @@ def test_few_lines_of_a_measured_bench() -> None:
     """Of 40 lines, some 5 Hz apart near 56 Hz, cross-validation takes a mode of half a hertz there besides."""
     record = loadmat(os.environ["FEEDSIM_TWO_INERTIA"])
     current, angle = (np.ravel(record[name]).astype(float) for name in ("iq_adx", "theta_mx"))
-    found = estimated([current], {"motor": [angle]}, 1 / 2500, period=2500)
+    found = estimate_responses([current], {"motor": [angle]}, 1 / 2500, period=2500)
     rows = np.unique(np.searchsorted(found.frequency, np.geomspace(11.0, 249.0, 40)))
     frequency = found.frequency[rows]
     values = {"motor": found.values["motor"][rows] * (2j * np.pi * frequency) ** 2}
-    fit = fitted(frequency, values, {"motor": found.relative["motor"][rows]})
+    fit = fit_responses(frequency, values, {"motor": found.relative["motor"][rows]})
     assert [mode.frequency for mode in fit.modes] == pytest.approx([76.3], abs=0.5)
     assert fit.modes[0].residues["motor"] / fit.rigid["motor"] == pytest.approx(1.0, abs=0.03)
     assert all("left out: it is" in each for each in fit.refused)
@@ -144,14 +146,14 @@ def test_time_signals_by_periods_and_by_segments(periodic: bool) -> None:
     dip and the peak of the bench, the hold of half a sample as a delay."""
     u, y = bench(40000, periodic, 1)
     assert (period_of(u) == 2000) == periodic
-    found = estimated([u], {"motor": [y]}, 1 / RATE)
+    found = estimate_responses([u], {"motor": [y]}, 1 / RATE)
     assert ("18 periods" in found.method) == periodic
     if periodic:
         assert found.frequency[[0, -1]] == pytest.approx([5.0, 220.0])
     within = (found.frequency >= 5) & (found.frequency <= 220)
     frequency = found.frequency[within]
     values = {"motor": found.values["motor"][within] * 2j * np.pi * frequency}
-    fit = fitted(frequency, values, {"motor": found.relative["motor"][within]})
+    fit = fit_responses(frequency, values, {"motor": found.relative["motor"][within]})
     assert [mode.frequency for mode in fit.modes] == pytest.approx([62.0], rel=0.01)
     assert fit.modes[0].residues["motor"] / fit.rigid["motor"] == pytest.approx(0.8, rel=0.05)
     assert fit.delay["motor"] == pytest.approx(0.5 / RATE, abs=0.1 / RATE)
@@ -243,7 +245,7 @@ def test_the_response_of_a_control_from_its_time_signals() -> None:
     recording = read_recording(path)
     read = recording.read(recording.names)
     runs = {node: [read[f"axis 1 node {node} run {k}"] for k in (1, 2)] for node in (61, 62)}
-    found = estimated(runs[62], {"speed": runs[61]}, float(np.diff(read["time"])[0]))
+    found = estimate_responses(runs[62], {"speed": runs[61]}, float(np.diff(read["time"])[0]))
     own = read_response(path)
     values = np.asarray(own[own.names[0]])
     # Line by line: the first lines are all excited.

@@ -13,7 +13,7 @@ from feedsim.motions import PartProgram
 from feedsim.motions.kind import Start, whole_cycles
 from feedsim.motions.part_program import Blending, Motion
 from feedsim.motions.planner import Limits
-from feedsim.motions.program import Programmed
+from feedsim.motions.program import ProgrammedGeometry
 from feedsim.simulation import nc
 
 HERE = {"X": 0.8, "Y": 0.3, "Z": 0.1}
@@ -39,7 +39,7 @@ def test_a_course_begins_where_the_axes_are_and_ends_where_the_program_does(tmp_
     assert course.moving == ("X", "Y")
     assert course.target == {"X": 0.83, "Y": 0.325}
     geometry = course.geometry
-    assert isinstance(geometry, Programmed)
+    assert isinstance(geometry, ProgrammedGeometry)
     x = np.column_stack([course.points["X"], course.points["Y"], np.full(course.cycles, HERE["Z"])])
     assert np.abs(x[0, :2] - [0.8, 0.3]).max() < 1e-6
     assert x[-1] == pytest.approx([0.83, 0.325, 0.1], abs=1e-15)

@@ -260,11 +260,29 @@ VALUE_KINDS = [
 def test_every_word_with_every_kind_of_value() -> None:
     """In a block of its own, after a movement: read, or refused in its line or at the end."""
     names = sorted(
-        {*words.VALUES, *words.NOTED, *words.NOTED_VALUES, *words.NAMES_REFUSED, *words.NAMED_CODES, *words.FRAMES,
-         *map(chr, range(ord("A"), ord("Z") + 1)), "R1", "X1", "I1", "AA", "SUB1", "SUBP", "L100", "SIN", "NOT", "TRUE",
-         *interpreter.Interpreter(recorder.Recorder("XYZ", (0, 0, 0)), lambda name: None, iso=False, skip=False,
-                                  tolerance=1, offsets={}).control}
-    )  # fmt: skip
+        {
+            *words.VALUES,
+            *words.NOTED_WORDS,
+            *words.NOTED_VALUES,
+            *words.NAMES_REFUSED,
+            *words.NAMED_CODES,
+            *words.FRAMES,
+            *map(chr, range(ord("A"), ord("Z") + 1)),
+            "R1",
+            "X1",
+            "I1",
+            "AA",
+            "SUB1",
+            "SUBP",
+            "L100",
+            "SIN",
+            "NOT",
+            "TRUE",
+            *interpreter.Interpreter(
+                recorder.Recorder("XYZ", (0, 0, 0)), lambda name: None, iso=False, skip=False, tolerance=1, offsets={}
+            ).control,
+        }
+    )
     count = 0
     for name in names:
         for value in VALUE_KINDS:

@@ -19,7 +19,7 @@ from scipy.signal import butter, cheby1, filtfilt
 
 from feedsim.estimation.identify.record import Record
 from feedsim.foundation import units
-from feedsim.motions.setpoints import Recorded
+from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import load, load_machine
 from feedsim.simulation.cosim import run
 from feedsim.simulation.nc import Program
@@ -181,7 +181,7 @@ def follow(
 
 def _begin(program: Program) -> int:
     """Row of the run, at the cycle, with the record's first row; the run-in takes whole cycles."""
-    (begin,) = (each.geometry.begin for each in program.segments if isinstance(each.geometry, Recorded))
+    (begin,) = (each.geometry.begin for each in program.segments if isinstance(each.geometry, RecordedGeometry))
     row = round(begin / T)
     assert abs(begin - row * T) < 1e-9
     return row

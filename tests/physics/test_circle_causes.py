@@ -47,7 +47,7 @@ def test_unlike_gains_are_a_servo_mismatch(driven: Driven) -> None:
     assert found["servo"].size / 2 == pytest.approx(SPEED * late / 2, rel=0.01)
     assert found["servo"].share > 0.99
     assert figures["XZ.squareness"].value == pytest.approx(0, abs=1)
-    assert "X lags Z by 3.0 ms" in analysis.answer(found)
+    assert "X lags Z by 3.0 ms" in analysis.explain_circle(found)
 
 
 def test_peaks_of_unlike_gains_are_those_of_like_ones(driven: Driven) -> None:
@@ -62,7 +62,7 @@ def test_peaks_of_unlike_gains_are_those_of_like_ones(driven: Driven) -> None:
 def test_glitches_that_are_none_are_told(driven: Driven) -> None:
     for overrides, axes in ((gains(4, 5), ["X", "Z"]), ((), [])):
         figures, found = driven(*overrides)
-        told = analysis.doubts(figures, {"XZ": found})
+        told = analysis.doubt_figures(figures, {"XZ": found})
         assert {finding.code for finding in told} <= {"glitch-misleading"}
         assert [finding.text.split("glitch_")[1][0] for finding in told] == axes
 
@@ -71,7 +71,7 @@ def test_one_direction_does_not_name_which(driven: Driven) -> None:
     figures, found = driven(*gains(4, 5), "motions.0.direction=counterclockwise")
     assert figures["XZ.squareness_or_servo"].value == pytest.approx(75, rel=0.01)
     assert not {"XZ.servo_mismatch", "XZ.squareness"} & set(figures)
-    assert "record the other direction" in analysis.answer(found)
+    assert "record the other direction" in analysis.explain_circle(found)
 
 
 def test_the_first_direction_is_the_circle_of_one_direction(driven: Driven) -> None:
@@ -116,7 +116,7 @@ def test_cogging_is_named_with_its_order_and_torque(driven: Driven) -> None:
     assert (term.axis, term.order) == ("X", 6)
     assert abs(term.value - 0.4) < term.half < 0.02
     assert figures["XZ.cogging_X_6"].value == term.value
-    assert "cogging of X, 6 per turn" in [analysis.circle.name(each) for each in found.terms]
+    assert "cogging of X, 6 per turn" in [analysis.circle.term_name(each) for each in found.terms]
     assert not found.vibrations  # it is no vibration
     clean = driven("motions.0.radius=60 mm")[1]
     assert not [each for each in clean.terms if each.key == "cogging"]

@@ -14,7 +14,7 @@ from feedsim import scenario
 from feedsim.analysis import compensation as module
 from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.tune_feedforward import Compensated, result_of
+from feedsim.jobs.tune_feedforward import CompensatedCircle, result_of
 from feedsim.linear.plant import LinearDrive
 from feedsim.report.compensate import rows_of
 from feedsim.scenario import Axis, Machine, Scenario
@@ -36,7 +36,7 @@ def done(fmus: Path) -> Iterator[Compensation]:
     described = scenario.load(CIRCLE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DELAY_ERRORS", (1e-3,))
-        patch.setattr(module, "VARIED", (("F_C", "F_S"),))
+        patch.setattr(module, "VARIED_PARAMETERS", (("F_C", "F_S"),))
         yield compensate(
             described, nc.plan(described), machines={"less friction": less_friction(described.machine)}, fmus=fmus
         )
@@ -194,7 +194,7 @@ def test_table_runs_are_those_of_the_whole_program(done: Compensation, fmus: Pat
 
 
 def test_results_have_the_table(done: Compensation, tmp_path: Path) -> None:
-    result_of(Compensated(done, {})).save(tmp_path / "out")
+    result_of(CompensatedCircle(done, {})).save(tmp_path / "out")
     with (tmp_path / "out" / "compensation.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [(row["compensation"], row["error"], row["unit of the error"]) for row in rows] == [
@@ -222,7 +222,7 @@ def test_a_changed_machine_has_the_same_compensation(done: Compensation, tmp_pat
         assert pytest.approx(expected.G, rel=1e-6) == left.G
         assert left.dip["Z"] == pytest.approx(expected.dip["Z"], rel=1e-6, abs=1e-12)
     assert found.after.dip["Z"] < 3 * done.left_after.dip["Z"] < 0  # too much now: a dip
-    result_of(Compensated(done, {})).save(tmp_path / "out")
+    result_of(CompensatedCircle(done, {})).save(tmp_path / "out")
     assert "With other effects of the machine" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
@@ -324,8 +324,8 @@ def test_parameters_without_effect_are_left_out(fmus: Path) -> None:
     """Pure LuGre has no engaging zone."""
     machine: Machine = default_machine()
     friction = machine.axes["Z"].friction.model_copy(update={"W": 0.0})
-    assert module._varied(friction, ("W",), 1.1) == friction
-    assert module._varied(friction, ("gamma",), 1.1) == friction
-    assert module._varied(friction, ("sigma_0",), 1.1).sigma_0 == pytest.approx(1.1 * friction.sigma_0)
+    assert module._scale_parameters(friction, ("W",), 1.1) == friction
+    assert module._scale_parameters(friction, ("gamma",), 1.1) == friction
+    assert module._scale_parameters(friction, ("sigma_0",), 1.1).sigma_0 == pytest.approx(1.1 * friction.sigma_0)
     engaged = machine.axes["Z"].friction.model_copy(update={"gamma": 0.95})
-    assert module._varied(engaged, ("gamma",), 1.1).gamma == 1.0
+    assert module._scale_parameters(engaged, ("gamma",), 1.1).gamma == 1.0

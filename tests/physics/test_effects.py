@@ -17,7 +17,7 @@ from feedsim.analysis.compensation import compensate
 from feedsim.analysis.evaluate import evaluate
 from feedsim.foundation.errors import InputError
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from feedsim.simulation.nc import plan
 from fmi_helpers import Archive
 
@@ -37,7 +37,7 @@ def moved(fmus: Path) -> Driven:
     @cache
     def run(*overrides: str) -> JudgedRun:
         path = SCENARIOS / "z_positioning.yaml"
-        return judged(cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus))
+        return judge_run(cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus))
 
     return run
 
@@ -170,7 +170,7 @@ def circle(fmus: Path) -> Driven:
     @cache
     def run(*overrides: str) -> JudgedRun:
         path = SCENARIOS / "xz_circle.yaml"
-        return judged(cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus))
+        return judge_run(cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus))
 
     return run
 

@@ -14,7 +14,7 @@ from feedsim.foundation.errors import InputError
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Friction, Scenario, load_subject
 from feedsim.simulation import cosim, nc
-from feedsim.simulation.judge import check, judged
+from feedsim.simulation.judge import check, judge_run
 from feedsim.structure import Modes, checked_modes
 
 MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"
@@ -160,7 +160,7 @@ SAID = {
 def test_runs_say_so_and_blame_no_coupling(gain: str, tmp_path: Path) -> None:
     plan = scenario.load(MACHINES.parent / "z_positioning.yaml", [f"machine.axes.Z.drive.K_v={gain}"])
     ahead = check(plan, nc.plan(plan))
-    told = judged(cosim.run(plan)).warnings
+    told = judge_run(cosim.run(plan)).warnings
     expected = SAID[gain]
     if expected is None:
         assert told == ahead == ()
@@ -170,7 +170,7 @@ def test_runs_say_so_and_blame_no_coupling(gain: str, tmp_path: Path) -> None:
     assert (told[0].code, told[0].severity, told[0].place) == (code, severity, "Z")
     assert part in told[0].text
     assert told[0].remedy.startswith("machine.axes.Z.drive.K_v=")
-    assert not judged(cosim.run(scenario.load(plan.file, [told[0].remedy]))).warnings
+    assert not judge_run(cosim.run(scenario.load(plan.file, [told[0].remedy]))).warnings
     assert not any("coupling.substeps" in finding.remedy for finding in told)
 
 

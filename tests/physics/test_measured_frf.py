@@ -98,7 +98,7 @@ MOTOR = 1e-4
 def test_measured_against_closed_form(excited: Measure, axis: str) -> None:
     n_M, x_M, speed = f"{axis}.n_a/{axis}.M_a", f"{axis}.x_a/{axis}.M_a", f"{axis}.n_a/{axis}.n_s"
     pairs = [(f"{axis}.n_a", f"{axis}.M_a"), (f"{axis}.x_a", f"{axis}.M_a"), (f"{axis}.n_a", f"{axis}.n_s")]
-    found = estimate.measured(excited(axis, "n_add", **SPARSE), pairs)
+    found = estimate.estimate_responses(excited(axis, "n_add", **SPARSE), pairs)
     figures = {}
     for name, allowed in ((n_M, ROUNDING), (x_M, ROUNDING), (speed, MOTOR)):
         output, _, given = name.partition("/")
@@ -108,7 +108,7 @@ def test_measured_against_closed_form(excited: Measure, axis: str) -> None:
         assert figures[name][1] < 10 * allowed
     force = f"tool.F_{axis}"
     compliance = f"tool.x_{axis}/{force}"
-    found = estimate.measured(excited(axis, force, seeds=(0,), **SPARSE), [(f"tool.x_{axis}", force)])
+    found = estimate.estimate_responses(excited(axis, force, seeds=(0,), **SPARSE), [(f"tool.x_{axis}", force)])
     expected = CLOSED.response(found.frequency, [force], [f"tool.x_{axis}"])[compliance]
     figures[compliance] = deviation(found, compliance, expected, (5, 500))
     assert figures[compliance][0] < ROUNDING
@@ -118,7 +118,7 @@ def test_measured_against_closed_form(excited: Measure, axis: str) -> None:
 
 def test_open_loop_gain_is_that_of_one_axis_measured_and_the_others_held(excited: Measure) -> None:
     """The control's own way: n_a/n_s = (S/C) L/(1 + L), measured with the others under position control, gives L."""
-    found = estimate.measured(excited("Z", "n_add", seeds=(0,), **SPARSE), [("Z.n_a", "Z.n_s")])
+    found = estimate.estimate_responses(excited("Z", "n_add", seeds=(0,), **SPARSE), [("Z.n_a", "Z.n_s")])
     f, reference = found.frequency, found["Z.n_a/Z.n_s"]
     s, drive = 2j * np.pi * f, CLOSED.drives[CLOSED.axes.index("Z")]
     from_measured = reference / (drive.from_setpoint(s) / drive.from_speed(s) - reference)
@@ -133,7 +133,7 @@ def test_other_axes_are_part_of_what_is_measured(excited: Measure) -> None:
     """n_Z = H_ZZ M_Z + the answers of the other drives: with their torques taken off, the modal sum alone is left."""
     measurement = excited("Z", "M_add", seeds=(0,), **SPARSE)[0]
     columns = ("Z.n_a", "Z.M_a", "X.M_a", "Y.M_a")
-    found = estimate.measured([measurement], [(name, "Z.M_add") for name in columns])
+    found = estimate.estimate_responses([measurement], [(name, "Z.M_add") for name in columns])
     n, M_Z, M_X, M_Y = (found[f"{name}/Z.M_add"] for name in columns)
     f = found.frequency
     expected = sum(modal_sum(f, f"n_{axis}", "n_Z", True) * M for axis, M in (("Z", M_Z), ("X", M_X), ("Y", M_Y)))
@@ -146,7 +146,9 @@ def test_what_the_design_says_of_n_over_M(excited: Measure) -> None:
     """Figures of the default machine from its description."""
     signal = {"resolution": 0.5, "band": (0.5, 500)}
     found = {
-        axis: estimate.measured(excited(axis, "M_add", seeds=(0,), signal=signal), [(f"{axis}.n_a", f"{axis}.M_a")])
+        axis: estimate.estimate_responses(
+            excited(axis, "M_add", seeds=(0,), signal=signal), [(f"{axis}.n_a", f"{axis}.M_a")]
+        )
         for axis in ("X", "Z")
     }
     normed = {}
@@ -175,7 +177,7 @@ def test_binary_sequence_finds_the_same(fmus: Path) -> None:
     """Another signal, one period: none of the lines is the image of another, so that nothing is to be averaged."""
     signal = binary_sequence(MACHINE.cycles, usual_rms(MACHINE, "Z", "M_add"), seed=1)
     measurement = measure(MACHINE, "Z", signal, fmus=fmus)
-    found = estimate.measured([measurement], [("Z.n_a", "Z.M_a"), ("Z.x_a", "Z.M_add")])
+    found = estimate.estimate_responses([measurement], [("Z.n_a", "Z.M_a"), ("Z.x_a", "Z.M_add")])
     assert (
         deviation(found, "Z.n_a/Z.M_a", CLOSED.ratio(found.frequency, "Z.n_a", "Z.M_a", "Z.M_add"), (5, 500))[0]
         < ROUNDING
@@ -208,7 +210,7 @@ def test_moving_axis_with_friction(excited: Measure) -> None:
     measurements = excited(
         "Z", "n_add", share=0.25, friction=True, offset_speed=speed, signal={"band": (1, 500), "spacing": "logarithmic"}
     )
-    found = estimate.measured(measurements, [("Z.n_a", "Z.M_a"), ("Z.M_fr", "Z.n_a")])
+    found = estimate.estimate_responses(measurements, [("Z.n_a", "Z.M_a"), ("Z.M_fr", "Z.n_a")])
     low = found.frequency <= 60 * (1 + 1e-9)
     frequency, n_M = found.frequency[low], found["Z.n_a/Z.M_a"][low]
     frictionless = CLOSED.ratio(frequency, "Z.n_a", "Z.M_a", "Z.n_add")
@@ -227,7 +229,7 @@ def test_friction_at_standstill_is_warned_of(excited: Measure) -> None:
     """The bristles hold the axis: n/M reads some -50 dB at 1 Hz, where it is 20 dB without friction."""
     measurement = excited("Z", "M_add", seeds=(0,), signal={"band": (1, 400)}, friction=True)[0]
     assert "axis-held-by-friction" in [finding.code for finding in measurement.warnings]
-    found = estimate.measured([measurement], [("Z.n_a", "Z.M_a")])
+    found = estimate.estimate_responses([measurement], [("Z.n_a", "Z.M_a")])
     assert 20 * np.log10(abs(found["Z.n_a/Z.M_a"][0])) < -25
     assert "Z.M_fr" in measurement.trace
 
@@ -250,7 +252,7 @@ def test_unsettled_response_is_warned_of(excited: Measure) -> None:
     signal = {"band": (5, 400), "resolution": 10.0}
     hasty = excited("Z", "M_add", seeds=(0,), signal=signal, settle=0)[0]
     assert "not-settled" in [finding.code for finding in hasty.warnings]
-    assert excited("Z", "M_add", seeds=(0,), signal=signal, settle=30)[0].unsettled < 1e-6
+    assert excited("Z", "M_add", seeds=(0,), signal=signal, settle=30)[0].unsettled_share < 1e-6
 
 
 def test_rounding_of_an_axis_that_is_not_reached_is_no_response(fmus: Path) -> None:
@@ -259,9 +261,9 @@ def test_rounding_of_an_axis_that_is_not_reached_is_no_response(fmus: Path) -> N
     signal = multisine(machine.cycles, 0.3, band=(5, 400), resolution=5.0)
     measurement = measure(machine, "X", signal, settle=26, periods=2, fmus=fmus)
     assert 0 < np.std(measurement.trace["Y.n_s"]) < 1e-9 * np.std(measurement.trace["X.n_s"])
-    assert measurement.unsettled < 1e-6
+    assert measurement.unsettled_share < 1e-6
     assert not measurement.warnings
-    assert measure(machine, "X", signal, settle=0, periods=2, fmus=fmus).unsettled > 1e-3
+    assert measure(machine, "X", signal, settle=0, periods=2, fmus=fmus).unsettled_share > 1e-3
 
 
 @pytest.mark.parametrize(("speed", "middle"), [(5.0, 0.1), (-5.0, 0.1), (50.0, None)])
@@ -277,7 +279,7 @@ def test_travel_is_kept(fmus: Path, speed: float, middle: float | None) -> None:
         assert (x[0] - 13 * signal.period * v + x[-1]) / 2 == pytest.approx(middle, abs=1e-4)
     else:
         assert x[0] - (14 * signal.period + 1) * v == pytest.approx(low, abs=0.05)  # it starts at the end of its travel
-    found = estimate.measured([moving], [("Z.x_a", "Z.M_a")])
+    found = estimate.estimate_responses([moving], [("Z.x_a", "Z.M_a")])
     expected = CLOSED.ratio(found.frequency, "Z.x_a", "Z.M_a", "Z.M_add")
     np.testing.assert_allclose(found["Z.x_a/Z.M_a"], expected, rtol=1e-4)  # the travel is taken out
 

@@ -57,7 +57,7 @@ def case(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Case:
             for count in COUNTS
         }
         recorded, simulated = study.record(plan, plants[COUNTS[-1]])
-        run = judge.judged(simulated)
+        run = judge.judge_run(simulated)
         expected, check = (
             pose_reference.run(
                 structure, pose, "Z", recorded.position, recorded.torque, H, np.linspace(START, END, count + 1)
@@ -143,7 +143,7 @@ def test_an_axis_at_rest_on_a_boundary_crosses_once_at_most(
     boundary = START + (END - START) / 4
     plan = study.load(tmp_path, START, boundary, 20.0, 0.2)
     _, simulated = study.record(plan, case.plants[4])
-    run = judge.judged(simulated)
+    run = judge.judge_run(simulated)
     assert run.pose.crossings is not None
     assert run.pose.crossings.count <= 1
     rest = run.trace["Z.x_a"][run.trace.time > run.program.segments[0].end]

@@ -15,7 +15,7 @@ import pytest
 from feedsim import scenario
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure import checked_modes
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"
@@ -89,7 +89,7 @@ def test_bound_of_the_friction_slope(scheme: str, of_bound: float, chatters: boo
     bound = SCHEMES[scheme].stable_share * 2 * checked_modes(machine).J_inf("Z") / machine.cycles.T_c
     sigma_1 = of_bound * bound - friction.sigma_2
     overrides = [f"coupling.scheme={scheme}", f"machine.axes.Z.friction.sigma_1={sigma_1!r} N.m.s/rad"]
-    result = judged(cosim.run(scenario.load(file, overrides), fmus=fmus))
+    result = judge_run(cosim.run(scenario.load(file, overrides), fmus=fmus))
     # A torque that goes from -F_S to F_S and back from cycle to cycle has this second difference: more is chatter. Two
     # passes drift apart without it, and the energy tells.
     largest = 4 * friction.F_S
@@ -105,7 +105,7 @@ def test_residual_over_time(fmus: Path, tmp_path: Path) -> None:
     file = tmp_path / "scenario.yaml"
     file.write_text(THERE_AND_BACK, encoding="utf-8")
     asked = ["recording.variables=[Z.n_ffw, '*.residual']"]
-    sound = judged(cosim.run(scenario.load(file, asked), fmus=fmus))
+    sound = judge_run(cosim.run(scenario.load(file, asked), fmus=fmus))
     assert [name for name in sound.trace if name.endswith("residual")] == ["X.residual", "Y.residual", "Z.residual"]
     residual = sound.trace["Z.residual"]
     assert sound.trace.unit("Z.residual") == "J"
@@ -116,7 +116,9 @@ def test_residual_over_time(fmus: Path, tmp_path: Path) -> None:
     assert "Z.residual" not in cosim.run(scenario.load(file, ["recording={}"]), fmus=fmus).trace
 
     # Half as much contact damping again as the exchange bears: it goes wrong where the axis turns about, not before.
-    steep = judged(cosim.run(scenario.load(file, [*asked, "machine.axes.Z.friction.sigma_1=45 N.m.s/rad"]), fmus=fmus))
+    steep = judge_run(
+        cosim.run(scenario.load(file, [*asked, "machine.axes.Z.friction.sigma_1=45 N.m.s/rad"]), fmus=fmus)
+    )
     wrong = np.flatnonzero(np.abs(steep.trace["Z.residual"]) > 1e-2)[0]
     turned = np.flatnonzero(steep.trace["Z.n_ffw"] < -1e-3)[0]
     settled = 0.02  # s, of the position loop behind its setpoint

@@ -20,7 +20,7 @@ from feedsim.linear.judgement import judge
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim import Run
 from feedsim.structure import Modes, checked_modes
-from feedsim.structure.modes import joined
+from feedsim.structure.modes import join_motors
 from fmi_helpers import Archive, Instance
 from reference import monolithic
 
@@ -44,7 +44,7 @@ def test_two_masses_have_their_frequency() -> None:
     J, rest, c = 0.004, 0.01, 900.0
     whole = np.array([1 / np.sqrt(J + rest)])
     one = Modes(Path("modes.csv"), np.zeros(1), np.zeros(1), {"n_A": whole, "x_A": 0.003 * whole})
-    found = joined(one, (("A", c, 0.3, J),))
+    found = join_motors(one, (("A", c, 0.3, J),))
     omega = np.sqrt(c * (1 / J + 1 / rest))
     np.testing.assert_allclose(2 * np.pi * found.frequency, [0, omega], rtol=1e-12)
     assert found.damping[1] == pytest.approx(0.3 * omega / (2 * c), rel=1e-12)

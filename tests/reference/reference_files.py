@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.comparison import thinned
+from feedsim.comparison import thin_series
 from feedsim.files.trace import Series
 
 HERE = Path(__file__).parent
@@ -134,7 +134,7 @@ def write_bounds(path: Path, dense: Table, every: int, digits: int = 15) -> None
         return
     columns = {name: values for name, values in dense.items() if name != "time"}
     table = {"time": dense["time"][::every]}
-    for name, values in thinned(Series(dense["time"], columns), every)[1].columns.items():
+    for name, values in thin_series(Series(dense["time"], columns), every)[1].columns.items():
         least = 10.0**-digits * float(np.abs(columns[name.rpartition(".")[0]]).max())
         table[name] = np.array([_outward(value) if abs(value) > least else 0.0 for value in values])
     write_table(path, table)

@@ -8,7 +8,7 @@ import pytest
 
 from feedsim.estimation.identify.result import Estimate
 from feedsim.report.changes import control_names
-from feedsim.report.replay.drive import beside, beside_lines, beside_part, beside_section
+from feedsim.report.replay.drive import beside_lines, beside_part, beside_section, compare_parameters
 from feedsim.scenario import load_machine
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"  # K_v 66.7 1/s, T_n 12 ms
@@ -28,7 +28,7 @@ def found(name: str, value: float, sigma: float, status: str = "estimated", unit
     ],
 )
 def test_which_values_differ(value: float, sigma: float, status: str, differs: bool) -> None:
-    (each,) = beside(load_machine(MACHINE), {"Z": {"K_v": found("K_v", value, sigma, status)}})
+    (each,) = compare_parameters(load_machine(MACHINE), {"Z": {"K_v": found("K_v", value, sigma, status)}})
     assert (each.parameter, each.present, each.differs) == ("drive.K_v", pytest.approx(200 / 3), differs)
 
 
@@ -36,7 +36,7 @@ def test_in_the_words_of_the_control() -> None:
     machine = load_machine(MACHINE)
     own = {"K_v": found("K_v", 175 / 3, 0.1), "F_C": found("F_C", 1.6, 0.01, unit="N.m"),
            "M_0": found("M_0", 2.0, 0.1, unit="N.m"), "J": found("J", 0.02, 0.001, unit="kg.m2")}  # fmt: skip
-    rows = beside(machine, {"Z": own})
+    rows = compare_parameters(machine, {"Z": own})
     assert [each.parameter for each in rows] == ["drive.K_v", "friction.F_C", "constant_load"]
     with control_names("sinumerik"):
         first, load = beside_lines(machine, rows)

@@ -10,9 +10,9 @@ import pytest
 
 from feedsim.estimation.identify import Record
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, read_axes, windowed
-from feedsim.estimation.replay.identified import _beside, coupled
-from feedsim.estimation.replay.machine_files import Beside, ElasticMode, RigidAxis, machine_files, with_modes
+from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, cut_window, read_axes
+from feedsim.estimation.replay.identified import _couple_modes, fit_coupled_shapes
+from feedsim.estimation.replay.machine_files import CoupledShape, ElasticMode, RigidAxis, machine_files, with_modes
 from feedsim.files.columns import load_columns
 from feedsim.files.trace import write_csv
 from feedsim.foundation.errors import InputError
@@ -66,7 +66,7 @@ def logged(folder: Path, machine: Path) -> dict[str, AxisRecord]:
     for axis in "XY":
         (folder / f"{axis}.yaml").write_text(COLUMNS.format(axis=axis))
         read = read_axes(folder / "log.csv", [axis], None, load_columns(folder / f"{axis}.yaml"))
-        records[axis] = windowed(axis, read[axis], None)
+        records[axis] = cut_window(axis, read[axis], None)
     return records
 
 
@@ -76,7 +76,7 @@ def test_the_shape_at_the_other_scale_comes_back(shape: float, tmp_path: Path) -
     rigid, has no mode at the scale of X."""
     records = logged(tmp_path, machine_with(tmp_path / "true", shape))
     known = load_machine(machine_with(tmp_path / "known", 0.0))
-    found = coupled(known, records)
+    found = fit_coupled_shapes(known, records)
     assert set(found) == {(2, "Y")}
     assert found[2, "Y"].axis == "Y"
     assert found[2, "Y"].shape == pytest.approx(shape, rel=0.05)
@@ -88,24 +88,26 @@ def test_the_interval_includes_what_is_not_known_of_the_mode(tmp_path: Path) -> 
     records = logged(tmp_path, machine_with(tmp_path / "true", 0.1))
     off = replace(MODE, frequency=0.997 * MODE.frequency, motor=0.88 * MODE.motor)
     known = load_machine(machine_with(tmp_path / "known", 0.0, off))
-    alone = coupled(known, records)[2, "Y"]
+    alone = fit_coupled_shapes(known, records)[2, "Y"]
     assert abs(alone.shape - 0.1) > NORMAL_95 * alone.sigma
     spread = (0.003 * MODE.frequency, 0.001, 0.12 * MODE.motor, 0.01)
-    whole = coupled(known, records, spread={2: spread})[2, "Y"]
+    whole = fit_coupled_shapes(known, records, spread={2: spread})[2, "Y"]
     assert whole.shape == alone.shape
     assert abs(whole.shape - 0.1) <= NORMAL_95 * whole.sigma < 0.05
-    assert coupled(known, records, spread={2: (0.0, 0.0, 0.0, 0.0)})[2, "Y"].sigma == pytest.approx(alone.sigma)
+    assert fit_coupled_shapes(known, records, spread={2: (0.0, 0.0, 0.0, 0.0)})[2, "Y"].sigma == pytest.approx(
+        alone.sigma
+    )
 
 
 def test_axes_that_do_not_move_one_another(tmp_path: Path) -> None:
     """Noise is no coupling; nor is a vibration of Y that X does not drive."""
     machine = machine_with(tmp_path / "true", 0.0)
     records = logged(tmp_path, machine)
-    assert coupled(load_machine(machine), records) == {}
+    assert fit_coupled_shapes(load_machine(machine), records) == {}
     Y = records["Y"].record
     assert Y.angle is not None
     shaken = replace(Y, angle=Y.angle + 1e-6 / records["Y"].I_P * np.sin(2 * np.pi * 24.0 * Y.time))
-    assert coupled(load_machine(machine), {**records, "Y": replace(records["Y"], record=shaken)}) == {}
+    assert fit_coupled_shapes(load_machine(machine), {**records, "Y": replace(records["Y"], record=shaken)}) == {}
 
 
 def test_a_table_of_modes_has_the_shape(tmp_path: Path) -> None:
@@ -123,7 +125,7 @@ def test_a_table_of_modes_has_the_shape(tmp_path: Path) -> None:
         J = checked_modes(known).J_tot(axis)
         limits = {"speed": 1.0, "acceleration": 1.0, "jerk": 10.0, "low": -1.0, "high": 1.0}
         axes[axis] = RigidAxis(10e-3, 0.0, limits, drive, friction | {"J": J, "M_0": 0.0}, {})
-    axes["X"] = replace(axes["X"], modes=(replace(MODE, beside=(Beside("Y", 0.04, 0.001),)),))
+    axes["X"] = replace(axes["X"], modes=(replace(MODE, beside=(CoupledShape("Y", 0.04, 0.001),)),))
     (tmp_path / "own").mkdir()
     for name, text in machine_files("made", "by a test", axes, 2e-3, 125e-6).items():
         (tmp_path / "own" / name).write_text(text)
@@ -143,6 +145,6 @@ def test_records_with_unlike_gaps() -> None:
 
     records = {"X": record("X", 300), "Y": record("Y", 200)}
     mode = ElasticMode(25.0, 0.04, 1.0, 1.0)
-    assert _beside({}, {"X": (mode,), "Y": ()}, records, None) == {"X": (mode,), "Y": ()}
+    assert _couple_modes({}, {"X": (mode,), "Y": ()}, records, None) == {"X": (mode,), "Y": ()}
     with pytest.raises(InputError, match=r"differ from axis to axis: X 0 to 0\.598 s, Y 0 to 0\.398 s; give a window"):
         Replay(load_machine(MACHINES / "sinumerik_840d"), records)

@@ -12,7 +12,7 @@ from drive_helpers import COLUMNS, MACHINES, SCENARIO
 from feedsim.estimation.identify.parameters import estimate
 from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.closed_loop import cut_window, read_axes
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.tuning import OtherCycle, decision, gain_of, with_either
 from feedsim.files.columns import load_columns
@@ -83,7 +83,7 @@ def test_a_delay_of_half_a_cycle_does_not_hide_it(cycle: str, tmp_path: Path) ->
         COLUMNS + "speed_setpoint: {column: X.n_s}\nfeedforward: {column: X.n_ffw}\n"
     )
     read = read_axes(tmp_path / "log.csv", ["X"], None, load_columns(tmp_path / "columns.yaml"))
-    found = identify_drives(read, {"X": windowed("X", read["X"], None)}, None, [], "made", "by a test")
+    found = identify_drives(read, {"X": cut_window("X", read["X"], None)}, None, [], "made", "by a test")
     one = found.drives["X"]
     assert not found.undecided_cycle
     assert one.machine.cycles.T_pos == pytest.approx(known.machine.cycles.T_pos)

@@ -10,7 +10,7 @@ import pytest
 
 import drive_helpers
 from feedsim.estimation.identify import Record
-from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.replay.closed_loop import AxisRecord, cut_window, read_axes
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import ElasticMode, resonance, with_modes
 from feedsim.files.columns import load_columns
@@ -57,7 +57,7 @@ def test_modes_of_a_simulated_axis_come_back(tmp_path: Path) -> None:
     write_csv(tmp_path / "log.csv", log)
     (tmp_path / "columns.yaml").write_text(COLUMNS)
     read = read_axes(tmp_path / "log.csv", ["X"], None, load_columns(tmp_path / "columns.yaml"))
-    records = {"X": windowed("X", read["X"], None)}
+    records = {"X": cut_window("X", read["X"], None)}
     found = identify_drives(read, records, None, ["by a test"], "made", "by a test", modes=None)
     one = found.drives["X"]
     assert [mode.frequency for mode in one.modes] == pytest.approx([24.0, 47.0], rel=0.02)

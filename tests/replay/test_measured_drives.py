@@ -13,7 +13,7 @@ import pytest
 from drive_helpers import MACHINES, identified
 from feedsim.cli import main
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.closed_loop import cut_window, read_axes
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.files.columns import load_columns
 from feedsim.scenario import load_machine
@@ -109,7 +109,7 @@ def test_the_published_controller_of_a_measured_axis() -> None:
     machine = load_machine(MACHINES / "emps")
     mapping = load_columns(MACHINES / "emps" / "columns.yaml")
     read = read_axes(Path(os.environ["FEEDSIM_EMPS"]), ["X"], machine, mapping)
-    records = {"X": windowed("X", read["X"], (0.0, 6.0))}
+    records = {"X": cut_window("X", read["X"], (0.0, 6.0))}
     found = identify_drives(read, records, machine, [], "", "").drives["X"]
     axis = machine.axes["X"]
     published = {"K_v": axis.drive.K_v, "K_p": axis.drive.K_p, "F_C": axis.friction.F_C,

@@ -12,7 +12,7 @@ import pytest
 
 from drive_helpers import COLUMNS, MACHINES, SCENARIO, logged
 from feedsim.cli import main
-from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.closed_loop import cut_window, read_axes
 from feedsim.estimation.replay.identified import DrivesFound, identify_drives
 from feedsim.files.columns import load_columns
 from feedsim.files.trace import write_csv
@@ -58,7 +58,7 @@ def simple_axis(
     write_csv(folder / "log.csv", replace(log, columns={**log.columns, "X.M_a": np.clip(torque, -most, most)}))
     (folder / "columns.yaml").write_text(COLUMNS.replace("deviation: {column: X.x_e}\n", ""))
     read = read_axes(folder / "log.csv", ["X"], None, load_columns(folder / "columns.yaml"))
-    records = {"X": windowed("X", read["X"], None)}
+    records = {"X": cut_window("X", read["X"], None)}
     return scenario.machine, identify_drives(read, records, None, [], "made", "by a test", position_cycle=125e-6)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from agreement_helpers import assert_numbers_agree
 from feedsim.cli import main
-from feedsim.estimation.replay.closed_loop import Replay, read_axes, windowed
+from feedsim.estimation.replay.closed_loop import Replay, cut_window, read_axes
 from feedsim.files.trace import Trace, read_csv, write_csv
 from feedsim.files.trace.trace import Array
 from feedsim.scenario import load, load_machine
@@ -172,7 +172,7 @@ def test_a_load_that_was_recorded_acts(
 def test_a_load_goes_with_the_scale_of_the_torques(log: Path) -> None:
     """An inertia that is being identified is a scale of all torques: half of each, and of the load, moves the same."""
     machine = load_machine(MACHINE)
-    each = windowed("Z", read_axes(log, ["Z"], machine)["Z"], (0.1, 0.2))
+    each = cut_window("Z", read_axes(log, ["Z"], machine)["Z"], (0.1, 0.2))
     pulse = 4.0 * np.exp(-(((each.record.time - 0.15) / 0.01) ** 2))
 
     def moved(load: float, scale: float) -> Array:
@@ -187,7 +187,7 @@ def test_a_load_goes_with_the_scale_of_the_torques(log: Path) -> None:
 def test_rests_at_both_ends_are_not_run_where_motion_is_asked_for(log: Path) -> None:
     """The motion is that of the whole record; ahead of it and behind it the axis stays as the run begins and ends."""
     machine = load_machine(MACHINE)
-    whole = windowed("Z", read_axes(log, ["Z"], machine)["Z"], None)
+    whole = cut_window("Z", read_axes(log, ["Z"], machine)["Z"], None)
     still = np.full(200, 1.0)
 
     def longer(values: Array) -> Array:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drive_helpers import COLUMNS, MACHINES
-from feedsim.estimation.replay.closed_loop import read_axes, windowed
+from feedsim.estimation.replay.closed_loop import cut_window, read_axes
 from feedsim.estimation.replay.drive import start_of
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import ElasticMode, with_modes
@@ -59,7 +59,7 @@ def test_the_structure_of_a_drive(
     write_csv(tmp_path / "log.csv", log)
     (tmp_path / "columns.yaml").write_text(COLUMNS)
     read = read_axes(tmp_path / "log.csv", ["X"], None, load_columns(tmp_path / "columns.yaml"))
-    records = {"X": windowed("X", read["X"], None)}
+    records = {"X": cut_window("X", read["X"], None)}
     found = identify_drives(read, records, None, [], "made", "by a test", position_cycle=125e-6).drives["X"]
     assert [one.name for one in found.rivals if one.taken] == taken
     true = scenario.machine.axes["X"]
@@ -96,7 +96,7 @@ def test_an_elastic_mode_that_nobody_asked_for(tmp_path: Path, monkeypatch: pyte
     write_csv(tmp_path / "log.csv", log)
     (tmp_path / "columns.yaml").write_text(COLUMNS)
     read = read_axes(tmp_path / "log.csv", ["X"], None, load_columns(tmp_path / "columns.yaml"))
-    records = {"X": windowed("X", read["X"], None)}
+    records = {"X": cut_window("X", read["X"], None)}
     found = identify_drives(read, records, None, [], "made", "by a test", position_cycle=125e-6).drives["X"]
     for name in ("K_p", "T_n"):
         assert found.estimates[name].status == "undetermined"

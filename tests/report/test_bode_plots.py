@@ -16,7 +16,7 @@ from feedsim.files.trace.response import FrequencyResponse
 from feedsim.report import chart
 from feedsim.report.chart import Panel
 from feedsim.report.chart.model import ranges, ticks
-from feedsim.report.frf.bode import Column, Curve, Ordinate, at, bode_chart, phases
+from feedsim.report.frf.bode import Column, Curve, Ordinate, bode_chart, curve_value, phases
 from feedsim.report.frf.bode_plots import (
     curves_of,
     loop_pictures,
@@ -73,7 +73,7 @@ def test_phase_begins_between_plus_and_minus_180(start: float, shown: float) -> 
 
 def test_values_between_samples() -> None:
     curve = closed((2j * np.pi * F) ** -1.0)
-    assert at(curve, 33.3) == pytest.approx(1 / (2j * np.pi * 33.3), rel=1e-9)
+    assert curve_value(curve, 33.3) == pytest.approx(1 / (2j * np.pi * 33.3), rel=1e-9)
 
 
 def test_points_of_low_coherence_are_faded_and_do_not_set_the_scale() -> None:

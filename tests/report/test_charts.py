@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
-from feedsim.report.chart.model import embedded, measured, ranges, ticks
+from feedsim.report.chart.model import axis_measure, embed_charts, ranges, ticks
 from feedsim.report.chart.svg import svg
 from feedsim.report.content import Picture
 from svg_helpers import Drawn, drawn_panels, overlap
@@ -122,9 +122,11 @@ def test_axes_are_marked_by_round_values(
 
 def test_axis_that_is_logarithmic_both_ways() -> None:
     values = np.array([-1e4, -10.0, -1e-9, 0.0, 3.0, 1e4])
-    seen = measured(Axis("v", symlog=10.0), values)
+    seen = axis_measure(Axis("v", symlog=10.0), values)
     assert np.all(np.diff(seen) > 0)
-    assert seen[-1] - measured(Axis("v", symlog=10.0), 1e3) == pytest.approx(1.0, abs=0.01)  # a decade far from zero
+    assert seen[-1] - axis_measure(Axis("v", symlog=10.0), 1e3) == pytest.approx(
+        1.0, abs=0.01
+    )  # a decade far from zero
     panel = Panel("", TIME, Axis("v", symlog=10.0), [Curve("", X, 1e3 * np.sin(X))])
     assert ranges(panel)[1][1] > 1e3 * math.sin(1.0)
 
@@ -233,7 +235,7 @@ def test_the_cell_that_is_looked_for_has_a_frame_and_a_map_its_room() -> None:
     for each, frames in ((grid, 1), (plain, 0)):
         text = svg(Chart([each]), "m", "t")
         assert text.count('stroke="var(--ink)" stroke-width="2.2"') == frames
-        (panel,) = json.loads(embedded({"m": Chart([each])}))["charts"]["m"]["panels"]
+        (panel,) = json.loads(embed_charts({"m": Chart([each])}))["charts"]["m"]["panels"]
         assert panel.get("best") == (None if each.best is None else [1, 0])
     text = svg(Chart([grid]), "m", "t")
     whole = float(re.search(r'viewBox="0 0 ([\d.]+)', text)[1])

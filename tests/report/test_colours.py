@@ -49,7 +49,10 @@ RAW = {"BLUE", "VERMILLION", "GREEN", "PURPLE", "ORANGE", "SKY", "WINE"}
 def test_no_two_meanings_share_a_colour() -> None:
     colours = [getattr(formatting, name) for name in MEANINGS]
     assert len(set(colours)) == len(colours)
-    assert (formatting.BEFORE, formatting.AFTER) == (formatting.RECORDED, formatting.SIMULATED)
+    assert (formatting.BEFORE_COLOUR, formatting.AFTER_COLOUR) == (
+        formatting.RECORDED_COLOUR,
+        formatting.SIMULATED_COLOUR,
+    )
 
 
 def test_colours_are_taken_by_their_meaning() -> None:
@@ -91,9 +94,9 @@ RESULT, RECORD = OneOf(figures={"XZ.G": 1.0}), OneOf()
 @pytest.mark.parametrize(
     ("sources", "colours"),
     [
-        ([RESULT, RESULT], [formatting.BEFORE, formatting.AFTER]),
-        ([RESULT, RECORD], [formatting.SIMULATED, formatting.RECORDED]),
-        ([RECORD, RESULT, RESULT], [formatting.RECORDED, formatting.SIMULATED, formatting.SKY]),
+        ([RESULT, RESULT], [formatting.BEFORE_COLOUR, formatting.AFTER_COLOUR]),
+        ([RESULT, RECORD], [formatting.SIMULATED_COLOUR, formatting.RECORDED_COLOUR]),
+        ([RECORD, RESULT, RESULT], [formatting.RECORDED_COLOUR, formatting.SIMULATED_COLOUR, formatting.SKY]),
     ],
 )
 def test_results_over_each_other(sources: list[OneOf], colours: list[str]) -> None:
@@ -118,7 +121,7 @@ def test_names_of_blocks_have_room() -> None:
 
 
 def test_curves_take_their_meaning_by_default() -> None:
-    assert Curve("", np.zeros(1), np.zeros(1)).colour == formatting.SIMULATED
+    assert Curve("", np.zeros(1), np.zeros(1)).colour == formatting.SIMULATED_COLOUR
 
 
 # What the colour-blind see of linear RGB (Machado, Oliveira, Fernandes 2009, severity 1), protan and deutan.
@@ -156,6 +159,6 @@ def test_both_directions_of_a_circle_are_told_apart(ground: int, seen: str) -> N
     back, paper = shades[formatting.CLOCKWISE], shades[formatting.PAPER]
     y, y_paper = (float(linear(colour) @ [0.2126, 0.7152, 0.0722]) for colour in (back, paper))
     assert (max(y, y_paper) + 0.05) / (min(y, y_paper) + 0.05) > 3
-    for other in (formatting.SIMULATED, formatting.RECORDED, formatting.AT_TOOL):
+    for other in (formatting.SIMULATED_COLOUR, formatting.RECORDED_COLOUR, formatting.AT_TOOL):
         distance = np.linalg.norm(lab(SEEN[seen] @ linear(back)) - lab(SEEN[seen] @ linear(shades[other])))
         assert distance > 20, other

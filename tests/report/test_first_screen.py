@@ -18,7 +18,7 @@ import pytest
 from feedsim.analysis import diagnoses, evaluate
 from feedsim.foundation.errors import Finding
 from feedsim.report import run as report
-from feedsim.report.content import Report, parted
+from feedsim.report.content import Report, split_finding
 from feedsim.report.page import html
 from kinds_helpers import KINDS, Kinds
 from page_browsers import drawn
@@ -130,11 +130,11 @@ def test_what_is_wrong_stands_ahead_of_the_answer() -> None:
 
 def test_long_findings_are_parted_and_lose_nothing() -> None:
     text = " ".join(f"word{k}" + ("." if k % 9 == 8 else "") for k in range(80))
-    head, rest = parted(text)
+    head, rest = split_finding(text)
     assert f"{head} {rest}" == text
     assert head.endswith(".")
     assert len(head.split()) <= 30
-    assert parted("short") == ("short", "")
+    assert split_finding("short") == ("short", "")
 
 
 NUMBER = re.compile(r"−?\d+(?:\.\d+)?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")

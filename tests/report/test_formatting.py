@@ -7,7 +7,7 @@ import pytest
 from feedsim.analysis import Figure
 from feedsim.foundation.errors import Finding
 from feedsim.report.content import Report
-from feedsim.report.formatting import display_unit, duration, minus, powers, shown, typeset
+from feedsim.report.formatting import display_unit, duration, figure_text, minus, powers, typeset
 from feedsim.report.page import html
 from report_helpers import Page
 
@@ -38,7 +38,11 @@ def test_units_to_a_power() -> None:
 
 
 def test_a_delay_is_told_in_microseconds() -> None:
-    assert [shown(Figure(value, "ms", ""))[0] for value in (0.3519, -3.94217, 99.02)] == ["0.352", "−3.942", "99.0"]
+    assert [figure_text(Figure(value, "ms", ""))[0] for value in (0.3519, -3.94217, 99.02)] == [
+        "0.352",
+        "−3.942",
+        "99.0",
+    ]
 
 
 def test_durations_read_well() -> None:

@@ -14,7 +14,7 @@ from feedsim.estimation.identify import Options, stages
 from feedsim.estimation.identify.result import Estimate, Identification, Stationary
 from feedsim.report.chart import Curve, Panel
 from feedsim.report.content import Picture, Report, Tile
-from feedsim.report.formatting import counted
+from feedsim.report.formatting import count_things
 from feedsim.report.identify import headline
 from feedsim.report.identify.report import report_of
 from feedsim.report.identify.stribeck_plots import speeds_of, stribeck_picture, stribeck_title
@@ -76,7 +76,7 @@ def test_one_is_not_many() -> None:
     )
     line = headline(identified(found=one))
     assert "no curve: 1 speed, 1 plateau; pre-sliding from 1 stretch, " in line
-    assert [counted(n, "speed") for n in (0, 1, 2)] == ["0 speeds", "1 speed", "2 speeds"]
+    assert [count_things(n, "speed") for n in (0, 1, 2)] == ["0 speeds", "1 speed", "2 speeds"]
 
 
 def test_whose_curve_it_is() -> None:

@@ -17,16 +17,16 @@ from PIL import Image
 from feedsim import cli
 from feedsim.foundation.errors import InputError
 from feedsim.report.machine.record import (
-    FRONT,
+    FRONT_VIEW,
     MODE_DEFLECTION,
     OBLIQUE,
-    SIDE,
-    TOP,
+    SIDE_VIEW,
+    TOP_VIEW,
     Model,
     model,
     motion,
     solids,
-    turned,
+    turn_vectors,
     view,
 )
 from feedsim.report.machine.report import FRAMES, telling_view
@@ -118,7 +118,7 @@ def test_a_mode_by_its_frequency_still_and_in_motion(tmp_path: Path, capsys: Cap
 def test_the_side_view_is_chosen_that_shows_the_motion() -> None:
     """21 Hz is the bed rocking about X, 25 Hz rocking about Z, 42 Hz turning about Y."""
     _, built, of = ready(TEST_CENTRE)
-    assert [telling_view(of, motion(built, of, k)) for k in (3, 4, 6)] == [SIDE, FRONT, TOP]
+    assert [telling_view(of, motion(built, of, k)) for k in (3, 4, 6)] == [SIDE_VIEW, FRONT_VIEW, TOP_VIEW]
 
 
 def test_deflections_are_of_a_size_to_be_seen() -> None:
@@ -151,23 +151,23 @@ def test_solids_have_the_machines_size() -> None:
 def test_turning_keeps_lengths() -> None:
     rng = np.random.default_rng(1)
     vectors, rotations = rng.normal(size=(5, 3)), rng.normal(size=(4, 3)) * 2
-    found = turned(vectors, rotations)
+    found = turn_vectors(vectors, rotations)
     assert np.linalg.norm(found, axis=2) == pytest.approx(np.tile(np.linalg.norm(vectors, axis=1), (4, 1)))
-    quarter = turned(np.array([[1.0, 0, 0]]), np.array([[0, 0, np.pi / 2]]))
+    quarter = turn_vectors(np.array([[1.0, 0, 0]]), np.array([[0, 0, np.pi / 2]]))
     assert quarter[0, 0] == pytest.approx([0, 1, 0], abs=1e-15)
-    assert turned(vectors, np.zeros((1, 3)))[0] == pytest.approx(vectors)
+    assert turn_vectors(vectors, np.zeros((1, 3)))[0] == pytest.approx(vectors)
 
 
 def test_y_is_up_in_every_view_but_from_above() -> None:
-    for where in (OBLIQUE, FRONT, SIDE, view("", (-1, 2, 0.3))):
+    for where in (OBLIQUE, FRONT_VIEW, SIDE_VIEW, view("", (-1, 2, 0.3))):
         x, y = where.flat(np.array([0.0, 1.0, 0.0]))
         assert x == pytest.approx(0, abs=1e-15)
         assert y > 0
-    for where in (OBLIQUE, FRONT, SIDE, TOP):
+    for where in (OBLIQUE, FRONT_VIEW, SIDE_VIEW, TOP_VIEW):
         assert where.basis @ where.basis.T == pytest.approx(np.eye(3), abs=1e-15)
         assert np.linalg.det(where.basis) == pytest.approx(1)
-    assert FRONT.flat(np.array([1.0, 2.0, 3.0])) == pytest.approx([1, 2])
-    assert TOP.flat(np.array([1.0, 2.0, 3.0])) == pytest.approx([1, -3])
+    assert FRONT_VIEW.flat(np.array([1.0, 2.0, 3.0])) == pytest.approx([1, 2])
+    assert TOP_VIEW.flat(np.array([1.0, 2.0, 3.0])) == pytest.approx([1, -3])
 
 
 def test_matrices_with_a_mesh_are_drawn_as_lines(tmp_path: Path, capsys: Capture) -> None:

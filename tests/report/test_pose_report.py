@@ -19,7 +19,7 @@ from feedsim.report.run.report import report_of
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation import cosim, judge
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.pose_change import LARGE_SHIFT, MAX_MODE_FREQUENCY, PoseChange, pose_change, warnings
 from report_helpers import positioning_run, write_run
@@ -140,7 +140,7 @@ def part_of(run: judge.JudgedRun) -> Mapping[str, object]:
 
 def test_a_run_with_one_pose(units: Path, tmp_path: Path) -> None:
     plan = scenario(Move(to={"Z": 0.3}, feed=0.5), Dwell(duration=0.05))
-    run = judged(cosim.run(plan))
+    run = judge_run(cosim.run(plan))
     assert run.pose.crossings is None
     (left,) = (finding for finding in run.warnings if finding.code == "pose-left")
     assert (left.place, left.remedy) == ("Z", "feedsim export --plant ... --poses Z=20mm")
@@ -166,7 +166,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     assert main(arguments) == 0
     assert "follows the pose, 3 cells (3 in Z)" in capsys.readouterr().out
     machine = default_machine().model_copy(update={"plant": plant})
-    run = judged(cosim.run(scenario(Move(to={"Z": 0.23}, feed=0.5), Dwell(duration=0.05), machine=machine)))
+    run = judge_run(cosim.run(scenario(Move(to={"Z": 0.23}, feed=0.5), Dwell(duration=0.05), machine=machine)))
     crossings = run.pose.crossings
     assert crossings is not None
     assert crossings.count == 2
@@ -188,7 +188,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     ]
     assert isinstance(part["crossings"], dict)
     assert part["crossings"]["count"] == 2
-    far = judged(cosim.run(scenario(Move(to={"Z": 0.4}, feed=0.5), machine=machine)))
+    far = judge_run(cosim.run(scenario(Move(to={"Z": 0.4}, feed=0.5), machine=machine)))
     (left,) = (finding for finding in far.warnings if finding.code == "pose-grid-left")
     assert "(60 mm to 240 mm) by 160 mm" in left.text
 

@@ -24,11 +24,11 @@ from feedsim.analysis import Figure, evaluate
 from feedsim.cli.commands import finish, warn
 from feedsim.files.trace import read_csv
 from feedsim.foundation.errors import Finding
-from feedsim.jobs.check import Checked
+from feedsim.jobs.check import CheckReport
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.chart.model import embedded
+from feedsim.report.chart.model import embed_charts
 from feedsim.report.content import Tile
 from feedsim.report.formatting import PAGE_COLOURS
 from feedsim.report.page import script
@@ -148,7 +148,7 @@ def test_names_from_files_cannot_break_the_page(tmp_path: Path) -> None:
     assert page.tags.count("script") == 2
     curves = [Curve("<b>", np.arange(2.0), np.ones(2))]
     foreign = Chart([Panel("</script><script>alert(1)", Axis("&"), Axis("y"), curves)])
-    data = embedded({"a": foreign})
+    data = embed_charts({"a": foreign})
     assert not set("<>&") & set(data)
     assert json.loads(data)["charts"]["a"]["panels"][0]["title"] == "</script><script>alert(1)"
     assert "a < b & c" in page.words
@@ -188,8 +188,8 @@ def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.C
         "feedsim: WRONG: worse than < before", "feedsim: warning: doubtful", "feedsim: note: as built",
     ]  # fmt: skip
     options = Namespace(quiet=False, json=False, verbose=False, strict=False)
-    assert finish(Checked(["done"], found), None, options) == 0
-    assert finish(Checked([], found), None, Namespace(quiet=True, json=False, verbose=False, strict=True)) == 1
+    assert finish(CheckReport(["done"], found), None, options) == 0
+    assert finish(CheckReport([], found), None, Namespace(quiet=True, json=False, verbose=False, strict=True)) == 1
     assert capsys.readouterr().out.splitlines() == ["WRONG: worse than < before", "done"]
 
 

@@ -13,7 +13,7 @@ from feedsim.motions import Circle, Dwell, Move
 from feedsim.report import chart
 from feedsim.report.chart import Panel, Polar
 from feedsim.report.content import LARGEST_SVG
-from feedsim.report.formatting import CLOCKWISE, SIMULATED
+from feedsim.report.formatting import CLOCKWISE, SIMULATED_COLOUR
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture, ring_step
 from feedsim.report.run.report import draw
 from feedsim.scenario import Axis, CircleTest, Positioning
@@ -93,8 +93,9 @@ def test_a_circle_driven_both_ways_is_drawn_both_ways() -> None:
         assert isinstance(panel, (Panel, Polar))
         looks = {each.name: (each.colour, each.dash) for each in panel.curves if each.name.startswith("linear")}
         assert looks == {
-            "linear scales, counterclockwise": (SIMULATED, ""), "linear scales, clockwise": (CLOCKWISE, "dashed"),
-        }  # fmt: skip
+            "linear scales, counterclockwise": (SIMULATED_COLOUR, ""),
+            "linear scales, clockwise": (CLOCKWISE, "dashed"),
+        }
     turned = {curve.name: np.diff(np.unwrap(curve.x)) for curve in polar.curves}
     assert np.all(turned["linear scales, counterclockwise"] > 0)
     assert np.all(turned["linear scales, clockwise"] < 0)

@@ -16,7 +16,7 @@ import feedsim as fs
 from command_helpers import feedsim, summary_of
 from feedsim.foundation import installation
 from feedsim.report.run.files import _name
-from feedsim.report.run.sheet import FAILS, NO_LIMIT_TEXT, OPEN, PASSES, judged
+from feedsim.report.run.sheet import FAILS, NO_LIMIT_TEXT, OPEN, PASSES, judge_figure
 
 ROOT = Path(__file__).resolve().parents[2]
 CYCLE = """
@@ -204,7 +204,7 @@ def test_names_of_worksheets() -> None:
     ],
 )  # fmt: skip
 def test_verdicts(value: float, limit: float, uncertainty: float, verdict: str) -> None:
-    assert judged(value, limit, uncertainty) == verdict
+    assert judge_figure(value, limit, uncertainty) == verdict
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
-from feedsim.report.chart.model import NARROWEST, UNITS_WITH_PREFIX, ticks
+from feedsim.report.chart.model import MIN_RELATIVE_SPAN, UNITS_WITH_PREFIX, ticks
 from feedsim.report.chart.svg import WIDTH, svg
 from feedsim.report.content import Picture, Report
-from feedsim.report.page import drawing, html
+from feedsim.report.page import drawing_script, html
 from feedsim_packager.units import parse
 from svg_helpers import drawn_panels
 
@@ -144,7 +144,7 @@ def test_ticks_are_the_same_at_any_span(browser: Any) -> None:
         axis = axes[random.integers(len(axes))]
         middle, wide = random.uniform(-1, 1) * 10 ** random.uniform(-6, 6), 10 ** random.uniform(-7, 6)
         low, high = middle - wide, middle + wide
-        if high - low < NARROWEST * max(abs(low), abs(high)):
+        if high - low < MIN_RELATIVE_SPAN * max(abs(low), abs(high)):
             continue
         if axis.log:
             low, high = abs(middle), abs(middle) * (1 + wide)
@@ -154,7 +154,7 @@ def test_ticks_are_the_same_at_any_span(browser: Any) -> None:
         asked.append([known, low, high, most])
         expected.append(ticks(axis, (low, high), most))
     page = browser.new_page()
-    script = drawing().partition("// What a reader does with the charts")[0]
+    script = drawing_script().partition("// What a reader does with the charts")[0]
     found = page.evaluate(f"asked => {{ {script}; return ({TICKS})(asked); }}", asked)
     page.close()
     assert len(found) > 400

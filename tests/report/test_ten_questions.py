@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from feedsim.analysis import evaluate
-from feedsim.foundation.arguments import Call, calling
+from feedsim.foundation.arguments import Call, call_context
 from feedsim.foundation.errors import Finding
 from feedsim.jobs.parameters import command_line
-from feedsim.report.content import FOLDER, Report, Step, typed
+from feedsim.report.content import FOLDER, Report, Step, command_path
 from feedsim.report.page import html
 from kinds_helpers import Kinds
 from page_browsers import drawn
@@ -102,14 +102,14 @@ def test_where_the_data_are_and_how_one_prints(browser: Any, kinds: Kinds) -> No
 
 def test_commands_of_the_next_step_can_be_typed(kinds: Kinds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     step = Step("Then", "diff", {"results": [FOLDER, "other folder"]})
-    with calling(Call({"figures": ("png",), "control": "sinumerik"}, command_line)):
+    with call_context(Call({"figures": ("png",), "control": "sinumerik"}, command_line)):
         assert step.line(Path("my results")) == "feedsim diff 'my results' 'other folder' --control sinumerik"
         assert step.line(None) == ""  # a result that is in no folder
     assert step.line(Path("my results")) == ""  # outside of jobs
     monkeypatch.chdir(tmp_path)
-    assert typed(tmp_path / "a" / "b c.yaml") == "'a/b c.yaml'"
-    assert typed(Path("a.yaml")) == "a.yaml"
-    assert typed(Path("/elsewhere/a.yaml")) == "/elsewhere/a.yaml"
+    assert command_path(tmp_path / "a" / "b c.yaml") == "'a/b c.yaml'"
+    assert command_path(Path("a.yaml")) == "a.yaml"
+    assert command_path(Path("/elsewhere/a.yaml")) == "/elsewhere/a.yaml"
     assert "friction=identify/friction.yaml" in kinds.page("identify").read_text(encoding="utf-8").replace(
         f"{kinds.folder}/", ""
     )

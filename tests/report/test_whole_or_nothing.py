@@ -12,7 +12,7 @@ import pytest
 from feedsim.analysis import evaluate
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import OutputError
-from feedsim.foundation.outputs import replacing
+from feedsim.foundation.outputs import allow_replacement
 from feedsim.jobs.run import KIND
 from feedsim.report.content import Report
 from feedsim.report.results import write_report
@@ -104,7 +104,7 @@ def test_a_result_of_a_kind_nobody_knows_goes_but_for_what_it_keeps(tmp_path: Pa
     assert (summary["kind"], summary["answer"], summary["keeps"]) == ("odd", ["It is odd."], ["odd.yaml"])
     assert set(summary["files"]) == {str(path.relative_to(tmp_path)) for path in written}
     (tmp_path / "mine.csv").write_text("mine")
-    with replacing():
+    with allow_replacement():
         write_run(small_run(), {}, tmp_path)
     assert not (tmp_path / "odd.csv").exists()
     assert (tmp_path / "odd.yaml").read_text() == "y"

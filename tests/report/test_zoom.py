@@ -15,7 +15,7 @@ import pytest
 from feedsim.analysis import evaluate
 from feedsim.files.trace import read_csv
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.chart.model import BLOCK_ROWS, embedded, steps, ticks
+from feedsim.report.chart.model import BLOCK_ROWS, embed_charts, steps, ticks
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from kinds_helpers import KINDS, Kinds
@@ -63,7 +63,7 @@ def decoded(rows: int, content: bytes) -> np.ndarray:
 def test_a_nanometre_over_two_metres() -> None:
     t, x = far_off()
     panel = Panel("", Axis("time", "s"), Axis("position", "mm"), [Curve("", t, x)])
-    data = json.loads(embedded({"one": Chart([panel])}))
+    data = json.loads(embed_charts({"one": Chart([panel])}))
     rows, text = data["arrays"][1]
     error = np.abs(decoded(rows, base64.b64decode(text)) - x)
     assert error.max() < 0.51 * rows * 2 / 2**32  # mm: half a step of a block while it moves by 2 mm a row
@@ -93,7 +93,7 @@ def test_arrays_of_every_kind(values: list[float]) -> None:
 def test_a_logarithmic_axis_keeps_relative_digits() -> None:
     x, y = np.array([1.0, 10.0, 1000.0]), np.array([1e-12, 1.0, 1e6])
     panel = Panel("", Axis("f", "Hz", log=True), Axis("gain", log=True), [Curve("", x, y)])
-    rows, text = json.loads(embedded({"one": Chart([panel])}))["arrays"][1]
+    rows, text = json.loads(embed_charts({"one": Chart([panel])}))["arrays"][1]
     assert rows == 0
     np.testing.assert_allclose(np.frombuffer(base64.b64decode(text), "<f4"), y, rtol=1e-7)
 

@@ -10,7 +10,7 @@ import yaml
 
 from feedsim.files.columns import Columns, Signal, load_columns
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.units import is_rms, spelled
+from feedsim.foundation.units import is_rms, spell_unit
 from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -88,7 +88,7 @@ def test_made_in_python() -> None:
     ],
 )  # fmt: skip
 def test_spellings_of_drives(unit: str, meant: str) -> None:
-    assert spelled(unit) == meant
+    assert spell_unit(unit) == meant
     assert is_rms(unit) == ("rms" in unit)
 
 

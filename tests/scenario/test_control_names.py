@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from command_helpers import feedsim
-from feedsim.files.control import CONTROLS, known, names_of
+from feedsim.files.control import CONTROLS, find_name, names_of
 from feedsim.files.control.names import table
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
@@ -59,14 +59,14 @@ def test_numbers_are_unique() -> None:
     ],
 )
 def test_conversion(number: str, value: float, text: str, unit: str) -> None:
-    name = known(number)
+    name = find_name(number)
     assert name is not None
     assert name.ours(value) == pytest.approx(units.parse(text, unit), rel=1e-14)
     assert name.shown(name.ours(value)) == pytest.approx(value, rel=1e-14)
 
 
 def test_frequency_and_rms() -> None:
-    frequency, torque = known("p1433"), known("p316")
+    frequency, torque = find_name("p1433"), find_name("p316")
     assert frequency is not None
     assert torque is not None
     assert frequency.ours(100) == pytest.approx(200 * math.pi, rel=1e-15)

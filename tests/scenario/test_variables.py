@@ -18,9 +18,9 @@ def test_the_packager_writes_what_is_loaded(tmp_path: Path) -> None:
 
 def test_a_table_that_is_missing_names_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(units, "FILE", tmp_path / "none.json")
-    units._read.cache_clear()
+    units._read_tables.cache_clear()
     with pytest.raises(InputError, match=r"none\.json is missing; `make fmus` builds it"):
-        units._read()
+        units._read_tables()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from feedsim.files import source
-from feedsim.files.source import MAX_VALUES, Place, _brackets, parse, read
+from feedsim.files.source import MAX_VALUES, Place, _brackets, parse, read_yaml
 from feedsim.foundation.errors import InputError
 
 
@@ -131,21 +131,21 @@ def test_files_that_cannot_be_read(tmp_path: Path, content: bytes, message: str)
     path = tmp_path / "s.yaml"
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"s\.yaml") as caught:
-        read(path)
+        read_yaml(path)
     assert message in str(caught.value)
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no such file: .*none\.yaml"):
-        read(tmp_path / "none.yaml")
+        read_yaml(tmp_path / "none.yaml")
     with pytest.raises(InputError, match="is a folder"):
-        read(tmp_path)
+        read_yaml(tmp_path)
 
 
 def test_byte_order_mark_and_other_line_ends(tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     path.write_bytes(b"\xef\xbb\xbfa: 1\r\nb: 2\r\n")
-    source = read(path)
+    source = read_yaml(path)
     assert source.data == {"a": 1, "b": 2}
     assert source.mark(("b",)).where == f"{path}:2"
 

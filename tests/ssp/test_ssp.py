@@ -13,13 +13,13 @@ from feedsim import analysis, scenario
 from feedsim.foundation.errors import Finding
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation import cosim, nc, ssp
-from feedsim.simulation.judge import JudgedRun, judged
-from feedsim.simulation.ssp.opened import Opened
+from feedsim.simulation.judge import JudgedRun, judge_run
+from feedsim.simulation.ssp.opened import OpenedSystem
 from ssp_helpers import ROOT, STRUCTURE, edited, run_ssp, short_scenario
 
 
 def run_scenario(file: Path, fmus: Path, *overrides: str) -> JudgedRun:
-    return judged(cosim.run(scenario.load(file, overrides), fmus=fmus))
+    return judge_run(cosim.run(scenario.load(file, overrides), fmus=fmus))
 
 
 def assert_same(one: JudgedRun, other: JudgedRun) -> None:
@@ -71,7 +71,7 @@ def test_recorded_setpoints_travel_along(fmus: Path, tmp_path: Path) -> None:
     file = ROOT / "scenarios" / "z_measured.yaml"
     loaded = scenario.load(file)
     done = ssp.export(loaded, tmp_path / "z_measured.ssp", fmus=fmus)
-    with ssp.opened(done.path) as found:
+    with ssp.open_system(done.path) as found:
         planned = nc.plan(loaded)
         assert [s.kind for s in found.program.segments] == [s.kind for s in planned.segments]
         for axis in loaded.machine.axes:
@@ -97,7 +97,7 @@ def test_the_structure_travels_along(exported: Path, fmus: Path, tmp_path: Path)
     """As geometry, from which the report says what other poses change; a table of modes alone has none."""
     loaded = scenario.load(ROOT / "scenarios" / "z_positioning.yaml")
     done = ssp.export(loaded, tmp_path / "z.ssp", fmus=fmus)
-    with ssp.opened(done.path) as found:
+    with ssp.open_system(done.path) as found:
         here, there = loaded.machine.structure, found.scenario.machine.structure
         assert here is not None
         assert there is not None
@@ -257,7 +257,7 @@ def test_a_longer_experiment(exported: Path, tmp_path: Path) -> None:
     """The axes rest behind the end of the table; the evaluation stays, and nothing is to be warned of."""
     one = run_ssp(exported)
     longer = with_stop(exported, tmp_path / "longer.ssp", one.program.duration + 0.1)
-    with ssp.opened(longer) as found:
+    with ssp.open_system(longer) as found:
         assert found.warnings == ()
         assert found.program.segments == one.program.segments
         assert found.scenario.evaluate == one.scenario.evaluate != ()
@@ -273,7 +273,7 @@ def test_a_shorter_experiment(exported: Path, tmp_path: Path, stop: float, left:
     """The stop time counts: motions are cut there, and what is no longer driven to its end is not evaluated."""
     whole = run_ssp(exported)
     file = with_stop(exported, tmp_path / "shorter.ssp", stop)
-    with ssp.opened(file) as found:
+    with ssp.open_system(file) as found:
         assert found.program.duration == pytest.approx(stop, abs=1e-12)  # a multiple of 1 ms
         assert len(found.program.segments) == left
         assert found.program.segments[:-1] == whole.program.segments[: left - 1]
@@ -289,10 +289,10 @@ def test_a_shorter_experiment(exported: Path, tmp_path: Path, stop: float, left:
 
 def test_every_stop_time_can_be_run(exported: Path, tmp_path: Path) -> None:
     """Also those just ahead of and behind the ends of motions and rests."""
-    with ssp.opened(exported) as found:
+    with ssp.open_system(exported) as found:
         move, rest = (segment.end for segment in found.program.segments)
     for stop in (0.001, move - 0.001, move, move + 0.001, move + 0.049, move + 0.051, rest - 0.001, rest, rest + 0.001):
-        with ssp.opened(with_stop(exported, tmp_path / "x.ssp", round(stop, 3))) as found:
+        with ssp.open_system(with_stop(exported, tmp_path / "x.ssp", round(stop, 3))) as found:
             analysis.check(found.scenario, found.program)
             assert bool(found.scenario.evaluate) != bool(found.warnings)
 
@@ -309,7 +309,7 @@ def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
     end = run_ssp(exported).program.duration
     late = with_stop(exported, tmp_path / "late.ssp", 1000.0 + end, 1000.0)
     assert_same(run_ssp(exported), run_ssp(late))
-    with ssp.opened(late) as found:
+    with ssp.open_system(late) as found:
         (finding,) = found.warnings
         assert (finding.code, finding.place) == ("start-time-shifted", "late.ssp")
         assert "their 0 s is its 1000 s" in finding.text
@@ -345,7 +345,7 @@ def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> N
 
 def test_what_is_wrong_stays_so_in_an_ssp() -> None:
     file = Path("a.ssp")
-    found = Opened(None, None, file, Path("there"), (), {"plant.fmu": "resources/plant.fmu"})  # type: ignore[arg-type]
+    found = OpenedSystem(None, None, file, Path("there"), (), {"plant.fmu": "resources/plant.fmu"})  # type: ignore[arg-type]
     archive = str(Path("there") / "plant.fmu")
     (told,) = found.told([Finding("unit-warns", "wrong", f"{archive}: bad", archive)])
     assert told == Finding("unit-warns", "wrong", "a.ssp: resources/plant.fmu: bad", "a.ssp: resources/plant.fmu")

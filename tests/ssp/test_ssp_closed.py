@@ -16,7 +16,7 @@ import pytest
 
 from audit_helpers import outside, watched
 from feedsim import cli
-from feedsim.files.source import closed
+from feedsim.files.source import confine_references
 from feedsim.foundation.errors import InputError
 from feedsim.simulation.ssp import archive
 from feedsim.structure.matrices.calculix import _cards
@@ -208,7 +208,7 @@ def test_entries_that_are_links(exported: Path, tmp_path: Path, baits: list[str]
 
 def test_a_file_that_includes_others(exported: Path, tmp_path: Path, baits: list[str]) -> None:
     """Neither does the second name outside: a recording that is a model of CalculiX, which names another file."""
-    with closed(tmp_path):
+    with confine_references(tmp_path):
         for bait in [bait for bait in baits if bait[0] in "./"]:
             (tmp_path / "mesh.inp").write_text(f"*INCLUDE, INPUT={bait}\n", encoding="utf-8")
             with watched() as seen, pytest.raises(InputError, match=r"leads out of the archive|is no file name"):

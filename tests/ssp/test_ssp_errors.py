@@ -18,7 +18,7 @@ M_A = '<ssd:Connection startElement="controller_Z" startConnector="M_a" endEleme
 
 
 def refusal(file: Path, *overrides: str) -> InputError:
-    with pytest.raises(InputError) as caught, ssp.opened(file, overrides):
+    with pytest.raises(InputError) as caught, ssp.open_system(file, overrides):
         pass
     assert str(file) in str(caught.value)
     assert UNPACKED not in str(caught.value)  # not of the folder that it was unpacked to
@@ -176,7 +176,7 @@ def test_start_values_of_inputs_that_change_nothing(exported: Path, tmp_path: Pa
         _parameter("release", "false", "Boolean"), _parameter("x_a", "0.3", unit="m"), _parameter("M_add", "0.0"),
     )  # fmt: skip
     file = _with_start_values(first, tmp_path / "2.ssp", "plant", _parameter("tool.F_Z", "0", unit="kN"))
-    with ssp.opened(file):
+    with ssp.open_system(file):
         pass
     file = _with_start_values(first, tmp_path / "3.ssp", "plant", _parameter("tool.F_Z", "500", unit="N"))
     refusal(file)
@@ -192,7 +192,7 @@ def test_start_values_of_inputs_that_change_nothing(exported: Path, tmp_path: Pa
             new = inline.replace("VALUE", value).replace("<ssv:ParameterSet ", f"<ssv:ParameterSet {space} ") + old
             changed = edited(given, tmp_path / f"s{number}{value}.ssp", STRUCTURE, (old, new))
             if fine:
-                with ssp.opened(changed):
+                with ssp.open_system(changed):
                     pass
             else:
                 assert "plant.tool.F_Z: 7 N is asked" in str(refusal(changed))
@@ -304,7 +304,7 @@ def test_a_flipped_byte(exported: Path, tmp_path: Path) -> None:
     ],
 )
 def test_settings_that_cannot_be(exported: Path, override: str, words: str) -> None:
-    with pytest.raises(InputError) as caught, ssp.opened(exported, [override]):
+    with pytest.raises(InputError) as caught, ssp.open_system(exported, [override]):
         pass
     assert words in str(caught.value)
     assert override in str(caught.value)

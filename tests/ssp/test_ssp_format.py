@@ -122,7 +122,7 @@ def test_sources_are_uris(place: str, source: str, exported: Path, tmp_path: Pat
             content = content.replace(b"resources/plant.ssv", source.replace(".fmu", ".ssv").encode())
         name = place if name == "resources/friction.fmu" else name
         files[place.replace(".fmu", ".ssv") if name == "resources/plant.ssv" else name] = content
-    with ssp.opened(exported) as plain, ssp.opened(ssp_helpers.write(tmp_path / "uri.ssp", files)) as opened:
+    with ssp.open_system(exported) as plain, ssp.open_system(ssp_helpers.write(tmp_path / "uri.ssp", files)) as opened:
         assert opened.scenario.machine.axes == plain.scenario.machine.axes
 
 
@@ -130,9 +130,9 @@ def test_sources_are_uris(place: str, source: str, exported: Path, tmp_path: Pat
 def test_names_are_written_as_uris(name: str) -> None:
     from urllib.parse import unquote
 
-    from feedsim.simulation.ssp.archive import as_source, inside
+    from feedsim.simulation.ssp.archive import as_source, resolve_source
 
     source = as_source(name)
     assert source.isascii()
     assert not {" ", "#", "?"} & {*source}
-    assert unquote(source) == name == inside(source, {name})
+    assert unquote(source) == name == resolve_source(source, {name})

@@ -13,7 +13,7 @@ from feedsim import analysis, scenario
 from feedsim.cli import main
 from feedsim.foundation.errors import InputError
 from feedsim.simulation import cosim, ssp
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from ssp_helpers import STRUCTURE, altered, contents, edited, short_scenario
 
 MACHINE = "resources/machine.fmu"
@@ -28,9 +28,9 @@ def one(short: Path, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 @pytest.mark.parametrize("overrides", [(), ("machine.axes.Z.drive.K_v=50 1/s", "recording.interval=250 us")], ids=str)
 def test_it_runs_as_the_scenario_does(short: Path, one: Path, fmus: Path, overrides: tuple[str, ...]) -> None:
-    here = judged(cosim.run(scenario.load(short, overrides), fmus=fmus))
-    with ssp.opened(one, overrides) as found:
-        there = judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
+    here = judge_run(cosim.run(scenario.load(short, overrides), fmus=fmus))
+    with ssp.open_system(one, overrides) as found:
+        there = judge_run(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
         assert found.told(there.warnings) == here.warnings
     assert [*there.units] == ["machine"]
     assert [*there.trace.columns] == [*here.trace.columns]
@@ -73,13 +73,13 @@ def test_another_machine(tmp_path: Path, fmus: Path) -> None:
     ssp.export(scenario.load(file), out, fmus=fmus)
     annotation = re.compile(r"(?s)<ssc:Annotation type=.feedsim.*?</ssc:Annotation>")
     bare = altered(out, tmp_path / "bare.ssp", STRUCTURE, lambda text: annotation.sub("", text))
-    here = judged(cosim.run(scenario.load(file, ["coupling.units=separate"]), fmus=fmus))
+    here = judge_run(cosim.run(scenario.load(file, ["coupling.units=separate"]), fmus=fmus))
     for path in (out, bare):
-        with ssp.opened(path) as found:
+        with ssp.open_system(path) as found:
             assert found.scenario.coupling.model_dump() == {
                 "scheme": "gauss_seidel", "substeps": 1, "call_limit": 60.0, "units": "one",
             }  # fmt: skip
-            there = judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
+            there = judge_run(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
         for name in here.trace.columns:
             assert list(there.trace[name]) == list(here.trace[name]), name
 
@@ -103,7 +103,7 @@ def test_another_machine(tmp_path: Path, fmus: Path) -> None:
 )  # fmt: skip
 def test_what_is_refused(one: Path, tmp_path: Path, change: tuple[str, str], told: str) -> None:
     broken = edited(one, tmp_path / "broken.ssp", STRUCTURE, change)
-    with pytest.raises(InputError, match=re.escape(told)), ssp.opened(broken):
+    with pytest.raises(InputError, match=re.escape(told)), ssp.open_system(broken):
         pass
 
 
@@ -120,14 +120,14 @@ def given(one: Path, out: Path, name: str, value: str) -> Path:
 
 def test_parameters_of_the_file_count_over_the_archives(one: Path, short: Path, fmus: Path, tmp_path: Path) -> None:
     changed = given(one, tmp_path / "changed.ssp", "Z.drive.K_v", '<ssv:Real value="50" unit="1/s"/>')
-    here = judged(cosim.run(scenario.load(short, ["machine.axes.Z.drive.K_v=50 1/s"]), fmus=fmus))
-    with ssp.opened(changed) as found:
-        there = judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
+    here = judge_run(cosim.run(scenario.load(short, ["machine.axes.Z.drive.K_v=50 1/s"]), fmus=fmus))
+    with ssp.open_system(changed) as found:
+        there = judge_run(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
     assert list(there.trace["Z.x_a"]) == list(here.trace["Z.x_a"])
 
 
 @pytest.mark.parametrize("name", ["motion.built_in", "coupling.friction"])
 def test_what_feedsim_cannot_run_of_it(one: Path, tmp_path: Path, name: str) -> None:
     broken = given(one, tmp_path / "broken.ssp", name, '<ssv:Boolean value="false"/>')
-    with pytest.raises(InputError, match=rf"machine\.{name} is false; true is needed"), ssp.opened(broken):
+    with pytest.raises(InputError, match=rf"machine\.{name} is false; true is needed"), ssp.open_system(broken):
         pass

@@ -124,9 +124,9 @@ def test_a_path_that_no_disk_takes(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_what_nobody_names_is_not_unpacked(exported: Path, tmp_path: Path) -> None:
-    zeros = bytes(unpacked.FREE + 1)
+    zeros = bytes(unpacked.FREE_BYTES + 1)
     file = write(tmp_path / "x.ssp", contents(exported) | {"extra/zeros": zeros, "resources/recordings/0.csv": zeros})
-    with ssp.opened(file) as found:
+    with ssp.open_system(file) as found:
         assert not (found.fmus / "resources").exists()
         assert not (found.fmus / "extra").exists()
 
@@ -138,7 +138,7 @@ def test_what_unpacks_to_far_too_much(
     exported: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(unpacked, "RATIO", 1)  # of a file this small the rest is free anyway
-    files = contents(exported) | {name: bytes(unpacked.FREE + 1)}
+    files = contents(exported) | {name: bytes(unpacked.FREE_BYTES + 1)}
     if name.endswith(".csv"):
         files[STRUCTURE] = _more(files[STRUCTURE].decode(), name).encode()
     said = refusal(write(tmp_path / "bomb.ssp", files), capsys)
@@ -154,7 +154,7 @@ def test_archives_inside_count_together(
     for unit in ("friction", "controller"):
         inner = tmp_path / f"{unit}.fmu"
         inner.write_bytes(files[f"resources/{unit}.fmu"])
-        half = {"resources/half": bytes(unpacked.FREE * 2 // 3)}
+        half = {"resources/half": bytes(unpacked.FREE_BYTES * 2 // 3)}
         files[f"resources/{unit}.fmu"] = write(inner, contents(inner) | half).read_bytes()
     assert "unpacks to" in refusal(write(tmp_path / "nested.ssp", files), capsys)
 
@@ -178,7 +178,7 @@ def test_a_document_type_in_utf_16(exported: Path, tmp_path: Path, capsys: pytes
     files = contents(exported)
     _, _, rest = files[FRICTION].decode().partition("?>")
     files[FRICTION] = f'<?xml version="1.0" encoding="UTF-16"?><!-- <!DOCTYPE -->{rest}'.encode("utf-16")
-    with ssp.opened(write(tmp_path / "fine.ssp", files)):
+    with ssp.open_system(write(tmp_path / "fine.ssp", files)):
         pass
 
 
@@ -253,7 +253,7 @@ STRANGE: tuple[Any, ...] = (
 def test_every_type_in_every_place(exported: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each value of the annotation replaced by each strange one, and pairs of them: words, or a scenario; never a
     traceback. What comes before and behind the annotation stays as it is, for the time it takes."""
-    with ssp.opened(exported) as found:
+    with ssp.open_system(exported) as found:
         kept = _parts_of(exported, monkeypatch)
         own = json.loads(kept["text"])
         places = list(_places(own))
@@ -293,6 +293,6 @@ def _parts_of(file: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     with monkeypatch.context() as patched:
         patched.setattr(rebuilt, "annotation", annotated)
         patched.setattr(rebuilt, "scenario_data", rebuilding)
-        with ssp.opened(file):
+        with ssp.open_system(file):
             pass
     return kept

@@ -20,7 +20,7 @@ from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.build import check
 from feedsim.structure.matrices import ansys
-from feedsim.structure.matrices.build import Imported, import_model
+from feedsim.structure.matrices.build import ImportedModel, import_model
 
 
 def bundled() -> Path | None:
@@ -37,7 +37,7 @@ def bundled() -> Path | None:
 needs_reader = pytest.mark.skipif(bundled() is None, reason="the package ansys-mapdl-reader is not installed")
 
 
-def structure(folder: Path, **changes: Any) -> Imported:
+def structure(folder: Path, **changes: Any) -> ImportedModel:
     keys: dict[str, Any] = {
         "kind": "ansys",
         "damping": {"ratio": "2 %"},
@@ -143,7 +143,7 @@ class Reader:
         return self.reference, self.stiffness, self.mass
 
 
-def with_reader(folder: Path, monkeypatch: pytest.MonkeyPatch, kinds: list[int], **changes: Any) -> Imported:
+def with_reader(folder: Path, monkeypatch: pytest.MonkeyPatch, kinds: list[int], **changes: Any) -> ImportedModel:
     """Import through the stand-in; ``changes`` replace what it holds."""
 
     def opened(file: Path) -> Reader:

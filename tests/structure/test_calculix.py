@@ -17,7 +17,7 @@ from fe_models import STRUCTURES, dense_modes
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.build import check
-from feedsim.structure.matrices.build import Imported, import_model
+from feedsim.structure.matrices.build import ImportedModel, import_model
 
 SHIPPED = STRUCTURES / "calculix"
 CCX = shutil.which("ccx")
@@ -48,7 +48,7 @@ def printed_frequencies(file: Path) -> list[float]:
     return found
 
 
-def structure(folder: Path, **changes: Any) -> Imported:
+def structure(folder: Path, **changes: Any) -> ImportedModel:
     """The model of the matrices that CalculiX left in a folder."""
     keys: dict[str, Any] = {
         "kind": "calculix",

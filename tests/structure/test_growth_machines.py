@@ -10,7 +10,7 @@ import pytest
 
 from feedsim import scenario
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure import checked_modes
 
 
@@ -24,7 +24,7 @@ def test_every_size_runs(axes: int, count: int, tmp_path: Path, fmus: Path) -> N
         # The elastic motion is shared out among the modes, none of it lost: exact but for rounding.
         assert modes.J_tot(axis) == pytest.approx(machines.J_1 + machines.J_2, rel=1e-12)
         assert modes.J_inf(axis) == pytest.approx(machines.J_1, rel=1e-12)
-    run = judged(cosim.run(loaded, fmus=fmus))
+    run = judge_run(cosim.run(loaded, fmus=fmus))
     # They are made to measure time: that their position loops are tight is told, and nothing else.
     assert {finding.code for finding in run.warnings} <= {"loop-margins-thin"}
     assert list(loaded.machine.axes) == list(machines.NAMES[:axes])

@@ -15,7 +15,7 @@ from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure import read_modes
 from feedsim.structure.build import Built, build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
-from feedsim.structure.pose_change import stale
+from feedsim.structure.pose_change import describe_stale_table
 from structure_helpers import GIVEN_POSE, MACHINES
 
 STEP = 125e-6
@@ -79,7 +79,7 @@ def test_shipped_tables_are_what_the_structures_give(name: str) -> None:
     shipped, found = read_modes(machine.modes, list(machine.axes)), built(name).solution.modes
     assert found.frequency == pytest.approx(shipped.frequency, rel=1e-6)
     assert np.array_equal(found.damping, shipped.damping)
-    assert stale(shipped, found) == ""
+    assert describe_stale_table(shipped, found) == ""
     given = np.column_stack([shipped.ports[port] for port in shipped.ports])
     ours = np.column_stack([found.ports[port] for port in shipped.ports])
     size = np.abs(given).max(axis=0)
@@ -99,17 +99,17 @@ def test_a_table_of_another_structure_is_told() -> None:
     shipped = read_modes(machine.modes, ["X"])
     assert machine.structure is not None
     elsewhere = build(load_structure(machine.structure), {"X": 0.45}).solution.modes
-    assert "the structure gives" in stale(shipped, elsewhere)
+    assert "the structure gives" in describe_stale_table(shipped, elsewhere)
     fewer = build(load_structure(machine.structure), machine.pose, cutoff=2 * math.pi * 300).solution.modes
     assert len(fewer.frequency) < len(shipped.frequency)
-    assert stale(shipped, fewer) == stale(fewer, shipped) == ""  # another cut-off
+    assert describe_stale_table(shipped, fewer) == describe_stale_table(fewer, shipped) == ""  # another cut-off
     corrected = build(
         load_structure(machine.structure), machine.pose, cutoff=2 * math.pi * 300, static_correction=True
     ).solution
     assert corrected.corrections > 0
-    assert stale(corrected.modes, shipped) == ""
-    assert "the structure gives" in stale(corrected.modes, elsewhere)
-    assert "the structure gives" in stale(fewer, elsewhere)
+    assert describe_stale_table(corrected.modes, shipped) == ""
+    assert "the structure gives" in describe_stale_table(corrected.modes, elsewhere)
+    assert "the structure gives" in describe_stale_table(fewer, elsewhere)
 
 
 def test_synthetic_drive_of_the_one_axis_machine() -> None:

@@ -16,14 +16,14 @@ from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.build import check
-from feedsim.structure.matrices.build import Imported, import_model
+from feedsim.structure.matrices.build import ImportedModel, import_model
 
 REFERENCE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre" / "modes.csv"
 SHIPPED = STRUCTURES / "matrix_market"
 PORTS = [f"{quantity}_{axis}" for quantity in ("n", "x", "tcp") for axis in "XYZ"]
 
 
-def structure(folder: Path, **changes: Any) -> Imported:
+def structure(folder: Path, **changes: Any) -> ImportedModel:
     """The model of the files in a folder."""
     keys: dict[str, Any] = {
         "kind": "matrices",

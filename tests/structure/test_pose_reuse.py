@@ -21,9 +21,9 @@ MICROMETRE = 1e-6
 def forget() -> None:
     """As in a process that has just started."""
     for cached in (
-        pose_change._between,
+        pose_change._changes_between,
         pose_change._end,
-        pose_change._middle,
+        pose_change._solve_pose,
         pose_change._modes_of_table,
         assemble.structure_of,
         assemble.assembler_of,
@@ -121,7 +121,12 @@ def test_another_pose_and_another_structure_are_noticed(poses: list[dict[str, fl
 
 
 def test_many_runs_keep_little(poses: list[dict[str, float]]) -> None:
-    for cached in (pose_change._between, pose_change._end, pose_change._middle, pose_change._modes_of_table):
+    for cached in (
+        pose_change._changes_between,
+        pose_change._end,
+        pose_change._solve_pose,
+        pose_change._modes_of_table,
+    ):
         assert cached.cache_parameters()["maxsize"] in range(1, 257)
 
 

@@ -15,7 +15,7 @@ from feedsim.foundation.errors import InputError
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.eigenpairs import dense
 from feedsim.structure.geometry.assemble import assemble
-from feedsim.structure.solve import Solution, cleaned, definite_basis, definite_signs, solve
+from feedsim.structure.solve import Solution, definite_basis, definite_signs, remove_strain, solve
 from structure_helpers import GIVEN_POSE, default_structure
 
 KHZ = 2 * math.pi * 1000
@@ -44,7 +44,7 @@ def test_cleaning_takes_the_strain_out() -> None:
     rigid, elastic = pairs.shapes[:, :3], pairs.shapes[:, 3:]
     spoiled = rigid + 1e-6 * elastic[:, [0, 40, 400]]
     # With the modes up to 1000 Hz known, as Lanczos leaves it: the last one mixed in is none of those.
-    found = cleaned(model, pairs, spoiled, elastic[:, :90], pairs.values[3:93])
+    found = remove_strain(model, pairs, spoiled, elastic[:, :90], pairs.values[3:93])
     forces = [np.abs(model.stiffness @ shapes).max() for shapes in (spoiled, found)]
     assert forces[1] < 1e-6 * forces[0]
 

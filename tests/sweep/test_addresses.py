@@ -33,7 +33,7 @@ def test_addresses(address: str) -> None:
 def test_waiting_for_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     from distributed import LocalCluster
 
-    monkeypatch.setattr(trial, "JOIN", 0.5)
+    monkeypatch.setattr(trial, "WORKER_JOIN_TIME", 0.5)
     told: list[str] = []
     with LocalCluster(
         n_workers=0, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50

@@ -87,7 +87,7 @@ def test_data_files_elsewhere(tmp_path: Path) -> None:
     for i, file in enumerate(base.files):
         moved[str(file)] = str(tmp_path / f"{i}{file.suffix}")
         shutil.copy(file, moved[str(file)])
-    away = Base.from_json(base.to_json()).relocated(moved)
+    away = Base.from_json(base.to_json()).relocate(moved)
     assert {file.parent for file in away.files} == {tmp_path}
     assert away.with_changes(CHANGES[1]).machine.modes == Path(moved[str(base.scenario.machine.modes)])
     assert away.content({new: "x" for new in moved.values()}) == base.content({old: "x" for old in moved})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feedsim.design.sweep.design import Outcome, Task
-from feedsim.design.sweep.engine import AIM, DEATHS, DEEP, Batch, Batches
+from feedsim.design.sweep.engine import AIM, BATCHES_PER_WORKER, DEATHS, Batch, Batches
 
 
 def outcomes(batch: Batch, seconds: float, count: int | None = None) -> list[Outcome]:
@@ -46,7 +46,7 @@ def test_tasks_are_read_as_they_are_needed() -> None:
 def test_workers_have_one_to_do_and_one_ahead() -> None:
     batches = Batches(Task(i) for i in range(1000))
     given = [batches.next(3) for _ in range(20)]
-    assert sum(batch is not None for batch in given) == 3 * DEEP
+    assert sum(batch is not None for batch in given) == 3 * BATCHES_PER_WORKER
 
 
 def test_batches_get_small_towards_the_end() -> None:
@@ -84,15 +84,15 @@ def test_each_task_comes_to_one_outcome(seed: int) -> None:
     while True:
         while (batch := batches.next(3)) is not None:
             flying.append(batch)
-        assert batches.flying == len(flying)
+        assert batches.count_batches_out == len(flying)
         if not flying:
             break
         batch = flying.pop(int(dice.integers(len(flying))))
         runs = [task.run for task in batch.tasks]
         if deadly.intersection(runs):
-            found += batches.died(batch, 1, "its worker process died")
+            found += batches.record_death(batch, 1, "its worker process died")
             if flying and dice.random() < 0.7:  # it had waited at the same worker
-                found += batches.died(flying.pop(0), 1, "its worker process died")
+                found += batches.record_death(flying.pop(0), 1, "its worker process died")
         elif dice.random() < 0.3:
             done = outcomes(batch, 0.02, int(dice.integers(len(runs))) + 1)
             found += done
@@ -115,7 +115,7 @@ def test_what_a_worker_refuses_is_handed_over_anew_as_it_was() -> None:
     again = batches.next(1)
     assert again is not None
     assert again.tasks == first.tasks
-    batches.died(again, 1, "its worker died")
+    batches.record_death(again, 1, "its worker died")
     suspect = batches.next(1)
     assert suspect is not None
     assert suspect.suspect
@@ -125,6 +125,6 @@ def test_what_a_worker_refuses_is_handed_over_anew_as_it_was() -> None:
     assert (again.tasks, again.suspect) == (suspect.tasks, True)
     batches.done(again, [Outcome(again.tasks[0].run, {})])
     while (batch := batches.next(1)) is not None:
-        assert batches.waiting or batches.flying
+        assert batches.waiting or batches.count_batches_out
         batches.done(batch, [Outcome(task.run, {}) for task in batch.tasks])
     assert not batches.waiting

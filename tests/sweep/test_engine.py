@@ -246,7 +246,7 @@ def test_wrong_requests() -> None:
 def test_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
     from feedsim.design.sweep import trial
 
-    monkeypatch.setattr(trial, "ANSWER", 1.0)
+    monkeypatch.setattr(trial, "SCHEDULER_ANSWER_TIME", 1.0)
     with pytest.raises(InputError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1: .*tcp://host:8786"):  # noqa: SIM117
         with open_engine(Chores("nobody"), scheduler="tcp://127.0.0.1:1"):
             pass

@@ -46,7 +46,7 @@ def test_a_killed_worker_costs_no_outcome(a_cluster: Cluster) -> None:
 
 
 def test_a_lost_scheduler_is_told(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "LOST", 2.0)
+    monkeypatch.setattr(engine, "SCHEDULER_LOSS_TIME", 2.0)
     a_cluster.worker("one")
     with (  # noqa: PT012
         pytest.raises(SimulationError, match="the scheduler is lost; what is done is kept"),
@@ -97,9 +97,9 @@ def test_a_place_is_kept_as_long_as_anybody_needs_it(tmp_path: Path) -> None:
     assert work.opened == 1
     for carrier, closed in ((first, 0), (second, 1)):
         carrier.teardown(host)
-        engine._clear(work.digest)  # as its thread does
+        engine._clear_place(work.digest)  # as its thread does
         assert work.closed == closed
-    assert engine._carried.keys().isdisjoint({first.key, second.key})
+    assert engine._carriers.keys().isdisjoint({first.key, second.key})
 
 
 def test_a_result_that_dies_with_its_worker_is_waited_for(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,7 +107,7 @@ def test_a_result_that_dies_with_its_worker_is_waited_for(a_cluster: Cluster, mo
     for name in ("one", "two"):
         a_cluster.worker(name, "--no-nanny")
     a_cluster.wait_for(2)
-    monkeypatch.setattr(engine, "FETCH", 0.5)
+    monkeypatch.setattr(engine, "FETCH_TIME", 0.5)
     fetch, killed = engine._Flight._outcomes, list[str]()
 
     def fetch_too_late(flight: engine._Flight, future: Any) -> list[Outcome]:
@@ -138,7 +138,7 @@ OTHERS = {
 def test_a_late_worker_that_cannot_take_part_is_left_out(
     a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, other: str
 ) -> None:
-    monkeypatch.setattr(engine, "ALONE", 2.0)
+    monkeypatch.setattr(engine, "WORKER_LOSS_TIME", 2.0)
     able = a_cluster.worker("one", "--no-nanny")
     with open_engine(Chores(other), scheduler=a_cluster.address) as made:
         outcomes = made.map(chore(i, data=0.02) for i in range(100_000))
@@ -163,7 +163,7 @@ def test_a_late_worker_that_cannot_take_part_is_left_out(
 
 
 def test_no_workers(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial, "JOIN", 0.5)
+    monkeypatch.setattr(trial, "WORKER_JOIN_TIME", 0.5)
     with (
         pytest.raises(InputError, match=r"has no workers .*dask worker tcp://"),
         open_engine(Chores("nobody"), scheduler=a_cluster.address),

@@ -19,7 +19,7 @@ from feedsim.foundation import units
 from feedsim.foundation.errors import Finding
 from feedsim.scenario import Base, Change, load
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim_packager import native, toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -86,7 +86,7 @@ def reference(bundle: Bundle) -> Rows:
 def test_figures_are_those_of_a_run_alone(fmus: Path, reference: Rows) -> None:
     run = 12
     (change,) = next(task for task in tasks() if task.run == run).changes
-    result = judged(cosim.run(load(SCENARIOS / "z_positioning.yaml", [*SHORT, change.option]), fmus=fmus))
+    result = judge_run(cosim.run(load(SCENARIOS / "z_positioning.yaml", [*SHORT, change.option]), fmus=fmus))
     figures = analysis.evaluate(result)
     expected = {
         name: (units.convert(figure.value, figure.unit, unit), unit)

@@ -10,7 +10,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from feedsim.design.sweep.sensitivity import LEAST_POINTS, MOST_LEFT_OUT, Indices, beyond, sobol_indices, trends
+from feedsim.design.sweep.sensitivity import (
+    LEAST_POINTS,
+    MOST_LEFT_OUT,
+    Indices,
+    find_impossible_indices,
+    sobol_indices,
+    trends,
+)
 
 Array = NDArray[np.float64]
 
@@ -140,9 +147,9 @@ def test_what_cannot_be_is_told() -> None:
         )
 
     fine = [(-0.1, 0.05), (0.8, 1.2), (-0.01, 0.0)]
-    assert beyond(indices(fine, [(0.0, 0.1), (0.9, 1.3), (0.0, 0.0)])) == []
+    assert find_impossible_indices(indices(fine, [(0.0, 0.1), (0.9, 1.3), (0.0, 0.0)])) == []
     wrong = indices([(0.9, 1.4), (-0.3, -0.1), (0.5, 0.7)], [(1.44, 1.71), (0.0, 0.2), (0.1, 0.3)])
-    assert beyond(wrong) == [0, 1, 2]
+    assert find_impossible_indices(wrong) == [0, 1, 2]
 
 
 def test_the_seed_makes_the_intervals_repeatable() -> None:

@@ -12,7 +12,7 @@ from feedsim.design.sweep.design import quantile
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import load
 from feedsim.scenario.study import load_study
-from feedsim.scenario.study.parameter import outside
+from feedsim.scenario.study.parameter import probability_outside
 from feedsim.scenario.study.study import Distribution
 
 Write = Callable[..., Path]
@@ -35,11 +35,11 @@ SHARES = 100_000
 def test_share_outside(found: Distribution, low: float, high: float) -> None:
     """Against a count of the values that runs are drawn from, at even shares of the distribution."""
     if found.kind == "uniform":
-        assert outside(found, low, high) == 0.0
+        assert probability_outside(found, low, high) == 0.0
         return
     values = quantile(found, (np.arange(SHARES) + 0.5) / SHARES)
     counted = np.count_nonzero((values < low) | (values > high)) / SHARES
-    assert outside(found, low, high) == pytest.approx(counted, abs=2 / SHARES)  # a count at either end
+    assert probability_outside(found, low, high) == pytest.approx(counted, abs=2 / SHARES)  # a count at either end
 
 
 @pytest.mark.parametrize(

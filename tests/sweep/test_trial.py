@@ -12,7 +12,7 @@ import pytest
 from feedsim.cli import main
 from feedsim.design.sweep import design
 from feedsim.design.sweep.study import run
-from feedsim.design.sweep.trial import ENOUGH, spread, trial
+from feedsim.design.sweep.trial import TRIAL_RUN_COUNT, spread, trial
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import load_study
 from feedsim.simulation import nc
@@ -43,7 +43,7 @@ def test_the_time_told_is_that_of_runs_of_the_study(
     text = study().read_text() + "  feed: {key: motions.0.feed, from: 1 m/min, to: 3 m/min}\n"
     loaded = load_study(study(text))
     found = trial(loaded, design(loaded), fmus)
-    assert len(found.runs) == ENOUGH - 1
+    assert len(found.runs) == TRIAL_RUN_COUNT - 1
     assert found.failed == {}
     assert "Z.overshoot" in found.figures
     assert takes < found.seconds[0] <= found.seconds[1]

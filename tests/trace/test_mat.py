@@ -24,7 +24,7 @@ from scipy.io import loadmat, savemat
 
 from command_helpers import PATIENCE
 from feedsim.files.trace import read_recording
-from feedsim.files.trace.mat import Other, flat, read_mat
+from feedsim.files.trace.mat import OtherValue, flatten_variables, read_mat
 from feedsim.foundation.errors import InputError
 
 CONTENT: dict[str, Any] = {
@@ -72,14 +72,14 @@ def as_scipy_reads(path: Path) -> Iterator[tuple[str, Any]]:
 
 def assert_same(path: Path) -> int:
     """How many arrays of numbers have been compared."""
-    mine, count = dict(flat(read_mat(path))), 0
+    mine, count = dict(flatten_variables(read_mat(path))), 0
     for name, value in as_scipy_reads(path):
         array = np.asarray(value)
         found = mine.get(name)
         if array.dtype.kind == "U" and array.shape == () and isinstance(found, np.ndarray):
             assert "".join(found.ravel().tolist()).rstrip() == str(array).rstrip(), name
             continue
-        if array.dtype.kind not in "fiuc" or isinstance(found, Other):
+        if array.dtype.kind not in "fiuc" or isinstance(found, OtherValue):
             assert not isinstance(found, np.ndarray) or found.dtype.kind == "U", name
             assert array.dtype.kind in "UO" or array.shape == () or hasattr(value, "tocsc"), name
             continue

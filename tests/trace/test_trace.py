@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from feedsim.files.trace import Trace, convert, read_csv, read_signals, write_csv, written_whole
-from feedsim.files.trace.files import shortest
+from feedsim.files.trace.files import shortest_numbers
 from feedsim.foundation.errors import InputError, OutputError
 
 
@@ -233,7 +233,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 @given(st.lists(st.floats(), max_size=20))
 def test_the_shortest_form_is_that_of_repr(values: list[float]) -> None:
-    assert shortest(np.array(values)) == [repr(value).removesuffix(".0") for value in values]
+    assert shortest_numbers(np.array(values)) == [repr(value).removesuffix(".0") for value in values]
 
 
 def test_the_shortest_form_where_it_changes() -> None:
@@ -241,7 +241,7 @@ def test_the_shortest_form_where_it_changes() -> None:
     around = [float(np.nextafter(power, towards)) for power in powers for towards in (0.0, np.inf)]
     values = np.array([0.0, *powers, *around, 123456789012345680.0, 5e-324, np.finfo(float).max])
     values = np.concatenate([values, -values])
-    assert shortest(values) == [repr(value).removesuffix(".0") for value in values.tolist()]
+    assert shortest_numbers(values) == [repr(value).removesuffix(".0") for value in values.tolist()]
 
 
 def test_a_value_that_is_not_finite_is_not_written(tmp_path: Path) -> None:

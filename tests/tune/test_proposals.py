@@ -20,7 +20,7 @@ from feedsim.design.tune.proposals import (
     GAIN_MARGIN,
     PHASE_MARGIN,
     axis_lag,
-    changed,
+    change_drive,
     least_margins,
     loop_lag,
     model_gain,
@@ -31,7 +31,7 @@ from feedsim.linear.system import LinearSystem
 from feedsim.report.changes import changes_part, changes_section
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure import checked_modes
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -40,7 +40,7 @@ DRIVE = "machine.axes.{}.drive.{}"
 
 
 def proposals(settings: Sequence[str], fmus: Path, *, searched: bool = False) -> list[Proposal]:
-    result = judged(cosim.run(load(CIRCLE, settings), fmus=fmus))
+    result = judge_run(cosim.run(load(CIRCLE, settings), fmus=fmus))
     return of_run(result, analysis.diagnoses(result), searched=searched)
 
 
@@ -58,7 +58,7 @@ def slow_phase_lag(machine: Machine, output: str, name: str) -> float:
 @pytest.mark.parametrize("k_ffw", [0.0, 0.6, 1.0])
 @pytest.mark.parametrize("ramped", [True, False])
 def test_the_lag_of_an_axis(k_ffw: float, ramped: bool) -> None:
-    machine = changed(load(CIRCLE).machine, "Z", {"k_ffw": k_ffw, "ramp_speed_setpoint": ramped, "T_dyn": 0.002})
+    machine = change_drive(load(CIRCLE).machine, "Z", {"k_ffw": k_ffw, "ramp_speed_setpoint": ramped, "T_dyn": 0.002})
     assert slow_phase_lag(machine, "Z.x_a", "Z.x_s") == pytest.approx(axis_lag(machine.axes["Z"].drive), rel=1e-5)
 
 
@@ -68,7 +68,7 @@ def test_the_lag_of_an_axis(k_ffw: float, ramped: bool) -> None:
 )
 def test_the_lag_of_the_speed_loop(values: dict[str, float]) -> None:
     """Without position control and feedback, n_ffw is the speed setpoint: its lag to n_a is that of the loop."""
-    machine = changed(load(CIRCLE).machine, "Z", {"K_v": 0.0, "T_dyn": 0.0, **values})
+    machine = change_drive(load(CIRCLE).machine, "Z", {"K_v": 0.0, "T_dyn": 0.0, **values})
     J = checked_modes(machine).J_tot("Z")
     expected = loop_lag(machine.axes["Z"].drive, machine.cycles, J)
     # A PI loop without model has terms of third order; the mount of the machine bends the rest by some parts in 1e4.
@@ -131,7 +131,7 @@ def test_a_slow_integral_part(fmus: Path) -> None:
     assert first.margins[1][1] >= PHASE_MARGIN
     # It is the shortest one but for 15 %: a shorter one lacks a margin.
     machine = load(CIRCLE).machine
-    shorter = changed(machine, "Z", {"T_n": 0.85 * first.proposed})
+    shorter = change_drive(machine, "Z", {"T_n": 0.85 * first.proposed})
     gain, phase = least_margins(judge(shorter, checked_modes(machine)), "Z")
     assert gain < GAIN_MARGIN or phase < PHASE_MARGIN
 
@@ -139,7 +139,7 @@ def test_a_slow_integral_part(fmus: Path) -> None:
 @pytest.mark.parametrize("values", [{"K_v": 0.0}, {"speed_integrator": False}])
 def test_the_response_to_a_torque(values: dict[str, float]) -> None:
     """At its ends: without position control by the integral part alone, without integral part by both gains."""
-    machine = changed(load(CIRCLE).machine, "Z", {"T_dyn": 0.0, **values})
+    machine = change_drive(load(CIRCLE).machine, "Z", {"T_dyn": 0.0, **values})
     system = LinearSystem(machine, checked_modes(machine))
     gain = abs(system.transfer(np.array([0.05]), "Z.x_a", "Z.M_add")[0]) / machine.axes["Z"].I_P
     assert gain == pytest.approx(torque_response(machine.axes["Z"].drive), rel=5e-3)
@@ -152,7 +152,7 @@ def test_the_peak_that_can_fall_most_comes_first(fmus: Path) -> None:
         DRIVE.format("X", "T_n=80 ms"),
     ]
     scenario = load(CIRCLE, settings)
-    result = judged(cosim.run(scenario, fmus=fmus))
+    result = judge_run(cosim.run(scenario, fmus=fmus))
     causes = analysis.diagnoses(result)
     peaks = {term.axis: term.value for diagnosis in causes.values() for term in diagnosis.terms if term.key == "peaks"}
     assert 0 < peaks["X"] < peaks["Y"]
@@ -168,7 +168,7 @@ def test_the_peak_that_can_fall_most_comes_first(fmus: Path) -> None:
     def fallen(axis: str) -> float:
         """What a T_n of 5 ms takes off."""
         shorter = load(CIRCLE, [*settings, DRIVE.format(axis, "T_n=5 ms")])
-        (diagnosis,) = analysis.diagnoses(judged(cosim.run(shorter, fmus=fmus))).values()
+        (diagnosis,) = analysis.diagnoses(judge_run(cosim.run(shorter, fmus=fmus))).values()
         now = [term.value for term in diagnosis.terms if term.key == "peaks" and term.axis == axis]
         return peaks[axis] - (now[0] if now else 0.0)
 
@@ -176,7 +176,7 @@ def test_the_peak_that_can_fall_most_comes_first(fmus: Path) -> None:
 
 
 def test_a_circle_alone_gives_directions(fmus: Path) -> None:
-    result = judged(cosim.run(load(CIRCLE, [DRIVE.format("Z", "T_sym=4.158 ms")]), fmus=fmus))
+    result = judge_run(cosim.run(load(CIRCLE, [DRIVE.format("Z", "T_sym=4.158 ms")]), fmus=fmus))
     (diagnosis,) = analysis.diagnoses(result).values()
     found = of_circle(diagnosis, None, None)
     assert [(each.axis, each.parameter, each.direction) for each in found[:2]] == [
@@ -189,7 +189,7 @@ def test_a_circle_alone_gives_directions(fmus: Path) -> None:
 
 def test_nothing_is_proposed_for_what_another_maker_drives(fmus: Path) -> None:
     scenario: Scenario = load(CIRCLE)
-    result = judged(cosim.run(scenario, fmus=fmus))
+    result = judge_run(cosim.run(scenario, fmus=fmus))
     causes = analysis.diagnoses(result)
     gone = scenario.machine.model_copy(update={"modes": Path("gone.csv")})
     assert of_run(replace(result, scenario=scenario.model_copy(update={"machine": gone})), causes) == []

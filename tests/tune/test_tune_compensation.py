@@ -18,7 +18,7 @@ from feedsim.design.tune import circles as circles_module
 from feedsim.design.tune import compensators as compensation
 from feedsim.design.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
 from feedsim.design.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, pulse, score, tune
-from feedsim.design.tune.knobs import compensated, effects_of, frictionless
+from feedsim.design.tune.knobs import effects_of, frictionless, set_compensation
 from feedsim.scenario import Machine, load
 from feedsim.structure import checked_modes
 from identified_sets import write_set
@@ -150,7 +150,7 @@ def test_objectives() -> None:
 
 def test_a_compensation_is_a_part_of_the_drive() -> None:
     machine = load(CIRCLE).machine
-    own = compensated(machine, "Z", "friction_pulse", {"amplitude": 1e-4, "time": 0.03})
+    own = set_compensation(machine, "Z", "friction_pulse", {"amplitude": 1e-4, "time": 0.03})
     parameters = own.axes["Z"].drive.parameters()
     assert parameters["friction_pulse.amplitude"] == 1e-4
     assert parameters["friction_pulse.time"] == 0.03

@@ -16,9 +16,18 @@ from scipy.linalg import solve_discrete_lyapunov
 from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
 from feedsim.design.tune.circles import Pair
-from feedsim.design.tune.drive import CHOSEN, HELD, SEARCHED, Limits, _Search, changed_values, least, tune_drive
+from feedsim.design.tune.drive import (
+    CHOSEN,
+    HELD_OUT_MOVES,
+    SEARCHED_MOVES,
+    Limits,
+    _Search,
+    changed_values,
+    minimise_rank,
+    tune_drive,
+)
 from feedsim.design.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
-from feedsim.design.tune.knobs import Knobs, matched, with_drives
+from feedsim.design.tune.knobs import Knobs, match_lag, with_drives
 from feedsim.design.tune.proposals import axis_lag, loop_lag
 from feedsim.linear.judgement import Candidates, judge
 from feedsim.scenario import Drive, Machine, load, load_machine
@@ -75,7 +84,7 @@ def test_modes_are_changed_behind_a_transmission(monkeypatch: pytest.MonkeyPatch
     structure = read_modes(scenario.machine.modes, list(scenario.machine.axes))
     monkeypatch.setattr(_Search, "errors", lambda *args, **named: ())
     poses = {"another": structure}
-    with _Search.begun(scenario, "Z", Limits(8.0, 40.0, 1e-5), poses, None, lambda *_: None, 10) as search:
+    with _Search.begin_search(scenario, "Z", Limits(8.0, 40.0, 1e-5), poses, None, lambda *_: None, 10) as search:
         changed = search.with_modes(scenario.machine, 1.1)
         table = read_modes(changed.modes, list(changed.axes))
         assert table.frequency == pytest.approx(1.1 * structure.frequency, rel=1e-15)
@@ -200,13 +209,13 @@ def test_axes_stay_equally_late() -> None:
     def lags(own: Machine) -> list[float]:
         return [axis_lag(each.drive) for each in own.axes.values()]
 
-    sooner = matched(with_drives(machine, {"Z": {"T_sym": 2e-3}}), "Z", machine)
+    sooner = match_lag(with_drives(machine, {"Z": {"T_sym": 2e-3}}), "Z", machine)
     assert lags(sooner) == pytest.approx([4.854e-3] * 3, abs=1e-9)
     assert sooner.axes["X"] is machine.axes["X"]
-    later = matched(with_drives(machine, {"Z": {"T_sym": 6e-3}}), "Z", machine)
+    later = match_lag(with_drives(machine, {"Z": {"T_sym": 6e-3}}), "Z", machine)
     assert lags(later) == pytest.approx([6e-3] * 3, abs=1e-6)
     apart = with_drives(machine, {"X": {"T_dyn": 1e-3}})
-    waits = matched(with_drives(apart, {"Z": {"T_sym": 7e-3}}), "Z", apart)
+    waits = match_lag(with_drives(apart, {"Z": {"T_sym": 7e-3}}), "Z", apart)
     assert waits.axes["X"] is apart.axes["X"]  # was not matched before either
 
 
@@ -237,7 +246,7 @@ def test_the_search_finds_a_constrained_least() -> None:
     inverse = np.linalg.inv(H)
     expected = c + inverse @ a * (b - a @ c) / (a @ inverse @ a)
     expected = np.clip(expected, 0, 1)
-    _, (violation, value) = least(rank, np.full(4, 0.7), step=0.2, evaluations=900, seed=1)
+    _, (violation, value) = minimise_rank(rank, np.full(4, 0.7), step=0.2, evaluations=900, seed=1)
     assert violation == 0
     free = (expected - c) @ H @ (expected - c)
     assert value == pytest.approx(free, rel=0.1, abs=0.02)
@@ -247,7 +256,7 @@ def test_the_search_is_the_same_every_time() -> None:
     def rank(x: np.ndarray) -> tuple[float, float]:
         return 0.0, float(((x - 0.4) ** 2).sum())
 
-    one, two = (least(rank, np.full(3, 0.9), step=0.2, evaluations=100, seed=3) for _ in range(2))
+    one, two = (minimise_rank(rank, np.full(3, 0.9), step=0.2, evaluations=100, seed=3) for _ in range(2))
     assert np.array_equal(one[0], two[0])
 
 
@@ -299,7 +308,7 @@ def test_circles_are_slower_where_the_path_asks_too_much_of_an_axis(axis: str) -
     """The path of this machine may accelerate at 2.25 m/s2, its axis Y at 1.8 m/s2."""
     scenario = load(Z, [f"machine={SCENARIOS / 'machines' / 'sinumerik_840d'}", f"motions={DWELL}", "evaluate=[]"])
     partner = partner_of(scenario, axis)
-    for stops, circles in (SEARCHED, CHOSEN, HELD):
+    for stops, circles in (SEARCHED_MOVES, CHOSEN, HELD_OUT_MOVES):
         wanted = circles_of(scenario.machine, axis, partner, circles)
         program = DriveProgram.of(scenario, axis, partner, stops_of(scenario.machine, axis, stops), wanted)
         for asked, planned in zip(wanted, program.circles, strict=True):

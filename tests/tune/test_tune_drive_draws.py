@@ -117,7 +117,7 @@ def test_margins_hold_on_draws_that_values_are_found_on(fmus: Path, tmp_path: Pa
     scenario = load(ONE, [machine_file])
     cloud = cloud_of(scenario.machine)
     limits = Limits(8.0, 40.0, 1e-5)
-    with drive._Search.begun(scenario, "X", limits, {}, fmus, lambda *_: None, 10, cloud) as search:
+    with drive._Search.begin_search(scenario, "X", limits, {}, fmus, lambda *_: None, 10, cloud) as search:
         present = search.knobs.drive
         nominal = margins_of(search.judges, present)
         assert search.margins(present).gain < nominal.gain - 0.05

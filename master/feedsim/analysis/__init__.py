@@ -4,7 +4,7 @@ May use cosim, structure, nc, scenario and trace.
 Start with evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole.
 """
 
-from feedsim.analysis.circle import Diagnosis, answer
+from feedsim.analysis.circle import Diagnosis, explain_circle
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour
 from feedsim.analysis.contour_error import ContourError, with_frictionless
 from feedsim.analysis.evaluate import (
@@ -18,18 +18,46 @@ from feedsim.analysis.evaluate import (
     contours,
     contours_asked,
     diagnoses,
-    doubts,
+    doubt_figures,
     evaluate,
     program_notes,
     stops_asked,
     tasks,
 )
-from feedsim.analysis.figures import Figure, Figures, Named
-from feedsim.analysis.positioning import Accuracy, Approach, deviation, positioning, with_clamped
+from feedsim.analysis.figures import Figure, Figures, FigureTable
+from feedsim.analysis.positioning import Accuracy, Approach, deviation, positioning_figures, with_clamped
 
 __all__ = [
-    "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "ContourError", "ContourTask", "Diagnosis",
-    "Figure", "Figures", "Glitch", "Named", "PositioningTask", "Result", "Task", "Turn", "answer", "check",
-    "circularity", "contour", "contours", "contours_asked", "deviation", "diagnoses", "doubts", "evaluate",
-    "positioning", "program_notes", "stops_asked", "tasks", "with_clamped", "with_frictionless",
+    "Accuracy",
+    "AccuracyTask",
+    "Approach",
+    "CircleTask",
+    "Contour",
+    "ContourError",
+    "ContourTask",
+    "Diagnosis",
+    "Figure",
+    "FigureTable",
+    "Figures",
+    "Glitch",
+    "PositioningTask",
+    "Result",
+    "Task",
+    "Turn",
+    "check",
+    "circularity",
+    "contour",
+    "contours",
+    "contours_asked",
+    "deviation",
+    "diagnoses",
+    "doubt_figures",
+    "evaluate",
+    "explain_circle",
+    "positioning_figures",
+    "program_notes",
+    "stops_asked",
+    "tasks",
+    "with_clamped",
+    "with_frictionless",
 ]  # fmt: skip

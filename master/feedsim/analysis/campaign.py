@@ -47,7 +47,7 @@ EVEN_STEP_SHARE = 1e-6  # of a step: rounding of recorded times
 LINE_ROUNDING = 1e-13  # of the largest value: lines below it are rounding, not response
 
 
-def measured(measurements: Sequence[Measurement], pairs: Sequence[Pair]) -> FrequencyResponse:
+def estimate_responses(measurements: Sequence[Measurement], pairs: Sequence[Pair]) -> FrequencyResponse:
     """Responses from one or several measurements of one machine with excitations of the same lines.
 
     Raises:
@@ -207,7 +207,7 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False)
-class Excited:
+class ExcitedInput:
     """What one input was excited with."""
 
     reference: str
@@ -232,7 +232,7 @@ class Campaign:
 
     plan: Plan
     response: FrequencyResponse
-    excited: tuple[Excited, ...]
+    excited: tuple[ExcitedInput, ...]
     wall_time: float
     simulated: float
     units: Mapping[str, Mapping[str, str]]
@@ -266,14 +266,14 @@ def run_campaign(
             _measure(machine, axis, inject, plan, realisation, fmus, progress, call_limit)
             for realisation in range(plan.realisations)
         ]
-        frequency_response = measured(measurements, pairs)
+        frequency_response = estimate_responses(measurements, pairs)
         frequency = frequency_response.frequency
         columns |= frequency_response.columns
         units |= frequency_response.units
         coherence |= frequency_response.coherence
         first = measurements[0]
         excited.append(
-            Excited(
+            ExcitedInput(
                 reference=first.reference,
                 unit=first.trace.unit(first.reference),
                 rms=first.excitation.rms,

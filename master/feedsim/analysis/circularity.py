@@ -19,7 +19,7 @@ from feedsim.analysis.figures import Array, Figure, column, window
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
 from feedsim.motions.circular import Circular
-from feedsim.motions.setpoints import Recorded
+from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.simulation.nc import Program, Segment
 
 QUARTER = math.pi / 2
@@ -176,7 +176,7 @@ def axis_letters(axes: Sequence[str]) -> str:
 # lead-in or a wrong centre makes far more, and figures that have nothing to do with the machine.
 OFF_CIRCLE = 20e-6
 # A recording of full turns may lack this share of the last one: its positions are rounded, 1 um of some millimetres.
-CLOSED = 1e-4
+FULL_TURN_TOLERANCE = 1e-4
 # The speed of a turn is constant where each of its parts takes as long as the others, to this share.
 TURN_PARTS, EVEN_SPEED_SHARE = 16, 0.05
 
@@ -195,7 +195,7 @@ def recorded_circle(
     InputError: less than a full turn, or setpoints that leave the circle by more than OFF_CIRCLE within the turns.
     """
     recording = segment.geometry
-    assert isinstance(recording, Recorded)
+    assert isinstance(recording, RecordedGeometry)
     # Half a position cycle's rounding must not let a setpoint of the run-in in, which lies a whole cycle away.
     rounding = 1e-6 * (program.time[1] - program.time[0])
     rows = (program.time >= recording.begin - rounding) & (program.time <= recording.end + rounding)
@@ -210,7 +210,7 @@ def recorded_circle(
     turned = np.maximum.accumulate(sense * (angle - angle[0])) / (2 * math.pi)
     name = f"circularity: recorded setpoints of {plane[0]} and {plane[1]}"
     about = f"about {plane[0]} {c[0] * 1e3:.7g} mm, {plane[1]} {c[1] * 1e3:.7g} mm"
-    turns = math.floor(float(turned[-1]) + CLOSED)
+    turns = math.floor(float(turned[-1]) + FULL_TURN_TOLERANCE)
     if turns < 1:
         raise InputError(f"{name} cover {turned[-1] * 360:.4g} deg {about}; at least one full turn, 360 deg, is needed")
     within = turned <= turns

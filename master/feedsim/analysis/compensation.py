@@ -17,7 +17,7 @@ from feedsim.scenario import CircleTest, FrictionParameters, Machine, Recording,
 from feedsim.simulation.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
 from feedsim.simulation.cosim.friction_law import FrictionLaws
 from feedsim.simulation.cosim.run import run
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from feedsim.simulation.nc import Program
 
 # --- What a friction compensation leaves on a circle: with errors in it, and on a machine that is another one ---------
@@ -25,7 +25,7 @@ from feedsim.simulation.nc import Program
 
 DELAY_ERRORS = (-1e-3, -0.5e-3, -0.2e-3, 0.2e-3, 0.5e-3, 1e-3)  # s
 # Parameters that are wrong together: a static torque below the Coulomb torque is none.
-VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("spread",), ("C",), ("sigma_1",), ("v_s",))
+VARIED_PARAMETERS = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("spread",), ("C",), ("sigma_1",), ("v_s",))
 FRICTION_ERROR = 0.1
 OF_ENGAGING = ("W", "gamma")  # of no effect where W is 0
 
@@ -54,7 +54,7 @@ class Variation:
 
 
 @dataclass(frozen=True)
-class Changed:
+class ChangedMachine:
     """A compensation on a changed machine. words: behind "with". before, after: without and with it."""
 
     words: str
@@ -91,7 +91,7 @@ def errors_and_changes(
     *,
     fmus: Path | None,
     progress: Progress,
-) -> tuple[tuple[Variation, ...], tuple[Changed, ...]]:
+) -> tuple[tuple[Variation, ...], tuple[ChangedMachine, ...]]:
     """One run up to the end of the turn for every error, and two for every changed machine.
 
     machines: words -> machine. Raises InputError, SimulationError, as a run.
@@ -113,9 +113,9 @@ def errors_and_changes(
         ("delay", error * 1e3, "ms", frictions, {axis: delay + error for axis, delay in delays.items()})
         for error in DELAY_ERRORS
     ]
-    for names in VARIED:
+    for names in VARIED_PARAMETERS:
         for share in (-FRICTION_ERROR, FRICTION_ERROR):
-            varied = {axis: _varied(friction, names, 1 + share) for axis, friction in frictions.items()}
+            varied = {axis: _scale_parameters(friction, names, 1 + share) for axis, friction in frictions.items()}
             if varied != frictions:
                 wanted.append((", ".join(names), share * 100, "%", varied, delays))
     total = len(wanted) + len(machines)
@@ -137,12 +137,12 @@ def errors_and_changes(
     torque = feedforward(frictions, delays) if machines else {}
     for done, (words, own) in enumerate(machines.items(), start=len(wanted)):
         progress("what errors cost", done, total)
-        changed.append(Changed(words, left(own, None), left(own, torque)))
+        changed.append(ChangedMachine(words, left(own, None), left(own, torque)))
     progress("what errors cost", total, total)
     return tuple(variations), tuple(changed)
 
 
-def _varied(friction: FrictionParameters, names: Sequence[str], factor: float) -> FrictionParameters:
+def _scale_parameters(friction: FrictionParameters, names: Sequence[str], factor: float) -> FrictionParameters:
     """A set with some parameters multiplied; the same where its law has none of them, or they have no effect."""
     if not set(names) <= set(type(friction).model_fields) or (set(names) <= set(OF_ENGAGING) and friction.W == 0):
         return friction
@@ -154,7 +154,7 @@ def _varied(friction: FrictionParameters, names: Sequence[str], factor: float) -
 
 Progress = Callable[[str, int, int], None]
 
-RESTING = 1e-9  # m; what an axis that is held may move by, from rounding
+REST_ROUNDING = 1e-9  # m; what an axis that is held may move by, from rounding
 # A figure has become worse from this share of G without compensation on, and by this [m] at least.
 WORSE, LEAST_WORSE = 0.01, 1e-9
 REVERSAL = "reversal "
@@ -189,7 +189,7 @@ class Compensation:
     left_after: Quality
     figures: Mapping[str, Figure]
     table: tuple[Variation, ...]
-    changed: tuple[Changed, ...]
+    changed: tuple[ChangedMachine, ...]
     warnings: tuple[Finding, ...]
 
     @property
@@ -222,7 +222,7 @@ def circle_task(scenario: Scenario, program: Program) -> CircleTask:
 
 def moving_axes(program: Program) -> tuple[str, ...]:
     """Axes that the program moves."""
-    return tuple(axis for axis, x in program.x_s.items() if np.ptp(x) > RESTING)
+    return tuple(axis for axis, x in program.x_s.items() if np.ptp(x) > REST_ROUNDING)
 
 
 def check_moves(axis: str, program: Program, what: str = "") -> None:
@@ -280,8 +280,8 @@ def compensate(
 
     with FrictionLaws(fmus) as laws:
         torque = friction_feedforward(machine, program, used, applied, laws)
-        before = judged(run(plain, program=program, fmus=fmus, progress=told("without compensation")))
-        after = judged(
+        before = judge_run(run(plain, program=program, fmus=fmus, progress=told("without compensation")))
+        after = judge_run(
             run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
         )
         variations, changed = errors_and_changes(
@@ -309,9 +309,9 @@ def compensate(
         table=variations,
         changed=changed,
         warnings=(
-            *_worse(figures, _reversals(before.trace, turn), _reversals(after.trace, turn)),
+            *_warn_worse_figures(figures, _reversals(before.trace, turn), _reversals(after.trace, turn)),
             *dict.fromkeys((*before.warnings, *after.warnings)),
-            *_doubts(applied),
+            *_warn_negative_delays(applied),
             *_not_judged(axes, turn),
             *_same_model(machine, used, lags, variations),
         ),
@@ -329,7 +329,9 @@ def _reversals(trace: Trace, turn: Turn) -> dict[str, float]:
     }
 
 
-def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Mapping[str, float]) -> list[Finding]:
+def _warn_worse_figures(
+    figures: Mapping[str, Figure], before: Mapping[str, float], after: Mapping[str, float]
+) -> list[Finding]:
     """What the compensation has made worse: wrong is more of G or of a reversal, of other figures it is a doubt.
 
     before, after: as from `_reversals`.
@@ -355,10 +357,10 @@ def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Ma
     rest = {name: both for name, both in worse.items() if name not in grave}
     result = []
     if grave:
-        text = f"worse with compensation than without: {_listed(grave)}"
+        text = f"worse with compensation than without: {_list_changes(grave)}"
         result.append(Finding("compensation-worse", "wrong", text, ", ".join(grave)))
     if rest:
-        text = f"larger with compensation than without: {_listed(rest)}"
+        text = f"larger with compensation than without: {_list_changes(rest)}"
         result.append(Finding("compensation-larger", "doubt", text, ", ".join(rest)))
     return result
 
@@ -373,7 +375,7 @@ def _size(name: str, value: float) -> float:
     return abs(value)
 
 
-def _listed(pairs: Mapping[str, tuple[float, float]]) -> str:
+def _list_changes(pairs: Mapping[str, tuple[float, float]]) -> str:
     return ", ".join(
         f"{name} {before:.3g} -> {f'{after:.3g} um' if np.isfinite(after) else 'not determined'}"
         for name, (before, after) in pairs.items()
@@ -474,7 +476,7 @@ def _feedforward_figures(
     return figures
 
 
-def _doubts(delays: Mapping[str, float]) -> list[Finding]:
+def _warn_negative_delays(delays: Mapping[str, float]) -> list[Finding]:
     return [
         Finding(
             "feedforward-looks-ahead", "doubt",

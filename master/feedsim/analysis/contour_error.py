@@ -24,7 +24,7 @@ from feedsim.files.fields import Quantity
 from feedsim.files.trace import Trace
 from feedsim.motions.part_program.words import Motion
 from feedsim.motions.planner.nearest import Feet
-from feedsim.motions.program import Programmed
+from feedsim.motions.program import ProgrammedGeometry
 from feedsim.scenario import Drive, ForeignUnit, Machine
 from feedsim.scenario.axis_units import ParameterGroup
 from feedsim.simulation.nc import Program, Segment
@@ -110,7 +110,7 @@ class ContourError:
     """
 
     segment: Segment
-    programmed: Programmed
+    programmed: ProgrammedGeometry
     delay: float
     time: Array
     positions: Positions
@@ -246,7 +246,7 @@ def contour_error(
     frictionless: of the same setpoints, nearly without friction. Raises InputError where positions are not recorded.
     """
     programmed = segment.geometry
-    assert isinstance(programmed, Programmed)
+    assert isinstance(programmed, ProgrammedGeometry)
     axes = programmed.moves.axes
     purpose = f"the contour error of {programmed.moves.files[0]}"
     setpoints = Setpoints(program, machine, axes)
@@ -296,11 +296,11 @@ class Positions:
     tool: Sequence[Array] | None
 
     def at(
-        self, time: Array, rows: slice | Integers, programmed: Programmed
+        self, time: Array, rows: slice | Integers, programmed: ProgrammedGeometry
     ) -> tuple[dict[str, Feet], dict[str, Vectors]]:
         """Feet and vectors by "scale" and "tool" of the instants ``time`` [s], rows of the record."""
         at, path = time - self.delay, programmed.path
-        x_ref, x = self.setpoints.at(at), _together(self.x, rows)
+        x_ref, x = self.setpoints.at(at), _stack_columns(self.x, rows)
         s_ref = np.interp(at, programmed.time, programmed.s)
         planned = _length(x_ref - path.point(s_ref))
         reach = 2 * (_length(x - x_ref) + planned) + programmed.uneven
@@ -308,11 +308,11 @@ class Positions:
         most = _length(x_ref - own)
         parts = {"plan": x_ref, "servo": x}  # each the one before with one more cause
         if self.without is not None:
-            parts = {"plan": x_ref, "servo": _together(self.without, rows), "friction": x}
+            parts = {"plan": x_ref, "servo": _stack_columns(self.without, rows), "friction": x}
         feet = {"scale": path.nearest(x, s_ref, reach)}
         vectors = {"scale": _vectors(feet["scale"], parts, most)}
         if self.tool is not None:
-            tool = _together(self.tool, rows)
+            tool = _stack_columns(self.tool, rows)
             feet["tool"] = path.nearest(tool, s_ref, reach + 2 * _length(tool - x))
             vectors["tool"] = _vectors(feet["tool"], {**parts, "structure": tool}, most)
         return feet, vectors
@@ -338,7 +338,7 @@ def _vectors(feet: Feet, parts: Mapping[str, Array], most: Array) -> Vectors:
     return Vectors(normal, feet.direction, shares)
 
 
-def _together(columns: Sequence[Array], rows: slice | Integers) -> Array:
+def _stack_columns(columns: Sequence[Array], rows: slice | Integers) -> Array:
     return np.stack([values[rows] for values in columns], axis=1)
 
 
@@ -426,16 +426,16 @@ def without_friction(machine: Machine) -> Machine | None:
     for name, axis in machine.axes.items():
         if isinstance(axis.friction, ForeignUnit):
             return None
-        changes: dict[str, object] = {"friction": _scaled(axis.friction, "N.m")}
+        changes: dict[str, object] = {"friction": _reduce_friction(axis.friction, "N.m")}
         if axis.guide is not None:
-            changes["guide"] = _scaled(axis.guide, "N")
+            changes["guide"] = _reduce_friction(axis.guide, "N")
         if isinstance(axis.drive, Drive):
             changes["drive"] = axis.drive.model_copy(update={"friction_pulse": None, "friction_table": None})
         axes[name] = axis.model_copy(update=changes)
     return machine.model_copy(update={"axes": axes})
 
 
-def _scaled(group: ParameterGroup, unit: str) -> ParameterGroup:
+def _reduce_friction(group: ParameterGroup, unit: str) -> ParameterGroup:
     """Friction with NEARLY_NONE of every torque or force, stiffness and damping: LuGre and GMS are linear in all."""
     return group.model_copy(
         update={

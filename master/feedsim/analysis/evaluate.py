@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, Term, TurnedPath, diagnose, name
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, Term, TurnedPath, diagnose, term_name
 from feedsim.analysis.circularity import (
     EVEN_SPEED_SHARE,
     Turn,
@@ -24,7 +24,7 @@ from feedsim.analysis.circularity import (
 )
 from feedsim.analysis.contour_error import ContourError, contour_error
 from feedsim.analysis.figures import Array, Figure
-from feedsim.analysis.positioning import MIN_REST_TIME, Accuracy, Approach, mounts_share, positioning, readings
+from feedsim.analysis.positioning import MIN_REST_TIME, Accuracy, Approach, mounts_share, positioning_figures, readings
 from feedsim.files.trace import Trace, matches
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.linear.loops import measuring_error, position_reference
@@ -32,8 +32,8 @@ from feedsim.linear.system import LinearSystem
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
 from feedsim.motions.positioning_cycle import Visits
-from feedsim.motions.program import Programmed
-from feedsim.motions.setpoints import Recorded
+from feedsim.motions.program import ProgrammedGeometry
+from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import CircleTest, ContourTest, Machine, Positioning, PositioningAccuracy, Scenario
 from feedsim.simulation.nc import Program, Segment
 
@@ -53,7 +53,7 @@ FIGURE_ORDER = (
 COMPARED_ANGLES = 720  # at which two directions are compared: every half degree
 
 
-def diagnosed(
+def diagnose_turns(
     trace: Trace,
     turns: Sequence[Turn],
     pitch: Mapping[str, float],
@@ -142,7 +142,7 @@ def figure_name(term: Term) -> str:
     return f"{names.get(term.key, term.key)}{'_' if term.axis else ''}{term.axis}{order}"
 
 
-def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str]:
+def warn_misleading_glitches(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str]:
     """A sentence for every axis whose quadrant glitch, largest deviation in the quadrant, is not friction's peak."""
     result = []
     for axis in diagnosis.circle.axes:
@@ -153,13 +153,13 @@ def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str
                 (term for term in diagnosis.terms if term.key not in ("peaks", "rest")), key=lambda term: term.size
             )
             result.append(
-                f"glitch_{axis}, {old}, is the largest deviation of the quadrant, most of it {name(largest)}; the "
+                f"glitch_{axis}, {old}, is the largest deviation of the quadrant, most of it {term_name(largest)}; the "
                 f"reversal peak of {axis} itself is {peak.value * 1e6:.3g} um"
             )
     return result
 
 
-def bidirectional(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
+def bidirectional_figures(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
     """ISO 230-4's figures of two turns in opposite senses, about the centre of the circle fitted to both."""
     measured = [contour(trace, entry) for entry in (turn, back)]
     return both_directions([(m.angle, m.deviation) for m in measured], turn.radius, turn.axes)
@@ -168,9 +168,9 @@ def bidirectional(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
 def both_directions(turns: Sequence[tuple[Array, Array]], radius: float, axes: tuple[str, str]) -> dict[str, Figure]:
     """The same of two turns by their angles [rad] and deviations of the radius [m]."""
     centre = fitted_centre(np.concatenate([a for a, _ in turns]), np.concatenate([e for _, e in turns]), radius)
-    around = [about(angle, deviation, radius, centre) for angle, deviation in turns]
+    around = [shift_centre(angle, deviation, radius, centre) for angle, deviation in turns]
     even: Array = np.arange(COMPARED_ANGLES, dtype=np.float64) * (2 * math.pi / COMPARED_ANGLES) - math.pi
-    there, again = (_at(even, angle, deviation) for angle, deviation in around)
+    there, again = (_deviation_at(even, angle, deviation) for angle, deviation in around)
     letters = axis_letters(axes)
     both = np.concatenate([deviation for _, deviation in around])
 
@@ -192,13 +192,13 @@ def both_directions(turns: Sequence[tuple[Array, Array]], radius: float, axes: t
     }
 
 
-def about(angle: Array, deviation: Array, radius: float, centre: Array) -> tuple[Array, Array]:
+def shift_centre(angle: Array, deviation: Array, radius: float, centre: Array) -> tuple[Array, Array]:
     """Angle [rad] and deviation of the radius [m] about another centre (2,) [m]."""
     x, y = (radius + deviation) * np.cos(angle) - centre[0], (radius + deviation) * np.sin(angle) - centre[1]
     return np.arctan2(y, x), np.hypot(x, y) - radius
 
 
-def _at(wanted: Array, angle: Array, deviation: Array) -> Array:
+def _deviation_at(wanted: Array, angle: Array, deviation: Array) -> Array:
     order = np.argsort(angle)
     return np.asarray(np.interp(wanted, angle[order], deviation[order], period=2 * math.pi))
 
@@ -239,7 +239,7 @@ class PositioningTask:
 
     def figures(self, trace: Trace, clamped: Trace | None = None) -> dict[str, Figure]:
         """Figures of the task, without prefix. clamped: the same setpoints on mounts that hold still."""
-        figures = positioning(trace, self.approach, band=self.band)
+        figures = positioning_figures(trace, self.approach, band=self.band)
         if clamped is not None:
             settling = figures["settling_time"]
             figures["settling_of_mounts"] = mounts_share(clamped, self.approach, settling, self.band)
@@ -269,7 +269,7 @@ class CircleTask:
         """Figures of the task, without prefix."""
         result = circularity(trace, self.turn)
         if self.back is not None:
-            result |= bidirectional(trace, self.turn, self.back)
+            result |= bidirectional_figures(trace, self.turn, self.back)
             result |= {f"clockwise.{name}": figure for name, figure in circularity(trace, self.back).items()}
         diagnosis = self.diagnosis(trace)
         return result | (cause_figures(diagnosis) if diagnosis is not None else {})
@@ -283,7 +283,7 @@ class CircleTask:
         if last is None or last[0] is not trace:
             last = (
                 trace,
-                diagnosed(
+                diagnose_turns(
                     trace,
                     self.turns,
                     self.pitch,
@@ -302,7 +302,7 @@ class CircleTask:
         return {axis: 2 * math.pi * self.machine.axes[axis].I_P for axis in self.turn.axes}
 
     @property
-    def _first(self) -> float:
+    def _circle_frequency(self) -> float:
         """The circle's frequency [Hz]."""
         return 1 / (self.turn.end - self.turn.begin)
 
@@ -322,12 +322,12 @@ class CircleTask:
     def _orders(self) -> tuple[int, dict[str, int]]:
         """Up to which multiple of the circle's frequency the loops' response to friction is taken; and of each axis, up
         to which one errors that repeat with the pitch have harmonics."""
-        sampled = 0.4 / self.machine.cycles.T_c / self._first
+        sampled = 0.4 / self.machine.cycles.T_c / self._circle_frequency
         counts = {}
         for axis in self.turn.axes:
             waves = 2 * math.pi * self.turn.radius / self.pitch[axis]
             counts[axis] = max(int(min(waves + PITCH_HARMONICS * (1 + waves ** (1 / 3)), sampled, 500)), 1)
-        return math.ceil(max(2, min(DRAG_HIGHEST / self._first, sampled, DRAG_MOST))) - 1, counts
+        return math.ceil(max(2, min(DRAG_HIGHEST / self._circle_frequency, sampled, DRAG_MOST))) - 1, counts
 
     @cached_property
     def _multiples(self) -> NDArray[np.int64]:
@@ -341,7 +341,7 @@ class CircleTask:
         """A response of the plane's axes at all multiples; empty where a drive is not the shipped one."""
         if self._system is None:
             return {}
-        frequency = np.asarray(self._first * self._multiples, dtype=np.float64)
+        frequency = np.asarray(self._circle_frequency * self._multiples, dtype=np.float64)
         return {axis: response(self._system, axis, frequency) for axis in self.turn.axes}
 
     @cached_property
@@ -355,7 +355,7 @@ class CircleTask:
         """x_a over M_add, a torque at the motor but for the current loop, of the plane's axes at the odd multiples of
         the circle's frequency [m/(N.m)]; empty as gain."""
         own = (self._multiples % 2 == 1) & (self._multiples <= self._orders[0])
-        return {axis: response[own] for axis, response in self._at_multiples(_dragged).items()}
+        return {axis: response[own] for axis, response in self._at_multiples(_drag_response).items()}
 
     @cached_property
     def following(self) -> dict[str, NDArray[np.complex128]]:
@@ -374,12 +374,12 @@ class CircleTask:
         def of_torque(axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
             s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
             per_setpoint, _ = system.drives[system.axes.index(axis)].torque(s)
-            return np.asarray(_dragged(system, axis, frequency) / per_setpoint)
+            return np.asarray(_drag_response(system, axis, frequency) / per_setpoint)
 
         return of_torque
 
 
-def _dragged(system: LinearSystem, axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _drag_response(system: LinearSystem, axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
     """x_a over M_add of an axis with its position loop closed, at frequencies (F,) [Hz]: (F,) [m/(N.m)]."""
     return system.closing({axis: "position"}).transfer(frequency, f"{axis}.x_a", f"{axis}.M_add")
 
@@ -429,7 +429,7 @@ class ContourTask:
     @property
     def needs(self) -> tuple[str, ...]:
         """Columns without which there is nothing to evaluate."""
-        assert isinstance(self.segment.geometry, Programmed)
+        assert isinstance(self.segment.geometry, ProgrammedGeometry)
         return tuple(f"{axis}.x_a" for axis in self.segment.geometry.moves.axes)
 
     def error(self, trace: Trace, frictionless: Trace | None = None) -> ContourError:
@@ -523,17 +523,17 @@ def contours(result: Result) -> Mapping[str, ContourError]:
 def program_notes(program: Program) -> tuple[Finding, ...]:
     """What is to be known of the NC programs among the motions."""
     geometries = [segment.geometry for segment in program.segments]
-    return tuple(note for entry in geometries if isinstance(entry, Programmed) for note in entry.notes)
+    return tuple(note for entry in geometries if isinstance(entry, ProgrammedGeometry) for note in entry.notes)
 
 
-def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Finding, ...]:
+def doubt_figures(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Finding, ...]:
     """Figures that do not mean what their names say, of this result."""
     notes = []
     for prefix, diagnosis in diagnoses.items():
         own = {name.removeprefix(f"{prefix}."): f for name, f in figures.items() if name.startswith(f"{prefix}.")}
         notes += [
             Finding("glitch-misleading", "note", f"{prefix}: {sentence}", prefix)
-            for sentence in misleading(diagnosis, own)
+            for sentence in warn_misleading_glitches(diagnosis, own)
         ]
     return tuple(notes)
 
@@ -570,7 +570,7 @@ def _task(
     if isinstance(item, CircleTest):
         return _turn(item, scenario, program)
     if isinstance(item, ContourTest):
-        programs = [s for s in _chosen(program, item.motion) if isinstance(s.geometry, Programmed)]
+        programs = [s for s in _chosen(program, item.motion) if isinstance(s.geometry, ProgrammedGeometry)]
         if not programs:
             raise InputError("contour: the motions have no NC program")
         return ContourTask("contour", programs[-1], program, scenario.machine)
@@ -673,7 +673,7 @@ def _circle(item: CircleTest, chosen: tuple[Segment, ...], program: Program) -> 
     circles = [s.geometry for s in chosen if s.kind == "circle" and isinstance(s.geometry, Circular)]
     if circles:
         return circles[-1]
-    recorded = [s for s in chosen if isinstance(s.geometry, Recorded)]
+    recorded = [s for s in chosen if isinstance(s.geometry, RecordedGeometry)]
     if not recorded:
         what = "the program has no circle" if item.motion is None else f"motions.{item.motion} is no circle"
         raise InputError(f"circularity: {what}")

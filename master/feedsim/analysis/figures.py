@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.files.trace import Trace
-from feedsim.files.trace.trace import suggest
+from feedsim.files.trace.trace import suggest_name
 from feedsim.foundation.errors import InputError, UnknownName
-from feedsim.foundation.installation import need
+from feedsim.foundation.installation import require_module
 
 if TYPE_CHECKING:
     import pandas
@@ -55,28 +55,28 @@ class Figure:
 Figures = Mapping[str, Figure]
 
 
-class Named(dict[str, Figure]):
+class FigureTable(dict[str, Figure]):
     """Figures by name, a table: :meth:`to_pandas`, and as notebooks show it.
 
     A name that is none raises UnknownName, which says which is the nearest.
 
-    >>> Named({"Z.overshoot": Figure(3.1, "um", "")})["Z.overshot"]
+    >>> FigureTable({"Z.overshoot": Figure(3.1, "um", "")})["Z.overshot"]
     Traceback (most recent call last):
     feedsim.foundation.errors.UnknownName: no figure 'Z.overshot'; did you mean 'Z.overshoot'?
     """
 
     def __missing__(self, name: str) -> Figure:
-        raise UnknownName(f"no figure {name!r}{suggest(name, self)}")
+        raise UnknownName(f"no figure {name!r}{suggest_name(name, self)}")
 
-    def with_intervals(self, intervals: Mapping[str, tuple[float, float]]) -> Named:
+    def with_intervals(self, intervals: Mapping[str, tuple[float, float]]) -> FigureTable:
         """The same with intervals of some; ends that are NaN are not known."""
         known = {name: ends for name, ends in intervals.items() if name in self and math.isfinite(ends[0])}
-        return Named(self | {name: replace(self[name], interval=ends) for name, ends in known.items()})
+        return FigureTable(self | {name: replace(self[name], interval=ends) for name, ends in known.items()})
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row per figure: value, unit, low and high end of its interval, meaning. Needs the package pandas."""
         rows = [(f.value, f.unit, *(f.interval or (math.nan, math.nan)), f.meaning) for f in self.values()]
-        return need("pandas", "a DataFrame").DataFrame(
+        return require_module("pandas", "a DataFrame").DataFrame(
             rows, index=list(self), columns=["value", "unit", "low", "high", "meaning"]
         )
 
@@ -141,7 +141,7 @@ def last_outside(time: Array, deviation: Array, band: float) -> float:
     return float(time[k] + share * (time[k + 1] - time[k]))
 
 
-def averaged(values: Array, count: int) -> Array:
+def moving_mean(values: Array, count: int) -> Array:
     """Mean over ``count`` neighbours; fewer at the ends."""
     ones = np.ones(min(count, len(values)))
     return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))

@@ -34,7 +34,7 @@ LIKELIHOOD_RATIO = 100.0
 SINGULAR = 1e-9  # of a column: what is left of it beside the others, where it says nothing of its own
 LEAST_SIGMA = 1e-9  # of the values' size: no standard deviation is taken for less
 ITERATIONS, ACCURACY = 60, 1e-6  # steps of Newton's method at most, and the last one over tau^2
-FURTHEST = 36525.0  # [days] beyond the last record, from which on a limit counts as not reached
+MAX_EXTRAPOLATION = 36525.0  # [days] beyond the last record, from which on a limit counts as not reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Series:
 
 
 @dataclass(frozen=True, eq=False)
-class Weighted:
+class WeightedFit:
     """Weighted least squares of M designs of one shape.
 
     coefficients (M, P), covariance (M, P, P), residuals (M, K), tau2 (M,), weights (M, K). free: degrees of freedom.
@@ -122,7 +122,7 @@ def solve(designs: Array, value: Array, variance: Array) -> tuple[Array, Array, 
     )
 
 
-def weighted(designs: Array, value: Array, sigma: Array, target: float | None = None) -> Weighted:
+def fit_weighted(designs: Array, value: Array, sigma: Array, target: float | None = None) -> WeightedFit:
     """Least squares of designs (M, K, P), each with the tau^2 of Paule and Mandel; K > P.
 
     target: what the sum of squares is to be; None: the degrees of freedom.
@@ -142,14 +142,14 @@ def weighted(designs: Array, value: Array, sigma: Array, target: float | None = 
         if np.all(np.abs(better - tau2) <= ACCURACY * better):
             break
         tau2 = better
-    return Weighted(coefficients, covariance, residuals, tau2, 1.0 / variance, free, regular)
+    return WeightedFit(coefficients, covariance, residuals, tau2, 1.0 / variance, free, regular)
 
 
 # --- Models of a change: constant, a rate, steps, a rate with steps ---------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedChange:
     """A model of a change, fitted.
 
     Attributes:
@@ -191,7 +191,7 @@ class Fitted:
             max(float(row @ self.covariance @ row), 0.0)
         )
 
-    def adjusted(self) -> Array:
+    def adjusted_values(self) -> Array:
         """(K,) values at the means of the covariates."""
         own = (
             np.stack(list(self.series.columns.values()), 1)
@@ -246,14 +246,14 @@ def _classes(series: Series) -> Iterator[_Class]:
             yield _Class(rate, steps, places, np.stack(designs))
 
 
-def _fitted(series: Series, one: _Class) -> tuple[Fitted, Weighted]:
+def _fit_class(series: Series, one: _Class) -> tuple[FittedChange, WeightedFit]:
     """The likeliest model of a class, and the fits of all."""
     sigma = series.known_sigma()
-    every = weighted(one.designs, series.value, sigma)
+    every = fit_weighted(one.designs, series.value, sigma)
     likelihood = 0.5 * np.sum(np.log(every.weights) - every.weights * every.residuals**2, axis=1)
     likelihood = np.where(every.regular, likelihood, -np.inf)
     k = int(np.argmax(likelihood))
-    best = Fitted(
+    best = FittedChange(
         series,
         one.rate,
         one.places[k],
@@ -267,7 +267,7 @@ def _fitted(series: Series, one: _Class) -> tuple[Fitted, Weighted]:
     return best, every
 
 
-def _probability(series: Series, small: _Class, place: tuple[int, ...], large: _Class, every: Weighted) -> float:
+def _probability(series: Series, small: _Class, place: tuple[int, ...], large: _Class, every: WeightedFit) -> float:
     """Chance that scatter alone makes any model of a class explain as much more than a smaller one as it does.
 
     F test at the weights of the larger model, times the number of its places (Bonferroni). `place`: the steps of the
@@ -297,12 +297,12 @@ class Change:
     """
 
     series: Series
-    model: Fitted
+    model: FittedChange
     probability: float
     threshold: float
-    rival: Fitted | None
+    rival: FittedChange | None
     excess: float
-    constant: Fitted
+    constant: FittedChange
 
     @property
     def changed(self) -> bool:
@@ -326,18 +326,18 @@ class Change:
         return min(likely) - 1, max(likely)
 
 
-class _Tested:
+class _TestedClasses:
     """The classes of a series fitted, and the chance of 'constant'."""
 
     def __init__(self, series: Series) -> None:
         self.series = series
         self.classes = list(_classes(series))
-        fits = [_fitted(series, one) for one in self.classes]
+        fits = [_fit_class(series, one) for one in self.classes]
         self.best = [best for best, _ in fits]
         self.every = [every for _, every in fits]
-        self.probability = self.improved(0)
+        self.probability = self.chance_of_improvement(0)
 
-    def improved(self, k: int) -> float:
+    def chance_of_improvement(self, k: int) -> float:
         """Chance that scatter alone makes any larger class explain so much more than class k."""
         larger = [n for n, one in enumerate(self.classes) if one.elements > self.classes[k].elements]
         chances = [
@@ -346,7 +346,7 @@ class _Tested:
         ]
         return min([1.0, *(len(larger) * chance for chance in chances)])
 
-    def concluded(self, threshold: float, named: bool) -> Change:
+    def conclude(self, threshold: float, named: bool) -> Change:
         """The smallest model that no larger one improves on, where the quantity is named."""
         levels = sorted({one.elements for one in self.classes}) if named else [0]
         chosen, rival = 0, None
@@ -363,7 +363,7 @@ class _Tested:
                 self.best[chosen].log_likelihood - self.best[other].log_likelihood < math.log(LIKELIHOOD_RATIO)
             )
             rival = self.best[other] if close and other is not None else None
-            if self.improved(chosen) >= ERROR_RATE:
+            if self.chance_of_improvement(chosen) >= ERROR_RATE:
                 break
         model = self.best[chosen]
         return Change(self.series, model, self.probability, threshold, rival, _excess(model), self.best[0])
@@ -375,14 +375,14 @@ def changes(every: Sequence[Series]) -> list[Change]:
     The probability that any is named though none changes is ERROR_RATE at most (S. Holm, Scand. J. Statist. 6, 1979),
     whether they are correlated or not. A quantity of fewer than MIN_RECORDS dates is not tested.
     """
-    tested = {k: _Tested(series) for k, series in enumerate(every) if testable(series)}
+    tested = {k: _TestedClasses(series) for k, series in enumerate(every) if testable(series)}
     result: dict[int, Change] = {}
     named = True
     for rank, k in enumerate(sorted(tested, key=lambda k: tested[k].probability)):
         threshold = ERROR_RATE / (len(tested) - rank)
         named = named and tested[k].probability < threshold
-        result[k] = tested[k].concluded(threshold, named)
-    return [result[k] if k in result else _untested(series) for k, series in enumerate(every)]
+        result[k] = tested[k].conclude(threshold, named)
+    return [result[k] if k in result else _mean_change(series) for k, series in enumerate(every)]
 
 
 def testable(series: Series) -> bool:
@@ -390,7 +390,7 @@ def testable(series: Series) -> bool:
     return len(series.days) >= MIN_RECORDS
 
 
-def _excess(model: Fitted) -> float:
+def _excess(model: FittedChange) -> float:
     """Chance of so much scatter about a model if the intervals of the results held all of it."""
     series = model.series
     if not np.all(np.isfinite(series.sigma)):
@@ -402,15 +402,15 @@ def _excess(model: Fitted) -> float:
     return float(chdtrc(model.free, np.sum(residuals**2 / series.known_sigma() ** 2)))
 
 
-def _untested(series: Series) -> Change:
+def _mean_change(series: Series) -> Change:
     """Of a series that is too short: its mean."""
     base = np.ones((1, len(series.days), 1))
     if len(series.days) < 2:
         sigma2 = float(series.known_sigma()[0]) ** 2
-        model = Fitted(series, False, (), series.value[:1], np.array([[sigma2]]), 0.0, 1, 0.0, 0.0)
+        model = FittedChange(series, False, (), series.value[:1], np.array([[sigma2]]), 0.0, 1, 0.0, 0.0)
         return Change(series, model, 1.0, 0.0, None, math.nan, model)
-    fit = weighted(base, series.value, series.known_sigma())
-    model = Fitted(
+    fit = fit_weighted(base, series.value, series.known_sigma())
+    model = FittedChange(
         series,
         False,
         (),
@@ -428,7 +428,7 @@ def _untested(series: Series) -> Change:
 
 
 @dataclass(frozen=True)
-class Crossing:
+class LimitCrossing:
     """When a quantity reaches a limit.
 
     Attributes:
@@ -442,7 +442,7 @@ class Crossing:
     interval: tuple[float, float] = (math.nan, math.nan)
 
 
-def crossing(model: Fitted, limit: float, side: int = 0) -> Crossing:
+def find_limit_crossing(model: FittedChange, limit: float, side: int = 0) -> LimitCrossing:
     """The first date at which a model reaches a limit, with an interval by inverse prediction (E. Fieller, J. R. Stat.
     Soc. B 16, 1954): the dates at which the interval of the level holds the limit.
 
@@ -453,24 +453,24 @@ def crossing(model: Fitted, limit: float, side: int = 0) -> Crossing:
     first, _ = model.level(begin, 0)
     side = side or int(np.sign(limit - first)) or 1
     if side * (first - limit) >= 0:
-        return Crossing("beyond", begin)
+        return LimitCrossing("beyond", begin)
     rate = model.rate_per_day()[0] if model.rate else 0.0
     edges = [begin, *(float(days[k]) for k in model.steps), math.inf]
     for regime in range(len(model.steps) + 1):
         low, high = edges[regime], edges[regime + 1]
         if regime and side * (model.level(low, regime)[0] - limit) >= 0:
             before = float(days[model.steps[regime - 1] - 1])
-            return Crossing("step", low, (before, low))
+            return LimitCrossing("step", low, (before, low))
         if side * rate <= 0:
             continue
         at = low + (limit - model.level(low, regime)[0]) / rate
-        if at < high and at - end < FURTHEST:
+        if at < high and at - end < MAX_EXTRAPOLATION:
             interval = _fieller(model, limit, regime, at)
-            return Crossing("passed" if at <= end else "ahead", at, interval)
-    return Crossing("never")
+            return LimitCrossing("passed" if at <= end else "ahead", at, interval)
+    return LimitCrossing("never")
 
 
-def _fieller(model: Fitted, limit: float, regime: int, at: float) -> tuple[float, float]:
+def _fieller(model: FittedChange, limit: float, regime: int, at: float) -> tuple[float, float]:
     """Dates about `at` at which the interval of the level holds the limit."""
     slope, half = model.rate_per_day()
     row, quantile = model.row(at, regime), student(model.free)
@@ -528,11 +528,11 @@ def scatter(name: str, unit: str, machines: Sequence[tuple[Array, Array]]) -> Sc
     own = (of[:, None] == np.arange(len(machines))).astype(float)
     within, within_interval, tau2 = math.nan, (math.nan, math.nan), 0.0
     if len(value) > len(machines):
-        tau2 = float(weighted(own[None], value, sigma).tau2[0])
+        tau2 = float(fit_weighted(own[None], value, sigma).tau2[0])
         within, within_interval = math.sqrt(tau2), _profile(own, value, sigma)
     means, covariance, _, _ = solve(own[None], value, (sigma**2 + tau2)[None])
     ones, deviations = np.ones((len(machines), 1)), np.sqrt(np.diag(covariance[0]))
-    fit = weighted(ones[None], means[0], deviations)
+    fit = fit_weighted(ones[None], means[0], deviations)
     variance = float(fit.covariance[0, 0, 0])
     between2 = float(fit.tau2[0])
     half = student(len(machines) - 1) * math.sqrt(variance)
@@ -554,5 +554,5 @@ def scatter(name: str, unit: str, machines: Sequence[tuple[Array, Array]]) -> Sc
 def _profile(design: Array, value: Array, sigma: Array) -> tuple[float, float]:
     """Interval of 95 % of tau: the sum of squares is one of chi^2 there."""
     free = design.shape[0] - design.shape[1]
-    low, high = (weighted(design[None], value, sigma, float(chdtri(free, p))).tau2[0] for p in (0.025, 0.975))
+    low, high = (fit_weighted(design[None], value, sigma, float(chdtri(free, p))).tau2[0] for p in (0.025, 0.975))
     return math.sqrt(float(low)), math.sqrt(float(high))

@@ -61,7 +61,7 @@ class Approach:
         return math.copysign(1.0, self.target - self.origin)
 
 
-def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict[str, Figure]:
+def positioning_figures(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict[str, Figure]:
     """Figures of ``approach``: overshoot, settling time to ``band`` [m], ringing, torques; by scale and by tool point.
 
     Overshoot, settling and ringing are NaN where less than MIN_REST_TIME of the rest behind the motion is recorded,
@@ -75,7 +75,7 @@ def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict
         **_stop(trace, approach, f"{axis}.x_a", band, f"axis {axis} by the linear scale"),
     }
     if f"{axis}.n_a" in trace.columns:
-        figures["ringing_frequency"] = _ringing(
+        figures["ringing_frequency"] = _ringing_figure(
             trace.time, approach.sense * trace[f"{axis}.n_a"], approach, f"motor speed of axis {axis}"
         )
     if f"{axis}.M_a" in trace.columns:
@@ -88,7 +88,7 @@ def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict
     return figures
 
 
-CLAMPED = 1000.0  # times as stiff as they are in the modes: mounts that hold still
+CLAMPING_FACTOR = 1000.0  # times as stiff as they are in the modes: mounts that hold still
 
 
 def with_clamped(run: Run, fmus: Path | None = None, progress: Progress | None = None) -> Run:
@@ -107,7 +107,7 @@ def with_clamped(run: Run, fmus: Path | None = None, progress: Progress | None =
     table = read_mounts(machine.mounts.table, len(bare.frequency))
     K_lin, x_2 = table.element[:, 0], table.element[:, 3]
     none = np.zeros(len(K_lin))
-    stiff = with_mounts(bare, table, np.column_stack([K_lin, CLAMPED * K_lin, none, x_2, none, none]))
+    stiff = with_mounts(bare, table, np.column_stack([K_lin, CLAMPING_FACTOR * K_lin, none, x_2, none, none]))
     columns = tuple(f"{axis}.x_a" for axis in machine.axes)
     recording = scenario.recording.model_copy(update={"variables": columns})
     with TemporaryDirectory() as folder:
@@ -177,13 +177,13 @@ def _stop(trace: Trace, approach: Approach, name: str, band: float, what: str) -
             "ms",
             f"last instant outside +-{width} about the target, counted from the end of the NC motion, {what}",
         ),
-        "ringing_frequency": _ringing(
+        "ringing_frequency": _ringing_figure(
             time, np.gradient(beyond, time), approach, f"rate of change of the position, {what}"
         ),
     }
 
 
-def _ringing(time: Array, speed: Array, approach: Approach, what: str) -> Figure:
+def _ringing_figure(time: Array, speed: Array, approach: Approach, what: str) -> Figure:
     begin, end = (approach.end + delay for delay in RINGING_WINDOW)
     inside = (time >= begin) & (time <= min(end, approach.until))
     seen = _rest_is_seen(time, approach, approach.end)

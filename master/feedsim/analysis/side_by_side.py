@@ -19,7 +19,7 @@ from feedsim.comparison.shift import estimated_shift
 from feedsim.files.columns import Columns
 from feedsim.files.source import json_file
 from feedsim.files.trace import Recording, Trace, as_series, read_recording
-from feedsim.files.trace.recording import mapped
+from feedsim.files.trace.recording import map_columns
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.outputs import read_rows
@@ -93,7 +93,7 @@ def read_sources(paths: Sequence[Path], mappings: Sequence[Columns] = ()) -> lis
     sources, problems = [], []
     for path, name in zip(paths, named_apart(paths), strict=True):
         try:
-            sources.append(_read(path, name, mappings))
+            sources.append(_read_source(path, name, mappings))
         except InputError as error:
             problems += list(error.problems)
     if problems:
@@ -111,7 +111,7 @@ def named_apart(paths: Sequence[Path]) -> list[str]:
     return [f"{path} ({k})" for k, path in enumerate(paths, 1)]
 
 
-def _read(path: Path, name: str, mappings: Sequence[Columns]) -> Source:
+def _read_source(path: Path, name: str, mappings: Sequence[Columns]) -> Source:
     curves = path / RESULT if path.is_dir() else path
     if path.is_dir() and not curves.is_file():
         raise InputError(
@@ -120,7 +120,7 @@ def _read(path: Path, name: str, mappings: Sequence[Columns]) -> Source:
         )
     recording = read_recording(curves)
     if curves.name != RESULT:
-        recording = mapped(recording, mappings)
+        recording = map_columns(recording, mappings)
     if (clock := recording.clock()) is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
     column, factor = clock
@@ -187,21 +187,27 @@ def _parameters(summary: Mapping[str, Any]) -> dict[str, str]:
     """Everything that a person sets, dotted: of the machine, and of the scenario."""
     result = {"scenario.motions": "; ".join(entry["description"] for entry in summary["scenario"]["motions"])}
     for group in ("coupling", "recording_interval"):
-        result |= _flat(f"scenario.{group}", summary["scenario"][group])
+        result |= _flatten_parameters(f"scenario.{group}", summary["scenario"][group])
     # Results of earlier versions lack some.
     known = ("name", "pose", "cycles", "path", "modes", "structure", "plant", "errors", "axes")
-    return result | _flat("machine", {key: summary["machine"][key] for key in known if key in summary["machine"]})
+    return result | _flatten_parameters(
+        "machine", {key: summary["machine"][key] for key in known if key in summary["machine"]}
+    )
 
 
-def _flat(name: str, value: Any) -> dict[str, str]:
+def _flatten_parameters(name: str, value: Any) -> dict[str, str]:
     if isinstance(value, Mapping):
         if set(value) == {"value", "unit"}:
             return {name: f"{value['value']:.9g} {value['unit']}" if value["value"] is not None else "none"}
-        return {key: text for part, entry in value.items() for key, text in _flat(f"{name}.{part}", entry).items()}
+        return {
+            key: text
+            for part, entry in value.items()
+            for key, text in _flatten_parameters(f"{name}.{part}", entry).items()
+        }
     return {name: str(value)[:DIGEST_DIGITS] if name.endswith(".sha256") else str(value)}
 
 
-def differing(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:
+def differing_parameters(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:
     """Parameters in which the results among the sources differ: name, and the value of every source, "" of records."""
     parameters = [source.parameters for source in sources]
     names = dict.fromkeys(name for entry in parameters for name in entry)
@@ -228,7 +234,7 @@ MAX_SIGNALS_NAMED = 4  # signals in a message
 WORDS = {"x_s": "position setpoints x_s", "x_a": "positions x_a, which takes out what all axes lag"}
 
 
-def aligned(sources: Sequence[Source]) -> list[Source]:
+def align_sources(sources: Sequence[Source]) -> list[Source]:
     """The sources, shifted in time onto the first one, and with the turns of circles that another one has.
 
     InputError lists the sources that share no signal and no figure with any other one.
@@ -241,7 +247,7 @@ def aligned(sources: Sequence[Source]) -> list[Source]:
     ]
     if alone:
         raise InputError.of("nothing can be shown", alone)
-    shifted = [sources[0], *(_shifted(source, sources[0]) for source in sources[1:])]
+    shifted = [sources[0], *(_shift_source(source, sources[0]) for source in sources[1:])]
     circles = {prefix: turns for source in reversed(sources) for prefix, turns in source.circles.items()}
     return [_with_circles(source, circles) for source in shifted]
 
@@ -258,7 +264,7 @@ def _shares(one: Source, other: Source) -> bool:
     return bool(set(one.signals) & set(other.signals) or set(one.figures) & set(other.figures))
 
 
-def _shifted(source: Source, onto: Source) -> Source:
+def _shift_source(source: Source, onto: Source) -> Source:
     if source.parameters and source.parameters.get("scenario.motions") == onto.parameters.get("scenario.motions"):
         return replace(source, aligned="by the program, which is the same")
     for signal, words in WORDS.items():

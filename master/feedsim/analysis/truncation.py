@@ -22,7 +22,7 @@ from feedsim.structure.build import assemble
 from feedsim.structure.solve import solve
 
 # What lies within this share of the cut-off is the reduced model's own; next to it, the dropped modes show.
-TRUSTED = 0.9
+TRUSTED_FREQUENCY_SHARE = 0.9
 
 FULL, REDUCED, CORRECTED = "full", "reduced", "with static correction"
 # All modes of a model are full matrices: 2000 degrees of freedom take some seconds, which a comparison may cost.
@@ -66,7 +66,7 @@ def truncation(structure: Structure, pose: Mapping[str, float]) -> Truncation | 
         return None
     full = solve(assembly, cutoff=math.inf, damping=structure.damping, described=False)
     kept = len(corrected.modes.frequency) - corrected.corrections  # the pseudo-modes come last
-    tables = {FULL: full.modes, REDUCED: _first(corrected.modes, kept), CORRECTED: corrected.modes}
+    tables = {FULL: full.modes, REDUCED: _first_modes(corrected.modes, kept), CORRECTED: corrected.modes}
     return Truncation(tables, structure.cutoff / (2 * math.pi))
 
 
@@ -119,7 +119,7 @@ def deviations(responses: Mapping[str, FrequencyResponse], full: FrequencyRespon
     for model, response in responses.items():
         for name in full:
             size = np.abs(deviation(response, full, name))
-            for key, limit in (("truncation_below", TRUSTED * cutoff), ("truncation", cutoff)):
+            for key, limit in (("truncation_below", TRUSTED_FREQUENCY_SHARE * cutoff), ("truncation", cutoff)):
                 within = full.frequency <= limit
                 largest = float(size[within].max()) if within.any() else np.nan
                 result[f"{loops.figure_key(name)}.{key}{_suffix(model)}"] = Figure(
@@ -133,7 +133,7 @@ def _suffix(model: str) -> str:
     return known.get(model, f"_{model.replace(' ', '_')}")
 
 
-def _first(modes: Modes, count: int) -> Modes:
+def _first_modes(modes: Modes, count: int) -> Modes:
     """The first `count` modes of a table."""
     ports = {port: shape[:count] for port, shape in modes.ports.items()}
     return replace(modes, frequency=modes.frequency[:count], damping=modes.damping[:count], ports=ports)

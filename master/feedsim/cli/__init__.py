@@ -28,12 +28,12 @@ from feedsim.cli.commands import (
     choose_colour,
     finish,
     given_files,
-    painted,
+    paint_text,
     prepare_streams,
     refuse_missing_files,
-    renamed,
+    rename_words,
     shown_streams,
-    watching,
+    watch_job,
 )
 from feedsim.foundation.owned import end_program
 
@@ -79,7 +79,7 @@ def main(arguments_given: Sequence[str] | None = None) -> int:
 
 
 def _main(given: Sequence[str]) -> int:
-    words, notes = renamed(given)
+    words, notes = rename_words(given)
     options = parser(words[0] if words else "").parse_args(words)
     if options.command is None:
         print(START_TEXT, end="")
@@ -94,21 +94,21 @@ def _main(given: Sequence[str]) -> int:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
     from feedsim.foundation.errors import FeedsimError
-    from feedsim.foundation.installation import missing
+    from feedsim.foundation.installation import missing_package_error
 
     try:
-        code = _done(command, options)
+        code = _run_command(command, options)
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()
         return code
     except FeedsimError as error:
         wrong_kind = error.exit_code == 2 and not command.missing_file(options)
-        _say(_kind_meant(command, options) if wrong_kind else "", error)
+        _print_error(_kind_meant(command, options) if wrong_kind else "", error)
         return _code(command, error.exit_code)
     except ModuleNotFoundError as error:
-        if (missing_package := missing(error, options.called)) is None:
+        if (missing_package := missing_package_error(error, options.called)) is None:
             raise
-        _say("", missing_package)
+        _print_error("", missing_package)
         return missing_package.exit_code
     except KeyboardInterrupt:
         print("feedsim: interrupted", file=sys.stderr)
@@ -134,24 +134,28 @@ def _code(command: Command, code: int) -> int:
     return 2 if command.name == "compare" else code
 
 
-def _done(command: Command, options: argparse.Namespace) -> int:
+def _run_command(command: Command, options: argparse.Namespace) -> int:
     """Do what the command asks for, and print what came out."""
     from feedsim.foundation.arguments import as_options
-    from feedsim.foundation.installation import ask
-    from feedsim.foundation.outputs import replacing
+    from feedsim.foundation.installation import require_extras
+    from feedsim.foundation.outputs import allow_replacement
 
-    ask(options.called, *command.declared.needs, *(["figures"] if getattr(options, "figures", ()) else []))
+    require_extras(options.called, *command.declared.needs, *(["figures"] if getattr(options, "figures", ()) else []))
     refuse_missing_files(command, options)
     from feedsim.jobs.result import in_words_of  # behind the look at the files: it loads what takes longer
 
     named = arguments(command, options)
     several = next((p.name for p in command.options if p.type.startswith("*")), None)
-    with as_options(), replacing(getattr(options, "force", False)), in_words_of(getattr(options, "control", "")):
+    with (
+        as_options(),
+        allow_replacement(getattr(options, "force", False)),
+        in_words_of(getattr(options, "control", "")),
+    ):
         job = command.job()
         listed = named.pop(several, ()) if several else ()
         silent = options.quiet or options.json is True
         if any(p.name == "watch" for p in command.declared.parameters):
-            with watching(silent) as watch:
+            with watch_job(silent) as watch:
                 result = job(*listed, **named, watch=watch)
         else:
             result = job(*listed, **named)
@@ -160,14 +164,16 @@ def _done(command: Command, options: argparse.Namespace) -> int:
 
 def _kind_meant(command: Command, options: argparse.Namespace) -> str:
     """What is to be said in place of a refusal, where the file is of a kind that another command takes."""
-    from feedsim.cli.kinds import meant
+    from feedsim.cli.kinds import explain_kind
 
-    sentences = (meant(f"{command.name} {option}".strip(), [value]) for option, value in given_files(command, options))
+    sentences = (
+        explain_kind(f"{command.name} {option}".strip(), [value]) for option, value in given_files(command, options)
+    )
     return next(filter(None, sentences), "")
 
 
-def _say(sentence: str, error: object) -> None:
-    print(painted(f"feedsim: {sentence or error}", "red", sys.stderr), file=sys.stderr)
+def _print_error(sentence: str, error: object) -> None:
+    print(paint_text(f"feedsim: {sentence or error}", "red", sys.stderr), file=sys.stderr)
 
 
 def entry() -> None:

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any, NoReturn, TextIO
 from unicodedata import category
 
-from feedsim.foundation.errors import WRONG, Finding, InputError, nearest, no_such_file, ranked
-from feedsim.jobs.parameters import COMMANDS, Argument, Declaration, Option, Parameter, Watch, declared
+from feedsim.foundation.errors import WRONG, Finding, InputError, find_nearest_name, no_such_file, rank_findings
+from feedsim.jobs.parameters import COMMANDS, Argument, Declaration, Option, Parameter, Watch, job_of_command
 
 GROUPS = {
     "identify": "friction, drives, modes or mounts from records",
@@ -69,7 +69,7 @@ class Command:
     @cached_property
     def declared(self) -> Declaration:
         """The job as its source declares it."""
-        return declared(self.name)
+        return job_of_command(self.name)
 
     @property
     def options(self) -> list[Parameter]:
@@ -122,7 +122,7 @@ def commands() -> tuple[Command, ...]:
     return tuple(Command(name, home) for name, home in COMMANDS.items())
 
 
-def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
+def rename_words(words: Sequence[str]) -> tuple[list[str], list[str]]:
     """Words of the command line in names of today, and a sentence on every name that was another one."""
     result, notes = [*words], []
     plain = next((k for k, word in enumerate(result) if not word.startswith("-")), len(result))
@@ -140,7 +140,11 @@ def renamed(words: Sequence[str]) -> tuple[list[str], list[str]]:
         result.remove("--try")
         result[plain : plain + 1] = ["tune", "proposals"]
         notes.append("feedsim run --try is called feedsim tune proposals")
-    elif first == "identify" and result[plain + 1 :] and result[plain + 1] not in _below("identify") | {"-h", "--help"}:
+    elif (
+        first == "identify"
+        and result[plain + 1 :]
+        and result[plain + 1] not in _subcommands("identify") | {"-h", "--help"}
+    ):
         result.insert(plain + 1, "friction")
         notes.append("feedsim identify is called feedsim identify friction")
     for k, word in enumerate(result):
@@ -177,7 +181,7 @@ def _words_of_check(words: Sequence[str]) -> Iterator[str]:
             next(rest, None)
 
 
-def _below(group: str) -> set[str]:
+def _subcommands(group: str) -> set[str]:
     return {name.split()[1] for name in COMMANDS if name.startswith(f"{group} ")}
 
 
@@ -195,7 +199,7 @@ def add_commands(top: argparse.ArgumentParser, only: str = "") -> None:
             name,
             help=declared.help,
             description=declared.description,
-            epilog=f"examples:\n{_indented(declared.examples)}" if declared.examples else None,
+            epilog=f"examples:\n{_indent_text(declared.examples)}" if declared.examples else None,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         add_options(parser, command)
@@ -206,7 +210,7 @@ def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def _indented(text: str) -> str:
+def _indent_text(text: str) -> str:
     return "\n".join(f"  {line}" if line else "" for line in text.splitlines())
 
 
@@ -290,10 +294,10 @@ def _words(parameter: Parameter, option: Option) -> tuple[list[str], dict[str, A
 
 def _kinds(text: str) -> tuple[str, ...]:
     """Kinds of files of figures."""
-    from feedsim.foundation.arguments import listed
+    from feedsim.foundation.arguments import split_names
     from feedsim.report.content import PICTURE_FORMATS
 
-    asked = listed(text)
+    asked = split_names(text)
     if not asked or any(kind not in PICTURE_FORMATS for kind in asked):
         raise ArgumentTypeError(f"{text!r}: of {', '.join(PICTURE_FORMATS)}, one or several, with commas between them")
     return tuple(dict.fromkeys(asked))
@@ -381,20 +385,20 @@ class Parser(argparse.ArgumentParser):
 
     def _sentences(self, options: Sequence[str]) -> Iterator[str]:
         for option in options:
-            yield f"no option {option}{_meant(option, [name for name in self.known() if name.startswith('--')])}"
+            yield f"no option {option}{_suggest_word(option, [name for name in self.known() if name.startswith('--')])}"
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is None or value in action.choices:
             return
         known = [str(choice) for choice in action.choices]
         what = "command" if isinstance(action, argparse._SubParsersAction) else action.dest
-        raise argparse.ArgumentError(None, f"no {what} {value!r}{_meant(str(value), known)}")
+        raise argparse.ArgumentError(None, f"no {what} {value!r}{_suggest_word(str(value), known)}")
 
 
-def _meant(word: str, known: Sequence[str]) -> str:
+def _suggest_word(word: str, known: Sequence[str]) -> str:
     """The tail of a message about a name that there is not."""
     begins = [name for name in known if len(word) > 2 and name.startswith(word)]
-    near = begins[0] if len(begins) == 1 else nearest(word, known)
+    near = begins[0] if len(begins) == 1 else find_nearest_name(word, known)
     return f"; did you mean {near}?" if near else f"; there is {', '.join(known)}"
 
 
@@ -485,16 +489,16 @@ def prepare_streams() -> None:
             lines = number == 2 or stream is None or stream.line_buffering
             encoding = stream.encoding if stream is not None else "utf-8"
             wrapper = io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=lines)
-            setattr(sys, name, Shown(wrapper))
+            setattr(sys, name, SafeStream(wrapper))
 
 
 def _plain_error() -> Any:
     """Standard error for a progress bar, which moves the cursor."""
-    return sys.stderr.stream if isinstance(sys.stderr, Shown) else sys.stderr
+    return sys.stderr.stream if isinstance(sys.stderr, SafeStream) else sys.stderr
 
 
 @contextmanager
-def watching(quiet: bool) -> Iterator[TerminalWatch]:
+def watch_job(quiet: bool) -> Iterator[TerminalWatch]:
     """Who watches a job for the person at the terminal: with a progress bar, unless `quiet` or where nobody looks."""
     if quiet or not sys.stderr.isatty():
         yield TerminalWatch(None, quiet)
@@ -507,22 +511,22 @@ def watching(quiet: bool) -> Iterator[TerminalWatch]:
 
 
 COLOURS = {"red": 31, "yellow": 33}
-_WHEN = {"colour": "auto"}
+_COLOUR_MODE = {"colour": "auto"}
 
 
 def choose_colour(when: str) -> None:
     """Colour what is printed from now on: "always", "never", or "" and "auto" where a terminal shows it."""
-    _WHEN["colour"] = when or "auto"
+    _COLOUR_MODE["colour"] = when or "auto"
 
 
-class Painted(str):
+class PaintedText(str):
     """Text with the colours of this program, which Shown lets pass."""
 
     def __str__(self) -> str:
         return self
 
 
-class Shown:
+class SafeStream:
     """A stream that obeys no control character of what is printed to it: text comes from files of other people.
 
     Line feeds and tabs stay. All that commands print goes through here, tracebacks included; tqdm writes past it.
@@ -532,7 +536,7 @@ class Shown:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        if not (isinstance(text, Painted) or text.isprintable()):
+        if not (isinstance(text, PaintedText) or text.isprintable()):
             text = "\n".join("\t".join(map(visible, line.split("\t"))) for line in text.split("\n"))
         return self.stream.write(text)
 
@@ -545,13 +549,13 @@ def shown_streams() -> Iterator[None]:
     """Standard output and error as Shown for the block; what they have become in it otherwise stays, such as None."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and not isinstance(stream, Shown):
-            setattr(sys, name, Shown(stream))
+        if stream is not None and not isinstance(stream, SafeStream):
+            setattr(sys, name, SafeStream(stream))
             try:
                 with shown_streams():
                     yield
             finally:
-                if isinstance(getattr(sys, name), Shown):
+                if isinstance(getattr(sys, name), SafeStream):
                     setattr(sys, name, stream)
             return
     yield
@@ -564,22 +568,22 @@ def visible(line: str) -> str:
     )
 
 
-def painted(text: str, colour: str, stream: Any) -> str:
+def paint_text(text: str, colour: str, stream: Any) -> str:
     """The text in a colour where a stream is a terminal that shows some, and NO_COLOR (no-color.org) is not set."""
     text = "\n".join(visible(line) for line in text.split("\n"))
     plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb" or not stream.isatty()
-    if not colour or _WHEN["colour"] == "never" or (plain and _WHEN["colour"] == "auto"):
+    if not colour or _COLOUR_MODE["colour"] == "never" or (plain and _COLOUR_MODE["colour"] == "auto"):
         return text
-    return Painted(f"\x1b[{COLOURS[colour]}m{text}\x1b[0m")
+    return PaintedText(f"\x1b[{COLOURS[colour]}m{text}\x1b[0m")
 
 
 def warn(warnings: Iterable[Finding]) -> None:
     """Say on standard error what the user should know before believing the results; what is wrong first."""
-    for finding in ranked(warnings):
+    for finding in rank_findings(warnings):
         kind, colour = {"wrong": (WRONG, "red"), "doubt": ("warning: ", "yellow"), "note": ("note: ", "")}[
             finding.severity
         ]
-        print(painted(f"feedsim: {kind}{finding}", colour, sys.stderr), file=sys.stderr)
+        print(paint_text(f"feedsim: {kind}{finding}", colour, sys.stderr), file=sys.stderr)
 
 
 def finish(result: Any, out: Any, options: Namespace) -> int:
@@ -594,7 +598,7 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         return 0
     quiet = bool(options.quiet or options.json is True)
     said = () if quiet or not isinstance(result, Result) else result.in_lines
-    findings = ranked(finding for finding in result.findings if finding not in said)
+    findings = rank_findings(finding for finding in result.findings if finding not in said)
     warn(findings)
     code = getattr(result, "exit_code", 0)
     try:
@@ -603,7 +607,10 @@ def finish(result: Any, out: Any, options: Namespace) -> int:
         elif not options.quiet:
             both = sys.stdout is not None and sys.stdout.isatty() and sys.stderr.isatty()  # it stands there already
             wrong = [finding.marked for finding in findings[:1] if finding.severity == "wrong" and not both]
-            for line in (*(painted(text, "red", sys.stdout) for text in wrong), *_lines(result, options.verbose, out)):
+            for line in (
+                *(paint_text(text, "red", sys.stdout) for text in wrong),
+                *_lines(result, options.verbose, out),
+            ):
                 print(line)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -659,7 +666,7 @@ def json_of(result: Any, out: Any) -> str:
         name: {"value": figure.value if math.isfinite(figure.value) else None, "unit": figure.unit}
         for name, figure in getattr(result, "figures", {}).items()
     }
-    entries = [asdict(finding) for finding in ranked(result.findings)]
+    entries = [asdict(finding) for finding in rank_findings(result.findings)]
     content = {"kind": result.kind, "answer": [*result.answers], "findings": entries, "figures": figures}
     return json.dumps(content | ({"files": [str(out)]} if out is not None else {}), indent=2, ensure_ascii=False)
 

@@ -1,6 +1,7 @@
 """Which kind of file a command takes, said where it was given another one.
 
-May use: errors, files. Start with meant(), which the command line asks about a command that has refused its input.
+May use: errors, files. Start with explain_kind(), which the command line asks about a command that has refused its
+input.
 """
 
 from __future__ import annotations
@@ -43,16 +44,16 @@ def _keys(path: Path) -> set[str]:
     """Keys of the first level of a YAML file; none of a file that is none."""
     if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
         return set()
-    from feedsim.files.source import read
+    from feedsim.files.source import read_yaml
 
     try:
-        data = read(path).data
+        data = read_yaml(path).data
     except InputError:
         return set()
     return {str(key) for key in data} if isinstance(data, dict) else set()
 
 
-def _keyed(some: set[str], *, none: set[str]) -> Callable[[Path], bool]:
+def _has_keys(some: set[str], *, none: set[str]) -> Callable[[Path], bool]:
     def is_one(path: Path) -> bool:
         keys = _keys(path)
         return bool(keys & some) and not keys & none
@@ -60,23 +61,23 @@ def _keyed(some: set[str], *, none: set[str]) -> Callable[[Path], bool]:
     return is_one
 
 
-def _ends(*endings: str) -> Callable[[Path], bool]:
+def _has_ending(*endings: str) -> Callable[[Path], bool]:
     return lambda path: path.is_file() and path.suffix.lower() in endings
 
 
-def _holds(*names: str) -> Callable[[Path], bool]:
+def _contains_file(*names: str) -> Callable[[Path], bool]:
     return lambda path: path.is_dir() and any((path / name).is_file() for name in names)
 
 
 def _modes(path: Path) -> bool:
-    return _table(path) and _first(path).startswith("mode,frequency")
+    return _table(path) and _first_line(path).startswith("mode,frequency")
 
 
 def _table(path: Path) -> bool:
-    return path.is_file() and path.suffix.lower() in (".csv", ".txt") and not _first(path).startswith("{")
+    return path.is_file() and path.suffix.lower() in (".csv", ".txt") and not _first_line(path).startswith("{")
 
 
-def _first(path: Path) -> str:
+def _first_line(path: Path) -> str:
     try:
         with path.open("rb") as file:
             return file.read(KIND_BYTES).decode("utf-8-sig", "replace").partition("\n")[0]
@@ -87,7 +88,7 @@ def _first(path: Path) -> str:
 def _capture(path: Path) -> bool:
     if path.suffix.lower() != ".json" or not path.is_file():
         return False
-    return _first(path).lstrip().startswith("{") and not _summary(path)
+    return _first_line(path).lstrip().startswith("{") and not _summary(path)
 
 
 def _summary(path: Path) -> bool:
@@ -107,31 +108,31 @@ _MACHINES = ("machine info", "machine view", "machine build", "frf", "export", "
 _RECORDS = ("identify friction", "circle", "diff", "compare", "tools convert", "identify drive", "replay",
             "identify modes", "identify mounts")  # fmt: skip
 INPUT_KINDS = (
-    Kind("a study", ("sweep", "check"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
-    Kind("a scenario", _RUN, _keyed({"motions"}, none={"sampling", "parameters"})),
+    Kind("a study", ("sweep", "check"), _has_keys({"sampling", "parameters"}, none={"motions", "machine"})),
+    Kind("a scenario", _RUN, _has_keys({"motions"}, none={"sampling", "parameters"})),
     Kind(
         "a structure file",
         ("machine info", "machine build", "machine view"),
-        _keyed({"damping", "bodies", "matrices"}, none={"cycles", "motions"}),
+        _has_keys({"damping", "bodies", "matrices"}, none={"cycles", "motions"}),
     ),
     Kind(
         "a machine file",
         _MACHINES,
-        _keyed({"axes"}, none={"motions", "bodies", "sampling"}),
+        _has_keys({"axes"}, none={"motions", "bodies", "sampling"}),
     ),
     Kind(
         "the folder of a machine",
         _MACHINES,
-        _holds("machine.yaml", "structure.yaml"),
+        _contains_file("machine.yaml", "structure.yaml"),
     ),
-    Kind("results of a study", ("diff",), _holds("study.json")),
-    Kind("a folder of results", ("diff", "compare"), _holds("result.csv")),
-    Kind(NO_RECORD, (), _holds("summary.json")),
+    Kind("results of a study", ("diff",), _contains_file("study.json")),
+    Kind("a folder of results", ("diff", "compare"), _contains_file("result.csv")),
+    Kind(NO_RECORD, (), _contains_file("summary.json")),
     Kind("a file of values for the option --set", (), lambda path: _keys(path) == {"set"}),
-    Kind("an SSP file", ("run", "check"), _ends(".ssp")),
-    Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
+    Kind("an SSP file", ("run", "check"), _has_ending(".ssp")),
+    Kind("a unit for simulators (FMU)", (), _has_ending(".fmu")),
     Kind("a table of modes, which a machine file names", (), _modes),
-    Kind("a record", _RECORDS, lambda path: _table(path) or _ends(".mat")(path)),
+    Kind("a record", _RECORDS, lambda path: _table(path) or _has_ending(".mat")(path)),
     Kind(
         "a capture of a control",
         ("identify drive", "replay", "identify friction", "tools convert", "diff", "compare"),
@@ -148,18 +149,18 @@ def kind(path: Path) -> Kind | None:
         return None
 
 
-def taken(command: str) -> list[str]:
+def accepted_kinds(command: str) -> list[str]:
     """Names of the kinds that a command takes."""
     return [*dict.fromkeys(entry.name for entry in INPUT_KINDS if command in entry.commands)]
 
 
-def meant(command: str, values: Iterable[Any]) -> str:
+def explain_kind(command: str, values: Iterable[Any]) -> str:
     """A sentence for a command that was given a file of a kind that it does not take; "" where none was.
 
     command: its name, such as "machine info"; with an option whose value is a file, "machine import --machine". values:
     of its arguments, single ones and lists.
     """
-    own = taken(command)
+    own = accepted_kinds(command)
     for path in _paths(values) if own else ():
         result = kind(path)
         if result is not None and command not in result.commands:

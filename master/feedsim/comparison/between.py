@@ -62,7 +62,7 @@ def bounds(
         first = np.minimum(first, np.searchsorted(time, begin + slack, side="right") - 1).clip(0)
         last = np.maximum(last, np.searchsorted(time, end - slack, side="left")).clip(max=len(time) - 1)
         return extremes(values, first, last)
-    left, right = along(time, values, begin), along(time, values, end)
+    left, right = interpolate_at(time, values, begin), interpolate_at(time, values, end)
     low, high = np.minimum(left, right), np.maximum(left, right)
     if (inside := last >= first).any():
         least, largest = extremes(values, first[inside], last[inside])
@@ -71,7 +71,7 @@ def bounds(
     return low, high
 
 
-def along(time: Array, values: Array, at: Array) -> Array:
+def interpolate_at(time: Array, values: Array, at: Array) -> Array:
     """The polyline at instants `at` (the last of several rows at one instant); its ends are held outside."""
     if len(time) == 1:
         return np.full(len(at), values[0])
@@ -109,7 +109,7 @@ BOUNDS = ".bounds.csv"
 BELOW, ABOVE = ".below", ".above"
 
 
-def thinned(dense: Series | Trace, every: int) -> tuple[Series, Series]:
+def thin_series(dense: Series | Trace, every: int) -> tuple[Series, Series]:
     """Every `every`-th row and the last one, and the bounds of what lies between them.
 
     InputError: `every` below 1, or values that are no numbers.
@@ -132,7 +132,7 @@ def _beside_the_line(time: Array, values: Array, rows: Rows) -> tuple[Array, Arr
     """Per kept row the least and largest distance from the line since the kept row before; 0 of the first."""
     if len(rows) < 2:
         return np.zeros(len(rows)), np.zeros(len(rows))
-    off = values - along(time[rows], values[rows], time)
+    off = values - interpolate_at(time[rows], values[rows], time)
     off[rows] = 0.0
     result = [np.r_[0.0, extreme.reduceat(off, rows[:-1])] for extreme in (np.minimum, np.maximum)]
     return np.minimum(result[0], 0.0), np.maximum(result[1], 0.0)
@@ -168,7 +168,7 @@ def check_bounds(between: Series, reference: Series) -> None:
             )
 
 
-class Between:
+class BoundsBetween:
     """Bounds of a variable between the rows of its reference.
 
     time, values, below, above: (N,) of the reference and its bounds, in the same unit.

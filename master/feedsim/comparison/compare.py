@@ -8,22 +8,32 @@ from math import inf
 
 import numpy as np
 
-from feedsim.comparison.between import ABOVE, BELOW, Between, Rows, along, bounds, check_bounds, slack_of, usual_step
+from feedsim.comparison.between import (
+    ABOVE,
+    BELOW,
+    BoundsBetween,
+    Rows,
+    bounds,
+    check_bounds,
+    interpolate_at,
+    slack_of,
+    usual_step,
+)
 from feedsim.comparison.likeness import Comparison, Coverage, Curves, Variable, Verdict, likeness, percent, seconds
 from feedsim.comparison.options import (
-    LISTED,
+    MAX_LISTED_COLUMNS,
     Options,
     check_used,
     chosen,
+    describe_missing_column,
     factor,
-    missing,
     repeated_units,
     sources,
     with_units,
 )
-from feedsim.comparison.tolerance import DEFAULT, OF_MAGNITUDE, Tolerances, allowed
+from feedsim.comparison.tolerance import DEFAULT_TOLERANCE, OF_MAGNITUDE, Tolerances, allowed_deviation
 from feedsim.files.trace import Array, Series, Trace, as_series, matches
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import InputError, shorten_list
 
 # --- The instants at which a result is looked at, and whether it covers the reference ---------------------------------
 
@@ -37,7 +47,7 @@ SPARSE = 10
 # and so many of the reference's may be: beyond, the result says too little about it.
 MAX_UNSEEN_SHARE = 0.25
 # Share of the compared time that a result may lack at an end for its shift or its tolerance in time, at most.
-LACKING = 0.1
+MAX_LACKING_SHARE = 0.1
 
 
 class Overlap:
@@ -69,13 +79,13 @@ class Overlap:
             shifted = f" (shifted by {seconds(options.shift)})" if options.shift else ""
             self.problem = (
                 f"the times do not overlap: the result's is {_span(self.theirs)}{shifted}, the reference's "
-                f"{_span(time)}{_asked(options)}"
+                f"{_span(time)}{_requested_span(options)}"
             )
             return
         steps = usual_step(time), usual_step(self.theirs)
         instants = np.unique(time[self._inside(time, self.start, self.end)])
         # A shift takes rows away at the end that it moves the result from; a tolerance in time at both.
-        longest = LACKING * (self.end - self.start)
+        longest = MAX_LACKING_SHARE * (self.end - self.start)
         forgiven = [min(max(reach, value, 0.0), longest) for value in (options.shift, -options.shift)]
         # Tools begin or end a step apart; a step of a reference with few rows would be much.
         most = max(steps[1], 0.01 * (self.end - self.start))
@@ -129,7 +139,7 @@ class Overlap:
         if hold:
             values = whole[(np.searchsorted(self.theirs, self.at + self.slack, side="right") - 1).clip(0)]
         else:
-            values = along(self.theirs, whole, self.at)
+            values = interpolate_at(self.theirs, whole, self.at)
         broken = self._inside(self.theirs, self.start, self.end)
         broken = broken[~np.isfinite(whole[broken])]
         # Those at an instant that shows it already do not count twice.
@@ -198,7 +208,7 @@ class Overlap:
         ]
 
 
-def _asked(options: Options) -> str:
+def _requested_span(options: Options) -> str:
     begin = "" if options.start is None else f"from {options.start:.9g} s"
     end = "" if options.end is None else f"to {options.end:.9g} s"
     return f" (asked for {' '.join(part for part in (begin, end) if part)})" if begin or end else ""
@@ -214,7 +224,7 @@ CONVERSION_ROUNDING = 4 * np.finfo(float).eps
 FOLLOWS = 0.1
 # Curves are kept of so many variables, the worst ones.
 CURVES = 12
-SUGGESTED = 20  # missing columns for which a name that could be meant is looked for
+MAX_SUGGESTIONS = 20  # missing columns for which a name that could be meant is looked for
 MAX_PAIRS = 10_000  # of columns that are looked through for one that another follows
 
 
@@ -238,16 +248,16 @@ def compare(
     result, reference = as_series(result), as_series(reference)
 
     def again(options: Options) -> Comparison:
-        return _compared(result, reference, tolerances, options, between, names)
+        return _compare_variables(result, reference, tolerances, options, between, names)
 
     comparison = again(options)
     if comparison.those("different"):
         ours, theirs = with_units(result, options.units), with_units(reference, options.reference_units)
         comparison = replace(comparison, looks_like=likeness(comparison, ours, theirs, tolerances, options, again))
-    return replace(comparison, variables=_light(comparison.variables))
+    return replace(comparison, variables=_drop_curves(comparison.variables))
 
 
-def _compared(
+def _compare_variables(
     result: Series,
     reference: Series,
     tolerances: Tolerances,
@@ -258,14 +268,16 @@ def _compared(
     """compare(), with the curves of all variables."""
     asked = [name for name in chosen(reference.all_names, options) if not tolerances.of(name).ignore]
     results = sources((*result.all_names, *result.skipped), asked, options)
-    notes = _unused(result, reference, tolerances, options)
+    notes = _note_unused_columns(result, reference, tolerances, options)
     notes += repeated_units(reference.units, asked, options.reference_units, "reference")
     notes += repeated_units(result.units, results.values(), options.units, "result")
     result, reference = with_units(result, options.units), with_units(reference, options.reference_units)
     unused = tuple(tolerances.unused(reference.all_names))
     blank = Comparison(*names, "unusable", notes=tuple(notes), shift=options.shift, unused=unused)
     if not results:
-        wanted = missing(asked[0], result.names) if asked else "every column of the reference is left out"
+        wanted = (
+            describe_missing_column(asked[0], result.names) if asked else "every column of the reference is left out"
+        )
         return replace(blank, problem=f"no column in common: {wanted}")
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
@@ -292,10 +304,14 @@ def _compared(
             variables.append(variable)
         elif not options.common:
             missed += 1
-            reason = missing(name, result.names) if missed <= SUGGESTED else f"the result has no column {name!r}"
+            reason = (
+                describe_missing_column(name, result.names)
+                if missed <= MAX_SUGGESTIONS
+                else f"the result has no column {name!r}"
+            )
             variables.append(Variable(name, "missing", reason=reason))
-    notes += [f"{few(who, LISTED)}: {remark}" for remark, who in reported.items()]
-    notes += _default(variables, reference, tolerances)
+    notes += [f"{shorten_list(who, MAX_LISTED_COLUMNS)}: {remark}" for remark, who in reported.items()]
+    notes += _note_default_tolerance(variables, reference, tolerances)
     verdict: Verdict = "same"
     if over.uncovered or any(variable.verdict in ("different", "missing") for variable in variables):
         verdict = "different"
@@ -312,13 +328,13 @@ def _compared(
     )
 
 
-def _bounds_between(between: Series | None, reference: Series) -> dict[str, Between]:
+def _bounds_between(between: Series | None, reference: Series) -> dict[str, BoundsBetween]:
     """Variable -> its bounds between the rows of the reference. InputError: they are of another one."""
     if between is None:
         return {}
     check_bounds(between, reference)
     return {
-        name: Between(reference.time, reference[name], between[name + BELOW], between[name + ABOVE])
+        name: BoundsBetween(reference.time, reference[name], between[name + BELOW], between[name + ABOVE])
         for name in reference.columns
         if name + BELOW in between
     }
@@ -346,7 +362,7 @@ def _variable(
     source: str,
     tolerances: Tolerances,
     peers: Mapping[str, float],
-    between: Between | None,
+    between: BoundsBetween | None,
 ) -> tuple[Variable, list[str]]:
     """A variable and what there is to say about it."""
     options, tolerance = over.options, tolerances.of(name)
@@ -387,9 +403,9 @@ def _variable(
     span = float(np.ptp(inside)) if inside.size else 0.0
     try:
         magnitude = peers.get(unit, float(np.abs(inside).max(initial=0.0)))
-        limit = allowed(tolerance, unit, span, magnitude)
+        limit = allowed_deviation(tolerance, unit, span, magnitude)
     except InputError as error:
-        reason = f"its tolerance: {error}{_fitting(over.reference, tolerances, name)}"
+        reason = f"its tolerance: {error}{_suggest_columns(over.reference, tolerances, name)}"
         return Variable(name, "unusable", source, unit, reason=reason), remarks
     if tolerance.unit and not unit and not theirs:
         remarks.append("neither side gives a unit; both are taken as SI for the tolerance")
@@ -408,7 +424,7 @@ def _variable(
     if not beyond.any() and span > OF_MAGNITUDE * magnitude and np.max(low) - limit <= np.min(high) + limit:
         remarks.append("the tolerance is as wide as what the reference does: a constant would be the same too")
     worst = int(np.argmax(off))
-    expected = float(along(time, values, at[worst : worst + 1])[0])
+    expected = float(interpolate_at(time, values, at[worst : worst + 1])[0])
     if 0 < off[worst] < inf:
         expected = float(np.clip(y[worst], low[worst], high[worst]))
     reason = ""
@@ -426,7 +442,7 @@ def _variable(
     ), remarks  # fmt: skip
 
 
-def _light(variables: Sequence[Variable]) -> tuple[Variable, ...]:
+def _drop_curves(variables: Sequence[Variable]) -> tuple[Variable, ...]:
     """Curves of the worst ones only."""
     ranked = sorted(variables, key=lambda variable: (-variable.ratio, -variable.deviation))
     kept = [variable.name for variable in ranked if variable.curves is not None][:CURVES]
@@ -434,7 +450,7 @@ def _light(variables: Sequence[Variable]) -> tuple[Variable, ...]:
     return tuple(variable if variable.name in keep else replace(variable, curves=None) for variable in variables)
 
 
-def _unused(result: Series, reference: Series, tolerances: Tolerances, options: Options) -> list[str]:
+def _note_unused_columns(result: Series, reference: Series, tolerances: Tolerances, options: Options) -> list[str]:
     """Columns that are not read. InputError: rules that match nothing."""
     notes: list[str] = []
     own = [pattern for pattern, _ in tolerances.rules if pattern not in tolerances.shared]
@@ -452,7 +468,7 @@ def _unused(result: Series, reference: Series, tolerances: Tolerances, options: 
     return notes
 
 
-def _default(variables: Sequence[Variable], reference: Series, tolerances: Tolerances) -> list[str]:
+def _note_default_tolerance(variables: Sequence[Variable], reference: Series, tolerances: Tolerances) -> list[str]:
     """What the default allows where no tolerance is given, beside what matters: how near a variable is to another one
     that it follows, such as a position to its setpoint."""
     compared = [
@@ -462,15 +478,16 @@ def _default(variables: Sequence[Variable], reference: Series, tolerances: Toler
     ]
     if not compared:
         return []
-    names = few([variable.name for variable in compared], LISTED)
-    text = f"no tolerance is given for {names}: {DEFAULT:g} of the range is allowed"
+    names = shorten_list([variable.name for variable in compared], MAX_LISTED_COLUMNS)
+    text = f"no tolerance is given for {names}: {DEFAULT_TOLERANCE:g} of the range is allowed"
     few_enough = max(1, MAX_PAIRS // len(reference.columns))
     followed = [(variable, *_leader(variable, reference)) for variable in compared[:few_enough]]
     entry, leader, apart = max(followed, key=lambda item: item[0].allowed / item[2] if item[2] else 0.0)
     if apart:
         text += (
             f", {entry.allowed:.3g} {entry.unit} of {entry.name}, which differs from {leader} by {apart:.3g} "
-            f"{entry.unit} at most; --tol '{entry.name}={DEFAULT * apart:.1g} {entry.unit}' is a thousandth of that"
+            f"{entry.unit} at most; --tol '{entry.name}={DEFAULT_TOLERANCE * apart:.1g} {entry.unit}' is a "
+            f"thousandth of that"
         )
     return [text]
 
@@ -511,7 +528,7 @@ def _not_read(reference: Series, name: str, source: str | None, result: Series) 
     return result.broken.get(source, "") if source is not None else ""
 
 
-def _fitting(reference: Series, tolerances: Tolerances, name: str) -> str:
+def _suggest_columns(reference: Series, tolerances: Tolerances, name: str) -> str:
     """Where a tolerance for all columns does fit some: how to give it to those alone."""
     rule = next(((p, t) for p, t in reversed(tolerances.rules) if t.value is not None and matches(name, p)), None)
     if rule is None or rule[0] != "*" or not rule[1].unit:

@@ -99,7 +99,7 @@ def unusable(result: str | Path, reference: str | Path, problem: str) -> Compari
     return Comparison(str(result), str(reference), "unusable", problem=problem)
 
 
-def beside(reference: Path) -> Path | None:
+def find_tolerance_file(reference: Path) -> Path | None:
     """Tolerance file of a reference: case.tolerances.yaml for case.csv or case_ref.csv, else tolerances.yaml beside."""
     stems = (reference.stem, reference.name.removesuffix(REFERENCE_ENDING))
     candidates = [reference.with_name(f"{stem}.{TOLERANCES}") for stem in stems]
@@ -111,7 +111,7 @@ def tolerances_of(reference: Path, file: Path | None, texts: Sequence[str]) -> T
 
     They may serve several references: a pattern that matches nothing is reported in Comparison.unused.
     """
-    path = file or beside(reference)
+    path = file or find_tolerance_file(reference)
     written = Tolerances.of_file(load_tolerances(path)) if path is not None else Tolerances()
     return written + Tolerances.parse(texts).for_several()
 
@@ -143,9 +143,9 @@ def lines_of(
     result = [line for pair in comparisons for line in _lines(pair, everything, full)]
     return [
         *result,
-        *_default(comparisons),
-        *_unused(comparisons, tolerances),
-        *_unreferenced(comparisons, asked),
+        *_note_default_tolerance(comparisons),
+        *_note_unused_patterns(comparisons, tolerances),
+        *_note_unreferenced_files(comparisons, asked),
         *_sum(comparisons),
     ]
 
@@ -171,7 +171,7 @@ def _variable_line(variable: Variable) -> str:
     return f"{variable.verdict}: {variable.line}{outside}"
 
 
-def _default(comparisons: Sequence[Comparison]) -> list[str]:
+def _note_default_tolerance(comparisons: Sequence[Comparison]) -> list[str]:
     """Of several pairs, whose notes are not shown where they are the same: that no tolerance is given for some."""
     if len(comparisons) == 1:
         return []
@@ -186,7 +186,7 @@ def _default(comparisons: Sequence[Comparison]) -> list[str]:
     return [f"note: {hidden[0][0].result}: {hidden[0][1]}{more}"] if hidden else []
 
 
-def _unused(comparisons: Sequence[Comparison], tolerances: Path | None) -> list[str]:
+def _note_unused_patterns(comparisons: Sequence[Comparison], tolerances: Path | None) -> list[str]:
     """Patterns of a tolerance file that match in no reference.
 
     Of the file that was asked for, each; one that lies beside references serves those too that are not compared, so
@@ -194,7 +194,7 @@ def _unused(comparisons: Sequence[Comparison], tolerances: Path | None) -> list[
     """
     by_file: dict[Path, list[set[str]]] = {}
     for comparison in comparisons:
-        if (file := tolerances or beside(Path(comparison.reference))) is not None and comparison.variables:
+        if (file := tolerances or find_tolerance_file(Path(comparison.reference))) is not None and comparison.variables:
             by_file.setdefault(file, []).append(set(comparison.unused))
     result = []
     for file, unused in by_file.items():
@@ -205,7 +205,7 @@ def _unused(comparisons: Sequence[Comparison], tolerances: Path | None) -> list[
     return result
 
 
-def _unreferenced(comparisons: Sequence[Comparison], asked: Sequence[Path]) -> list[str]:
+def _note_unreferenced_files(comparisons: Sequence[Comparison], asked: Sequence[Path]) -> list[str]:
     """That files of a folder of results have no reference."""
     compared = {Path(comparison.result) for comparison in comparisons}
     results = []

@@ -13,12 +13,12 @@ from typing import Literal
 
 import numpy as np
 
-from feedsim.comparison.between import along, usual_step
-from feedsim.comparison.options import LISTED, Options, factor
+from feedsim.comparison.between import interpolate_at, usual_step
+from feedsim.comparison.options import MAX_LISTED_COLUMNS, Options, factor
 from feedsim.comparison.shift import estimated_shift
 from feedsim.comparison.tolerance import Tolerances
 from feedsim.files.trace import Array, Series
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import InputError, shorten_list
 
 # --- What a comparison finds ------------------------------------------------------------------------------------------
 
@@ -212,7 +212,7 @@ class Comparison:
         for kind, words in (("missing", "missing: "), ("unusable", "cannot be compared: ")):
             if named := self.those(kind):
                 why = f" ({named[0].reason})" if kind == "unusable" else ""
-                parts.append(words + few([variable.name for variable in named], 3) + why)
+                parts.append(words + shorten_list([variable.name for variable in named], 3) + why)
         if self.verdict == "same":
             parts.append(f"{len(compared)} variable{'s'[: len(compared) != 1]}")
         if self.coverage is not None:
@@ -237,7 +237,7 @@ def seconds(value: float) -> str:
     return f"{value * 1e9:.6g} ns" if value else "0 s"
 
 
-EXPLAINED = 0.1  # of the difference may be left
+EXPLAINED_SHARE = 0.1  # of the difference may be left
 # Units that are mistaken for one another, by what is meant: those that are not of the reference's kind drop out.
 MISTAKEN = ("m", "mm", "um", "in", "rad", "deg", "rev", "rad/s", "rpm", "deg/s", "rev/s", "m/s", "mm/s", "mm/min",
             "m/min", "in/min", "N", "kN", "N.m", "N.cm", "mN.m", "A", "mA", "percent", "1")  # fmt: skip
@@ -279,7 +279,7 @@ def likeness(
     those = comparison.those("different")
     if len(those) > VARIABLES_EXPLAINED:
         those = tuple(sorted(those, key=lambda variable: -variable.ratio)[:VARIABLES_EXPLAINED])
-    asked = [variable for variable in those if variable.curves is not None and _enough(variable.curves)]
+    asked = [variable for variable in those if variable.curves is not None and _has_enough_rows(variable.curves)]
     if not asked:
         return ()
     guessed: dict[str, _Guess] = {}
@@ -291,14 +291,14 @@ def likeness(
             guessed[entry.name] = min(guesses, key=lambda guess: guess.remaining)
         if not guesses or guessed[entry.name].outside:
             open_ones.append(entry)
-    shift = _shifted(open_ones, result, reference, tolerances, options) if open_ones else None
+    shift = _find_common_shift(open_ones, result, reference, tolerances, options) if open_ones else None
     if shift is not None and abs(shift - options.shift) <= WHOLE_ROW_TOLERANCE * usual_step(result.time):
         shift = None  # where it is now it fits best
     late: list[Variable] = []
     for entry in open_ones:
         assert entry.curves is not None
-        remaining = np.inf if shift is None else _rest(entry.curves, shift - options.shift)
-        if remaining <= EXPLAINED * _rms(_difference(entry.curves)) and (
+        remaining = np.inf if shift is None else _shifted_rms(entry.curves, shift - options.shift)
+        if remaining <= EXPLAINED_SHARE * _rms(_difference(entry.curves)) and (
             entry.name not in guessed or remaining < guessed[entry.name].remaining
         ):
             late.append(entry)
@@ -326,19 +326,19 @@ def _proposal(those: Sequence[Variable], words: str, outside: Mapping[str, int |
     if all(outside.get(name) is None for name in names):
         then = ""
     elif rest:
-        then = f"; outside would still be {few(rest, 2)}"
+        then = f"; outside would still be {shorten_list(rest, 2)}"
     else:
         then = "; all of it would be within the tolerance"
-    return Proposal(tuple(names), f"{few(names, LISTED)}: {words}{then}")
+    return Proposal(tuple(names), f"{shorten_list(names, MAX_LISTED_COLUMNS)}: {words}{then}")
 
 
-def _enough(curves: Curves) -> bool:
+def _has_enough_rows(curves: Curves) -> bool:
     return int(np.isfinite(curves.values).sum()) >= MIN_GUESS_ROWS
 
 
 def _difference(curves: Curves) -> Array:
     """(M,) result less reference."""
-    return curves.values - along(curves.reference_time, curves.reference, curves.time)
+    return curves.values - interpolate_at(curves.reference_time, curves.reference, curves.time)
 
 
 def _rms(values: Array) -> float:
@@ -347,16 +347,16 @@ def _rms(values: Array) -> float:
     return largest * float(np.sqrt(np.mean((known / largest) ** 2))) if largest else 0.0
 
 
-def _rest(curves: Curves, by: float) -> float:
+def _shifted_rms(curves: Curves, by: float) -> float:
     """What a shift of the result [s] would leave of the difference, as a root mean square."""
     at = curves.time + by
     inside = (at >= curves.reference_time[0]) & (at <= curves.reference_time[-1])
     if 2 * np.sum(inside) < len(at):
         return np.inf
-    return _rms(curves.values[inside] - along(curves.reference_time, curves.reference, at[inside]))
+    return _rms(curves.values[inside] - interpolate_at(curves.reference_time, curves.reference, at[inside]))
 
 
-def _shifted(
+def _find_common_shift(
     asked: Sequence[Variable], result: Series, reference: Series, tolerances: Tolerances, options: Options
 ) -> float | None:
     """Shift [s] that fits best all that differ; None where none is found."""
@@ -390,10 +390,10 @@ def _time_words(shift: float, before: float, result: Series) -> str:
             else ": results of the step before, or inputs held for a step"
         )
     direction = "later" if by > 0 else "earlier"
-    return f"{direction} by {_short(abs(by))}{counted}{reason}: --shift '{_short(shift)}'"
+    return f"{direction} by {_shift_text(abs(by))}{counted}{reason}: --shift '{_shift_text(shift)}'"
 
 
-def _short(time: float) -> str:
+def _shift_text(time: float) -> str:
     """To the digits that a shift is known to."""
     return seconds(float(f"{time:.5g}"))
 
@@ -401,7 +401,7 @@ def _short(time: float) -> str:
 def _guesses(variable: Variable, curves: Curves, result: Series) -> Iterator[_Guess]:
     """What the values alone may look like."""
     y = curves.values
-    x = along(curves.reference_time, curves.reference, curves.time)
+    x = interpolate_at(curves.reference_time, curves.reference, curves.time)
     known = np.isfinite(y) & np.isfinite(x)
     off = _rms(y - x)
     header = result.units.get(variable.source, "")
@@ -413,17 +413,17 @@ def _guesses(variable: Variable, curves: Curves, result: Series) -> Iterator[_Gu
     if gain and np.isfinite(gain) and abs(gain - 1) > LIKE_A_UNIT and size:
         words, exact = _factor_words(gain, variable, header)
         remaining = _rms(y - exact * x)
-        if remaining <= EXPLAINED * min(off, _rms(y)):
-            yield _Guess(remaining, words, _outside(curves, y / exact))
+        if remaining <= EXPLAINED_SHARE * min(off, _rms(y)):
+            yield _Guess(remaining, words, _count_rows_outside(curves, y / exact))
     constant = float(np.median((y - x)[known]))
     remaining = _rms(y - x - constant)
-    if constant and remaining <= EXPLAINED * off:
+    if constant and remaining <= EXPLAINED_SHARE * off:
         unit = f" {variable.unit}" if variable.unit not in ("", "1") else ""
         words = f"{'more' if constant > 0 else 'less'} by {abs(constant):.4g}{unit} throughout: another zero point?"
-        yield _Guess(remaining, words, _outside(curves, y - constant))
+        yield _Guess(remaining, words, _count_rows_outside(curves, y - constant))
 
 
-def _outside(curves: Curves, values: Array) -> int:
+def _count_rows_outside(curves: Curves, values: Array) -> int:
     """Rows of values that are put right which would still be outside."""
     return int(np.sum((values < curves.lower) | (values > curves.upper)))
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from feedsim.files.trace import Series, matches
-from feedsim.files.trace.trace import suggest
+from feedsim.files.trace.trace import suggest_name
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, few
-from feedsim.foundation.units import spelled
+from feedsim.foundation.errors import InputError, shorten_list
+from feedsim.foundation.units import spell_unit
 
-LISTED = 4  # columns that a note names
+MAX_LISTED_COLUMNS = 4  # columns that a note names
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,13 @@ class Options:
 
 def chosen(names: Sequence[str], options: Options) -> list[str]:
     """Reference's names that are asked for. InputError: a pattern that matches nothing."""
-    for pattern in unmatched((*options.only, *options.ignore), names):
-        raise InputError(f"the reference has no column {pattern!r}{suggest(pattern, names)}")
-    return [name for name in names if (not options.only or _any(name, options.only)) and not _any(name, options.ignore)]
+    for pattern in unmatched_patterns((*options.only, *options.ignore), names):
+        raise InputError(f"the reference has no column {pattern!r}{suggest_name(pattern, names)}")
+    return [
+        name
+        for name in names
+        if (not options.only or _matches_any(name, options.only)) and not _matches_any(name, options.ignore)
+    ]
 
 
 def sources(result: Sequence[str], reference: Sequence[str], options: Options) -> dict[str, str]:
@@ -62,13 +66,15 @@ def sources(result: Sequence[str], reference: Sequence[str], options: Options) -
     """
     results: dict[str, str] = {}
     for theirs, ours in options.columns:
-        pattern, target = _renaming(theirs, ours)
+        pattern, target = _renaming_rule(theirs, ours)
         renamed = {match.expand(target): name for name in result if (match := pattern.fullmatch(name))}
         if not renamed:
-            raise InputError(f"--column {theirs}={ours}: the result has no column {theirs!r}{suggest(theirs, result)}")
+            raise InputError(
+                f"--column {theirs}={ours}: the result has no column {theirs!r}{suggest_name(theirs, result)}"
+            )
         if "*" not in ours and ours not in reference:
             raise InputError(
-                f"--column {theirs}={ours}: the reference has no column {ours!r}{suggest(ours, reference)}"
+                f"--column {theirs}={ours}: the reference has no column {ours!r}{suggest_name(ours, reference)}"
             )
         for name, source in renamed.items():
             if results.get(name, source) != source:
@@ -78,23 +84,23 @@ def sources(result: Sequence[str], reference: Sequence[str], options: Options) -
     return {name: results.get(name, name) for name in reference if name in there}
 
 
-def missing(name: str, result: Sequence[str]) -> str:
+def describe_missing_column(name: str, result: Sequence[str]) -> str:
     """That a reference's column is not in the result, and what could be meant."""
     alike = [entry for entry in result if entry.endswith(name) and entry[: -len(name)].endswith((".", ":", "/", "|"))]
     if len(alike) == 1:
         prefix = alike[0].removesuffix(name)
         return f"the result has no column {name!r}; is it {alike[0]!r}? Then --column '{prefix}*=*'"
-    return f"the result has no column {name!r}{suggest(name, result)}"
+    return f"the result has no column {name!r}{suggest_name(name, result)}"
 
 
 def with_units(series: Series, given: Mapping[str, str]) -> Series:
     """With the units that are given for columns whose header gives none. given: pattern -> unit."""
     if not given:
         return series
-    return replace(series, units={name: unit or _given(name, given) for name, unit in series.units.items()})
+    return replace(series, units={name: unit or _given_unit(name, given) for name, unit in series.units.items()})
 
 
-def _given(name: str, given: Mapping[str, str]) -> str:
+def _given_unit(name: str, given: Mapping[str, str]) -> str:
     """Unit that is given for a column; "" without."""
     return next((unit for pattern, unit in reversed(list(given.items())) if matches(name, pattern)), "")
 
@@ -106,7 +112,7 @@ def repeated_units(headers: Mapping[str, str], names: Iterable[str], given: Mapp
     """
     twice: dict[str, list[str]] = {}
     for name in names:
-        header, unit = headers.get(name, ""), _given(name, given)
+        header, unit = headers.get(name, ""), _given_unit(name, given)
         if not header or not unit:
             continue
         try:
@@ -119,7 +125,10 @@ def repeated_units(headers: Mapping[str, str], names: Iterable[str], given: Mapp
                 "without one, and a header that is wrong must be put right"
             )
         twice.setdefault(unit, []).append(name)
-    return [f"{few(those, LISTED)}: the {whose}'s header gives {unit} already" for unit, those in twice.items()]
+    return [
+        f"{shorten_list(those, MAX_LISTED_COLUMNS)}: the {whose}'s header gives {unit} already"
+        for unit, those in twice.items()
+    ]
 
 
 def factor(result: str, reference: str) -> tuple[float, str]:
@@ -133,9 +142,9 @@ def factor(result: str, reference: str) -> tuple[float, str]:
     if result and reference:
         return conversion(result, reference), ""
     if not result:
-        scale = 1 / units.unit(spelled(reference)).factor
+        scale = 1 / units.unit(spell_unit(reference)).factor
         return float(scale), f"the result gives no unit; taken as SI (the reference's is {reference})"
-    to_si = float(units.unit(spelled(result)).factor)
+    to_si = float(units.unit(spell_unit(result)).factor)
     return to_si, f"the reference gives no unit; taken as SI (the result's is {result})"
 
 
@@ -144,17 +153,17 @@ def conversion(given: str, wanted: str) -> float:
     try:
         return float(units.factor(given, wanted))
     except InputError:
-        return float(units.factor(spelled(given), spelled(wanted)))
+        return float(units.factor(spell_unit(given), spell_unit(wanted)))
 
 
-def unmatched(patterns: Iterable[str], names: Sequence[str]) -> list[str]:
+def unmatched_patterns(patterns: Iterable[str], names: Sequence[str]) -> list[str]:
     """Patterns that match no name."""
     return [pattern for pattern in patterns if not any(matches(name, pattern) for name in names)]
 
 
 def check_used(what: str, patterns: Iterable[str], names: Sequence[str]) -> None:
     """InputError where what is given for a pattern is given for no name."""
-    for pattern in unmatched(patterns, names):
+    for pattern in unmatched_patterns(patterns, names):
         raise InputError(f"{what} given for {no_match(pattern, names)}")
 
 
@@ -164,11 +173,11 @@ def no_match(pattern: str, names: Sequence[str]) -> str:
     return f"{pattern!r}, which matches no column; there is {', '.join(names[:12])}{more}"
 
 
-def _any(name: str, patterns: Iterable[str]) -> bool:
+def _matches_any(name: str, patterns: Iterable[str]) -> bool:
     return any(matches(name, pattern) for pattern in patterns)
 
 
-def _renaming(theirs: str, ours: str) -> tuple[re.Pattern[str], str]:
+def _renaming_rule(theirs: str, ours: str) -> tuple[re.Pattern[str], str]:
     """Pattern of the result's names and what the reference calls them."""
     if theirs.count("*") != ours.count("*"):
         raise InputError(f"--column {theirs}={ours}: as many * on either side are needed")

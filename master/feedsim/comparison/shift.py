@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.comparison.between import Rows, usual_step
-from feedsim.comparison.options import LISTED, Options, chosen, factor, sources, with_units
+from feedsim.comparison.options import MAX_LISTED_COLUMNS, Options, chosen, factor, sources, with_units
 from feedsim.comparison.tolerance import Tolerances
 from feedsim.files.trace import Array, Series
-from feedsim.foundation.errors import InputError, few
+from feedsim.foundation.errors import InputError, shorten_list
 
 # Positions tried over the whole range before the best is refined, at most.
 TRIES = 2001
@@ -38,8 +38,10 @@ class Shift:
         reasons: dict[str, list[str]] = {}
         for name, reason in self.left_out.items():
             reasons.setdefault(reason, []).append(name)
-        without = "".join(f"; without {few(names, LISTED)}: {reason}" for reason, names in reasons.items())
-        return f"the shift in time is found from {few(self.used, LISTED)}{without}"
+        without = "".join(
+            f"; without {shorten_list(names, MAX_LISTED_COLUMNS)}: {reason}" for reason, names in reasons.items()
+        )
+        return f"the shift in time is found from {shorten_list(self.used, MAX_LISTED_COLUMNS)}{without}"
 
 
 @np.errstate(all="ignore")  # values of any magnitude are compared; what is no number then fits nowhere
@@ -83,7 +85,7 @@ def estimated_shift(
         else:
             results[name] = expected / span, values / span
     if not results:
-        why = f" ({few([*left_out], LISTED)}: {next(iter(left_out.values()))})" if left_out else ""
+        why = f" ({shorten_list([*left_out], MAX_LISTED_COLUMNS)}: {next(iter(left_out.values()))})" if left_out else ""
         raise InputError(f"the shift in time cannot be found: no column of the reference moves{why}")
     misfit = _Misfit(
         reference.time,
@@ -94,15 +96,15 @@ def estimated_shift(
     )
     step = max(min(usual_step(reference.time), usual_step(result.time)), 2 * most / (TRIES - 1))
     tried = step * np.arange(-np.floor(most / step), np.floor(most / step) + 1)
-    best = _best(misfit, tried)
+    best = _find_best_shift(misfit, tried)
     if best is None or best in (0, len(tried) - 1):
         raise InputError(f"the shift in time cannot be found within +-{most:.6g} s; allow a larger one")
-    refined = _lowest(misfit.of, float(tried[best - 1]), float(tried[best + 1]), 1e-8 * step)
+    refined = _find_minimum(misfit.of, float(tried[best - 1]), float(tried[best + 1]), 1e-8 * step)
     # No more digits than rounding of the misfit leaves.
     return Shift(round(refined, -floor(log10(1e-6 * step))) + 0.0, tuple(results), left_out)
 
 
-def _lowest(of: Callable[[float], float], low: float, high: float, width: float) -> float:
+def _find_minimum(of: Callable[[float], float], low: float, high: float, width: float) -> float:
     """Where a function with one minimum between two places has it, to `width`: by golden sections."""
     golden = (sqrt(5) - 1) / 2
     inner, outer = high - golden * (high - low), low + golden * (high - low)
@@ -168,7 +170,7 @@ class _Misfit:
         return _Misfit(self.time, self.expected, self.at[picked], self.values[:, picked], self.span)
 
 
-def _best(misfit: _Misfit, tried: Array) -> int | None:
+def _find_best_shift(misfit: _Misfit, tried: Array) -> int | None:
     """Which of the tried shifts is best; None where the times do not overlap enough."""
     coarse = misfit.thinned()
     parts = [coarse.parts(shift) for shift in tried.tolist()]

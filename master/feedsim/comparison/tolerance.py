@@ -13,7 +13,7 @@ from feedsim.files.trace import matches
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 
-DEFAULT = 1e-3  # of the range of the reference
+DEFAULT_TOLERANCE = 1e-3  # of the range of the reference
 # A reference that hardly moves: its range counts as this share of the largest magnitude of all columns in its unit (of
 # its own where it has none) at least, and as this much in its unit, so that rounding noise of an axis at rest is none.
 OF_MAGNITUDE, OF_UNIT = 1e-6, 1e-9
@@ -97,7 +97,7 @@ class Tolerances:
 
     def of(self, name: str) -> Tolerance:
         """All that holds for a variable."""
-        result = Tolerance(value=DEFAULT, relative=True, time=0.0)
+        result = Tolerance(value=DEFAULT_TOLERANCE, relative=True, time=0.0)
         for pattern, tolerance in self.rules:
             if matches(name, pattern):
                 result = tolerance.over(result)
@@ -158,19 +158,19 @@ def _part(text: str) -> Tolerance:
     return Tolerance(value=value, unit=unit)
 
 
-def allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
+def allowed_deviation(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
     """Tolerance in value in `unit`; without a unit the values are taken to be in SI.
 
     span, magnitude: range of the reference, and largest magnitude of its kind. InputError: a unit of another kind, or
     what comes of it is too large for a number.
     """
-    value = _allowed(tolerance, unit, span, magnitude)
+    value = _allowed_value(tolerance, unit, span, magnitude)
     if not isfinite(value):
         raise InputError(f"{tolerance.text} of a range of {span:.6g} is no finite number")
     return value
 
 
-def _allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
+def _allowed_value(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
     value, given = tolerance.value or 0.0, tolerance.unit or ""
     if tolerance.relative:
         return value * max(span, OF_MAGNITUDE * magnitude, OF_UNIT) if value else 0.0

@@ -31,7 +31,7 @@ from feedsim.analysis.evaluate import Result
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.fields import Quantity
 from feedsim.foundation import units
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.scenario import Drive, Friction, FrictionParameters, GmsFriction, Machine, Recording, Scenario
 from feedsim.scenario.axis_units import SHARED_WITH_GUIDE, ParameterGroup
@@ -48,12 +48,12 @@ SEARCH_SEED, JUDGE_SEED = 1, 2  # of draws that values are found on, and of othe
 LOAD, INERTIA = "constant_load", "inertia"
 ATTRACTION = "C"  # of Maxwell slip, a torque per time
 # Symbol of the correlation matrix -> key of the group `identified`, of what is no parameter of the friction.
-BESIDE = {"M_0": LOAD, "J": INERTIA}
+SYMBOL_KEYS = {"M_0": LOAD, "J": INERTIA}
 DRAWN_UNITS = {LOAD: "N.m", INERTIA: "kg.m2"}
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownValues:
     """How well the values of an axis are known.
 
     names: keys of friction, "drive.K_p" and the like of the drive, "constant_load", "inertia". mean (P,), covariance
@@ -83,7 +83,7 @@ class Cloud:
     """A machine and what is known of its values, by axis."""
 
     machine: Machine
-    known: Mapping[str, Known]
+    known: Mapping[str, KnownValues]
 
     def draws(self, count: int, seed: int = 1) -> Iterator[Machine]:
         """Machines, the same ones for the same seed. InputError: the intervals of an axis exclude what is possible."""
@@ -91,7 +91,7 @@ class Cloud:
         for _ in range(count):
             axes = dict(self.machine.axes)
             for axis, known in self.known.items():
-                axes[axis] = _possible(axes[axis], known, random)
+                axes[axis] = _draw_possible_axis(axes[axis], known, random)
             yield self.machine.model_copy(update={"axes": axes})
 
 
@@ -109,7 +109,7 @@ def cloud_of(machine: Machine, axes: Sequence[str] | None = None) -> Cloud:
     return Cloud(machine, result)
 
 
-def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[str, Known]:
+def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[str, KnownValues]:
     """Axis -> what its files say of its values, of axes that have identified values with intervals. Raises InputError
     as :func:`known_of`."""
     result = {}
@@ -131,21 +131,21 @@ def known_values(machine: Machine, axes: Sequence[str] | None = None) -> dict[st
     return result
 
 
-def known_of(friction: FrictionParameters, axis: str, present: Mapping[str, Any]) -> Known:
+def known_of(friction: FrictionParameters, axis: str, present: Mapping[str, Any]) -> KnownValues:
     """What a friction file says of its values. present: key -> value [SI] that is in use; others do not count.
 
     Raises InputError: the group `identified` is not as feedsim writes it.
     """
     identified = friction.identified
     try:
-        return _known(identified, axis, present)
+        return _known_values(identified, axis, present)
     except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
         raise InputError(
             f"axis {axis}: the group identified of its friction is not as feedsim identify friction writes it: {error}"
         ) from None
 
 
-def _known(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any]) -> Known:
+def _known_values(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any]) -> KnownValues:
     ends: dict[str, tuple[float, float]] = {}
     for name, one in (
         *identified.get("parameters", {}).items(),
@@ -166,13 +166,13 @@ def _known(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any])
     mean = np.array([sum(ends[name]) / 2 if name == INERTIA else present[name] for name in names], dtype=np.float64)
     correlation = np.eye(len(names))
     known = identified.get("correlation", {})
-    of = [BESIDE.get(name, name) for name in known.get("names", ())]
+    of = [SYMBOL_KEYS.get(name, name) for name in known.get("names", ())]
     matrix = np.array(known.get("matrix", ()), dtype=np.float64).reshape(len(of), len(of))
     shared = [(i, of.index(name)) for i, name in enumerate(names) if name in of]
     for i, k in shared:
         for j, m in shared:
             correlation[i, j] = 1.0 if i == j else (matrix[k, m] + matrix[m, k]) / 2
-    return Known(axis, tuple(names), mean, correlation * np.outer(sigma, sigma), tuple(fixed))
+    return KnownValues(axis, tuple(names), mean, correlation * np.outer(sigma, sigma), tuple(fixed))
 
 
 def _si(end: str | float, name: str) -> float:
@@ -248,16 +248,16 @@ def on_draw(scenario: Scenario, drawn: Machine) -> Scenario:
     return scenario.model_copy(update={"machine": drawn, "loads": tuple(loads), "logging": None})
 
 
-def drawn_friction(friction: Law, known: Known, random: np.random.Generator) -> Law:
+def drawn_friction(friction: Law, known: KnownValues, random: np.random.Generator) -> Law:
     """A draw of a friction alone, as compensations use it. Raises InputError as :meth:`Cloud.draws`."""
     for _ in range(ATTEMPTS):
         drawn = known.draw(random)
         if (made := _friction(friction, drawn, 1.0)) is not None:
             return made
-    raise _impossible(known)
+    raise _impossible_draws_error(known)
 
 
-def _possible(axis: Any, known: Known, random: np.random.Generator) -> Any:
+def _draw_possible_axis(axis: Any, known: KnownValues, random: np.random.Generator) -> Any:
     """The axis with a draw that is possible."""
     for _ in range(ATTEMPTS):
         drawn = known.draw(random)
@@ -270,10 +270,10 @@ def _possible(axis: Any, known: Known, random: np.random.Generator) -> Any:
             load = factor * drawn.get(LOAD, axis.constant_load)
             parts = {} if factor == 1 else _behind_motor(axis, factor)
             return axis.model_copy(update={"friction": friction, "drive": drive, "constant_load": load, **parts})
-    raise _impossible(known)
+    raise _impossible_draws_error(known)
 
 
-def _impossible(known: Known) -> InputError:
+def _impossible_draws_error(known: KnownValues) -> InputError:
     return InputError(
         f"axis {known.axis}: of {ATTEMPTS} draws from the intervals of its identified values none is possible; their "
         "values lie outside of the ranges of the parameters"
@@ -286,7 +286,7 @@ def _friction(friction: Law, drawn: Mapping[str, float], factor: float) -> Law |
     torques = [name for name in (*SHARED_WITH_GUIDE, ATTRACTION) if name in type(friction).model_fields]
     for name in torques if factor != 1 else ():
         values[name] = factor * values.get(name, float(getattr(friction, name)))
-    if not _within(type(friction), values):
+    if not _are_in_range(type(friction), values):
         return None
     made = friction.model_copy(update=values)
     # Where the identification found no difference of both, F_S is no value of its own and follows F_C.
@@ -303,7 +303,7 @@ def _drive(drive: Any, drawn: Mapping[str, float], factor: float) -> Any:
     if factor != 1:
         values["K_p"] = factor * values.get("K_p", drive.K_p)
         values["M_max"] = factor * drive.M_max
-    if not _within(Drive, values):
+    if not _are_in_range(Drive, values):
         return None
     torques = {} if factor == 1 else _group_torques(drive, factor)
     return drive.model_copy(update={**values, **torques})
@@ -335,7 +335,7 @@ def _times(group: ParameterGroup, names: Iterable[str], factor: float) -> Parame
     return group.model_copy(update={name: factor * getattr(group, name) for name in names})
 
 
-def _within(model: type[FrictionParameters | Drive], values: Mapping[str, float]) -> bool:
+def _are_in_range(model: type[FrictionParameters | Drive], values: Mapping[str, float]) -> bool:
     """Whether all values are in the ranges of their parameters."""
     for name, value in values.items():
         quantity = Quantity.of(model.model_fields[name])
@@ -361,7 +361,8 @@ def check_count(count: int) -> None:
     """InputError: too few draws for an interval."""
     if count < MIN_DRAWS:
         raise InputError(
-            f"{spelt('uncertain')} {count}: at least {MIN_DRAWS} draws are needed; {MIN_DRAWS} hold 90 % of what may "
+            f"{spell_argument('uncertain')} {count}: at least {MIN_DRAWS} draws are needed; {MIN_DRAWS} hold 90 "
+            f"% of what may "
             "be, 39 and more hold 95 %"
         )
 
@@ -426,7 +427,7 @@ class Uncertainty:
     count: int
     figures: Mapping[str, tuple[float, float]]
     bands: tuple[Band, ...] = ()
-    sets: Mapping[str, Known] = field(default_factory=dict)
+    sets: Mapping[str, KnownValues] = field(default_factory=dict)
 
     @property
     def share(self) -> float:
@@ -458,7 +459,7 @@ def of_run(
 
 
 def of_compensation(
-    compensation: Compensation, known: Mapping[str, Known], cloud: Cloud | None, count: int, *, seed: int = 1,
+    compensation: Compensation, known: Mapping[str, KnownValues], cloud: Cloud | None, count: int, *, seed: int = 1,
     fmus: Path | None = None, progress: Callable[[str, int, int], None],
 ) -> Uncertainty:  # fmt: skip
     """Run a circle without and with compensation, with draws of the machine and of the sets that compensate.

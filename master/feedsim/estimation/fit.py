@@ -106,7 +106,7 @@ def fit(
     if prior is not None and not normalised:
         raise InputError("fit: a prior asks for normalised residuals, or its weight against the data is unknown")
     problem, beside = _with_prior(residuals, tuple(parameters), prior, difference)
-    whole = _Whole(problem)
+    whole = _AllResiduals(problem)
     random = np.random.default_rng(seed)
     made: list[tuple[Start, Array | None]] = []
     for k in range(max(starts, 1)):
@@ -124,7 +124,7 @@ def _with_prior(
 ) -> tuple[LeastSquares, int]:
     """The problem, and how many residuals the prior adds."""
     names = [parameter.name for parameter in parameters]
-    known = prior.restricted(names) if prior is not None else None
+    known = prior.restrict(names) if prior is not None else None
     if known is None or not known.names:
         return LeastSquares(model, parameters, difference), 0
     root = known.rows()
@@ -138,7 +138,7 @@ def _with_prior(
     return LeastSquares(model, parameters, difference, beside), len(root)
 
 
-class _Whole:
+class _AllResiduals:
     """All residuals over positions; the last ones are kept, for the Jacobian asks for them again."""
 
     def __init__(self, problem: LeastSquares) -> None:
@@ -161,7 +161,7 @@ class _Whole:
         return slopes
 
 
-def _run(whole: _Whole, begin: Array, *, tolerance: float, limit: int) -> tuple[Start, Array | None]:
+def _run(whole: _AllResiduals, begin: Array, *, tolerance: float, limit: int) -> tuple[Start, Array | None]:
     """One start, and the position where it ended (None: nowhere)."""
     problem = whole.problem
     first = problem.position(dict(zip(problem.names, map(float, begin), strict=True)))
@@ -192,7 +192,13 @@ def _onto_bounds(problem: LeastSquares, position: Array) -> Array:
 
 
 def _conclude(
-    whole: _Whole, position: Array, beside: int, cost: float, starts: tuple[Start, ...], normalised: bool, jumps: bool
+    whole: _AllResiduals,
+    position: Array,
+    beside: int,
+    cost: float,
+    starts: tuple[Start, ...],
+    normalised: bool,
+    jumps: bool,
 ) -> Fit:
     """Covariance and what else belongs to a solution. beside: residuals of the prior."""
     problem = whole.problem
@@ -219,7 +225,7 @@ def _conclude(
     )
 
 
-def _secants(whole: _Whole, position: Array) -> Array:
+def _secants(whole: _AllResiduals, position: Array) -> Array:
     """(N + M, P) slopes over as many positions as a standard deviation: the mean of both sides, but for a jump on one,
     which rules out what lies beyond it and determines nothing on the other."""
     problem, here = whole.problem, whole(position)

@@ -34,19 +34,19 @@ def half_width(sigma: float) -> float:
     return NORMAL_95 * sigma
 
 
-def determined(value: float, half: float) -> bool:
+def is_determined(value: float, half: float) -> bool:
     """Whether half of the interval is at most that share of the value; a value without an interval (NaN) is.
 
-    >>> determined(2.0, 0.9), determined(-2.0, 1.1), determined(2.0, math.nan)
+    >>> is_determined(2.0, 0.9), is_determined(-2.0, 1.1), is_determined(2.0, math.nan)
     (True, False, True)
     """
     return not half > MAX_RELATIVE_HALF * abs(value)
 
 
-def shows(value: float, half: float) -> bool:
+def is_significant(value: float, half: float) -> bool:
     """Whether the interval does not hold 0: what the value stands for is there. Without an interval (NaN) it is.
 
-    >>> shows(-2.0, 1.9), shows(2.0, 2.1), shows(2.0, math.nan)
+    >>> is_significant(-2.0, 1.9), is_significant(2.0, 2.1), is_significant(2.0, math.nan)
     (True, False, True)
     """
     return not half >= abs(value)
@@ -136,7 +136,7 @@ class Covariance:
         return self.by(sums.T @ sums) * (count / free)
 
 
-def stretched(matrix: Array, residuals: Array, least: float, length: Callable[[Array], float]) -> Array:
+def correlated_middle(matrix: Array, residuals: Array, least: float, length: Callable[[Array], float]) -> Array:
     """(P, P) middle of residuals (N,) that are correlated over a stretch of rows.
 
     matrix (N, P): slopes. least: rms that the residuals have at least. length: rows that count as one, of residuals
@@ -414,7 +414,7 @@ def secant_from(problem: LeastSquares, here: Point, tolerance: float, give_up: G
                 break
             failed = MAX_FAILURES
         else:
-            ahead = _ahead(problem, here, step)
+            ahead = _advance_point(problem, here, step)
             gained = -inf if ahead is None else cost - problem.cost(ahead.x, ahead.errors)
             if gained > GOOD_RATIO * predicted and bound > 0.99 * radius:
                 radius = min(2 * radius, LARGEST_STEP)
@@ -437,7 +437,7 @@ def secant_from(problem: LeastSquares, here: Point, tolerance: float, give_up: G
     return here if here is begin else Point(here.x, here.errors, here.slopes, here.exact, near)
 
 
-def _ahead(problem: LeastSquares, here: Point, step: Array) -> Point | None:
+def _advance_point(problem: LeastSquares, here: Point, step: Array) -> Point | None:
     """A step further, with slopes that agree with it; None: there is nothing."""
     x = np.clip(here.x + step, problem.low, problem.high)
     try:
@@ -494,7 +494,7 @@ def robust_fit(matrix: Array, deviation: Array, spread: Array, blocks: Array, fl
     what a sample is worth at best beside that [m], as no model is exact.
     """
     weights = slopes = np.ones(len(deviation))
-    known = _known(matrix, spread)
+    known = _prior_information(matrix, spread)
     _, block = np.unique(blocks, return_inverse=True) if len(spread) else (0, np.empty(0, dtype=np.int64))
     shared = floor
     for _ in range(MAX_REWEIGHTINGS):
@@ -515,7 +515,7 @@ def robust_fit(matrix: Array, deviation: Array, spread: Array, blocks: Array, fl
     return Robust(np.asarray(values), np.asarray(weights), np.asarray(slopes), noise, shared)
 
 
-def _bounded(curved: Array, weighted: Array) -> Array:
+def _bound_curvature(curved: Array, weighted: Array) -> Array:
     """The matrix of second derivatives (K, K), in every direction at least LEAST_CURVATURE of the weighted normal
     matrix (K, K).
 
@@ -533,7 +533,7 @@ def _bounded(curved: Array, weighted: Array) -> Array:
     return np.asarray((along * np.maximum(shares, LEAST_CURVATURE)) @ along.T)
 
 
-def _known(matrix: Array, spread: Array) -> Array:
+def _prior_information(matrix: Array, spread: Array) -> Array:
     """What is known of the values beforehand, as an inverse covariance (K, K) [1/m2]."""
     return np.diag(np.concatenate([np.zeros(matrix.shape[1] - len(spread)), 1 / spread**2]))
 
@@ -547,7 +547,7 @@ def _resolution(values: Array) -> float:
     return float(apart.min()) if float(np.abs(steps - np.round(steps)).max()) < 0.01 else 0.0
 
 
-def rounding(paths: Sequence[Array], off: Sequence[Array], noise: float) -> NDArray[np.complex128]:
+def rounding_columns(paths: Sequence[Array], off: Sequence[Array], noise: float) -> NDArray[np.complex128]:
     """What rounding may have added to the samples of all paths, a column for each path and harmonic (N, J) [m].
 
     paths: recorded values of each [m]. off: what the model leaves of them [m]. noise: of a sample [m].
@@ -584,9 +584,9 @@ def covariance_of(
     The larger of two: as if every sample had noise of its own, and as if only blocks of samples had. Besides, what
     rounding adds, and what is not known of the tails.
     """
-    known = robust.shared**2 * _known(matrix, spread)
+    known = robust.shared**2 * _prior_information(matrix, spread)
     weighted = matrix.T @ (robust.weights[:, None] * matrix) + known
-    covariance = Covariance.of(_bounded(matrix.T @ (robust.slopes[:, None] * matrix) + known, weighted))
+    covariance = Covariance.of(_bound_curvature(matrix.T @ (robust.slopes[:, None] * matrix) + known, weighted))
     influence = robust.weights * residual
     _, block = np.unique(blocks, return_inverse=True)
     free = max(int(block.max()) + 1 - matrix.shape[1] + len(spread), 2)

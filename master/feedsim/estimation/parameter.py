@@ -98,7 +98,7 @@ class Prior:
     covariance: Array
 
     @classmethod
-    def joined(cls, priors: Sequence[Prior]) -> Prior:
+    def join(cls, priors: Sequence[Prior]) -> Prior:
         """Independent priors as one."""
         names = tuple(name for prior in priors for name in prior.names)
         covariance = np.zeros((len(names), len(names)))
@@ -109,7 +109,7 @@ class Prior:
             at += size
         return cls(names, np.concatenate([np.zeros(0), *(prior.values for prior in priors)]), covariance)
 
-    def restricted(self, free: Sequence[str]) -> Prior:
+    def restrict(self, free: Sequence[str]) -> Prior:
         """Of those among `free`: the marginal distribution."""
         kept = [k for k, name in enumerate(self.names) if name in free]
         return Prior(tuple(self.names[k] for k in kept), self.values[kept], self.covariance[np.ix_(kept, kept)])

@@ -14,8 +14,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from feedsim.files.fields import ExistingFile, Quantity, Reading, brief, did_you_mean, is_multiple
-from feedsim.files.source import Mark, Place, Source, at, copied, parse, read, referred
+from feedsim.files.fields import ExistingFile, Quantity, ReadingContext, brief, did_you_mean, is_multiple
+from feedsim.files.source import Mark, Place, Source, copy_tree, parse, read_yaml, resolve_reference, value_at
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 # --- What the models expect at a place of a file's tree: which keys, a group or a file name ---------------------------
 
 
-def expected(model: Any, data: Any, place: Place) -> Any:
+def expected_annotation(model: Any, data: Any, place: Place) -> Any:
     """Annotation at `place` of a tree `data` that is read as `model`; None where no key of that name belongs."""
     annotation = resolve(model, data)
     for key in place:
         annotation = child(annotation, key)
-        data = data[key] if _holds(data, key) else None
+        data = data[key] if _has_key(data, key) else None
         annotation = resolve(annotation, data)
         if annotation is None:
             return None
@@ -72,7 +72,7 @@ def resolve(annotation: Any, data: Any) -> Any:
                     options = [option for option in options if kind_of(option) == kind]
                 elif all(is_group(resolve(part, None)) for part in options):  # a key separates them
                     given = data if isinstance(data, dict) else {}
-                    options = [part for part in options if _fits(resolve(part, None), given)] or options
+                    options = [part for part in options if _chooses_model(resolve(part, None), given)] or options
                 else:  # a group or something else, as the data is
                     options = [part for part in options if is_group(resolve(part, None)) == isinstance(data, dict)]
                 if not options:
@@ -88,9 +88,9 @@ def kind_of(model: Any) -> str | None:
     return info.default if info is not None else None
 
 
-def separating(model: Any, data: Any, place: Place) -> list[str]:
+def separating_keys(model: Any, data: Any, place: Place) -> list[str]:
     """Keys that decide which of several models stands at `place` of a tree `data` that is read as `model`."""
-    annotation = child(expected(model, data, place[:-1]), place[-1]) if place else None
+    annotation = child(expected_annotation(model, data, place[:-1]), place[-1]) if place else None
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     parts = [resolve(part, None) for part in get_args(annotation)] if _is_union(annotation) else []
@@ -102,7 +102,7 @@ def keys(annotation: Any) -> list[str] | None:
     return [info.alias or name for name, info in annotation.model_fields.items()] if is_model(annotation) else None
 
 
-def instead(annotation: Any, key: str, known: list[str]) -> str:
+def suggest_key(annotation: Any, key: str, known: list[str]) -> str:
     """Tail of a message about a `key` that a group of `annotation` lacks: where it belongs, else what is `known`."""
     place = getattr(annotation, "ELSEWHERE", {}).get(key)
     return f"; it belongs to the {place}" if place else did_you_mean(key, known)
@@ -117,7 +117,7 @@ def _is_union(annotation: Any) -> bool:
     return get_origin(annotation) in (Union, UnionType)
 
 
-def _fits(model: Any, given: dict[str, Any]) -> bool:
+def _chooses_model(model: Any, given: dict[str, Any]) -> bool:
     """Whether the keys of a group choose this one of several models."""
     return is_model(model) and model.TOLD_BY in given and given[model.TOLD_BY] not in model.BUT_FOR
 
@@ -138,7 +138,7 @@ def names_file(annotation: Any) -> bool:
     )
 
 
-def _holds(data: Any, key: str | int) -> bool:
+def _has_key(data: Any, key: str | int) -> bool:
     return (isinstance(data, dict) and key in data) or (
         isinstance(data, list) and isinstance(key, int) and 0 <= key < len(data)
     )
@@ -159,7 +159,7 @@ def options(text: str, folder: Path) -> list[tuple[str, Source]]:
     if equals or not text.endswith((".yaml", ".yml")):
         example = "machine.axes.Z.friction.W='0 rad'"
         raise InputError(f"{where}: KEY=VALUE is needed, for example {example}, or a YAML file with a group `set`")
-    source = read(folder / text)
+    source = read_yaml(folder / text)
     if not isinstance(source.data, dict) or [*source.data] != ["set"] or not isinstance(source.data["set"], dict):
         raise InputError(f"{where}: the file has to hold the group `set` with KEY: VALUE, and nothing else")
     return [*entries(source, "set")]
@@ -194,7 +194,7 @@ def apply(source: Source, model: Any, key: str, value: Source) -> Iterator[Place
     not belong there, an index out of range.
     """
     for place in list(places(source, model, key, value.marks[()])):
-        source.put(place, Source(copied(value.data), value.marks))
+        source.put(place, Source(copy_tree(value.data), value.marks))
         yield place
 
 
@@ -208,10 +208,14 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         yield place
         return
     part, rest = parts[0], parts[1:]
-    data = at(source.data, place)
+    data = value_at(source.data, place)
     here = ".".join(str(item) for item in place) or f"the {model.__name__.lower()}"
     if part == "*" and isinstance(data, (dict, list)):
-        names = list(data) if isinstance(data, dict) else _having(source, model, place, rest, f"{mark.where}: ", here)
+        names = (
+            list(data)
+            if isinstance(data, dict)
+            else _entries_with_key(source, model, place, rest, f"{mark.where}: ", here)
+        )
         for name in names:
             yield from _places(source, model, (*place, name), rest, key, mark)
         return
@@ -223,10 +227,10 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         return
     if not isinstance(data, dict):
         raise InputError(f"{mark.where}: {here} is {brief(data)}, which has no {part!r} inside")
-    annotation = expected(model, source.data, place)
+    annotation = expected_annotation(model, source.data, place)
     known = keys(annotation)
-    if known is not None and part not in (*known, *separating(model, source.data, place)):
-        raise InputError(f"{mark.where}: unknown key {part!r} in {here}{instead(annotation, part, known)}")
+    if known is not None and part not in (*known, *separating_keys(model, source.data, place)):
+        raise InputError(f"{mark.where}: unknown key {part!r} in {here}{suggest_key(annotation, part, known)}")
     if rest and not isinstance(data.get(part), (dict, list)):
         inner = child(annotation, part)
         if part in data and data[part] is not None:
@@ -238,15 +242,15 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
     yield from _places(source, model, (*place, part), rest, key, mark)
 
 
-def _having(source: Source, model: Any, place: Place, rest: list[str], where: str, here: str) -> list[int]:
+def _entries_with_key(source: Source, model: Any, place: Place, rest: list[str], where: str, here: str) -> list[int]:
     """Entries of the list at `place` that know the next key: of several kinds, * means those that have it.
 
     InputError: none does.
     """
-    entries = range(len(at(source.data, place)))
+    entries = range(len(value_at(source.data, place)))
     if not rest or rest[0] == "*":
         return [*entries]
-    known = [keys(expected(model, source.data, (*place, i))) for i in entries]
+    known = [keys(expected_annotation(model, source.data, (*place, i))) for i in entries]
     indexes = [i for i in entries if known[i] is None or rest[0] in known[i]]  # type: ignore[operator]
     if entries and not indexes:
         words = [*dict.fromkeys(word for keys in known for word in keys or ())]
@@ -264,10 +268,10 @@ def _having(source: Source, model: Any, place: Place, rest: list[str], where: st
 def describe(source: Source, place: Place, message: str) -> str:
     """One problem as a line of text."""
     where = source.mark(place).where
-    return f"{where}: {dotted(place)}: {message}" if place else f"{where}: {message}"
+    return f"{where}: {dotted_key(place)}: {message}" if place else f"{where}: {message}"
 
 
-def dotted(place: Place) -> str:
+def dotted_key(place: Place) -> str:
     """A place as the dotted key of --set."""
     return ".".join(str(key) for key in place)
 
@@ -292,10 +296,10 @@ def explain(source: Source, model: Any, detail: ErrorDetails, unread: str) -> st
     if beside := detail.get("ctx", {}).get("beside"):
         place = (*place[:-1], *beside)
     if detail["type"] == "extra_forbidden":
-        group = expected(model, source.data, place[:-1])
+        group = expected_annotation(model, source.data, place[:-1])
         known = keys(group) or []
         known += [] if place[:-1] or "motions" not in known else ["set"]
-        return describe(source, place, f"unknown key{instead(group, str(place[-1]), known)}")
+        return describe(source, place, f"unknown key{suggest_key(group, str(place[-1]), known)}")
     return describe(source, place, _message(source, model, detail, place))
 
 
@@ -303,7 +307,7 @@ def _message(source: Source, model: Any, detail: ErrorDetails, place: Place) -> 
     kind, value, context = detail["type"], brief(detail["input"]), detail.get("ctx", {})
     if kind == "missing":
         return (
-            f"missing; {_wanted(source, model, place)}"
+            f"missing; {_describe_expected(source, model, place)}"
             if isinstance(place[-1], str)
             else f"the list is too short; {_length(model, source, place)} entries are needed"
         )
@@ -342,7 +346,7 @@ def _message(source: Source, model: Any, detail: ErrorDetails, place: Place) -> 
 
 def _length(model: Any, source: Source, place: Place) -> str:
     """How many entries the list has that lacks the one at `place`."""
-    entries = get_args(expected(model, source.data, place[:-1]))
+    entries = get_args(expected_annotation(model, source.data, place[:-1]))
     return {2: "two", 3: "three"}.get(len(entries), str(len(entries)))
 
 
@@ -350,15 +354,15 @@ def _entries(count: int) -> str:
     return f"{count} entr{'y' if count == 1 else 'ies'}"
 
 
-def _wanted(source: Source, model: Any, place: Place) -> str:
+def _describe_expected(source: Source, model: Any, place: Place) -> str:
     """What belongs at a place, e.g. "a speed, for example 5000 mm/min"."""
-    parent = expected(model, source.data, place[:-1])
+    parent = expected_annotation(model, source.data, place[:-1])
     annotation = child(parent, place[-1])
     info = field(parent, place[-1]) if is_model(parent) else None
     description = info.description if info is not None else None
     if quantity := quantity_of(annotation):
         example = quantity.example or units.example(quantity.unit)
-        text = f"{units.article(quantity.kind)}, for example {dotted(place[-1:])}: {example}"
+        text = f"{units.article(quantity.kind)}, for example {dotted_key(place[-1:])}: {example}"
     elif is_group(resolve(annotation, None)):
         text = "a group of keys"
     else:
@@ -378,7 +382,7 @@ def quantity_of(annotation: Any) -> Quantity | None:
 
 def _words(model: Any, source: Source, place: Place) -> list[str]:
     """The kinds that may stand at a place in a list of motions or evaluations."""
-    parent = expected(model, source.data, place[:-1])
+    parent = expected_annotation(model, source.data, place[:-1])
     union = child(parent, place[-1])
     while get_origin(union) not in (None,) and not all(is_model(part) for part in get_args(union)):
         union = get_args(union)[0]
@@ -409,7 +413,7 @@ Faults = Iterable[tuple[Place, str]]
 
 
 def read_group(path: Path) -> Source:
-    source = read(path)
+    source = read_yaml(path)
     if not isinstance(source.data, dict):
         raise InputError(f"{source.mark(()).where}: a file of 'key: value' lines is expected, not {brief(source.data)}")
     return source
@@ -417,10 +421,10 @@ def read_group(path: Path) -> Source:
 
 def read_checked(path: str | Path, model: type[M]) -> M:
     """A file as a model that needs no more than its own checks. InputError lists every problem with file and line."""
-    return checked(read_group(Path(path)), model, path)
+    return check_tree(read_group(Path(path)), model, path)
 
 
-def checked(
+def check_tree(
     source: Source, model: type[M], path: str | Path, contradictions: Callable[[M], Faults] = lambda _: ()
 ) -> M:
     """The tree of the file `path` as a model; `contradictions`: place and message of what cannot go together in it.
@@ -443,7 +447,7 @@ def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
     data: Any = source.data
     for key in place:
         data = data[key]
-    annotation = expected(model, source.data, place)
+    annotation = expected_annotation(model, source.data, place)
     if annotation is None:
         return
     if isinstance(data, str):
@@ -452,7 +456,7 @@ def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
         if not (is_file or is_group):
             return
         try:
-            named = referred(source.mark(place).folder, data)
+            named = resolve_reference(source.mark(place).folder, data)
         except InputError as error:
             faults.append(describe(source, place, str(error)))
             source.put(place, Source(UNREAD, {(): source.mark(place)}))
@@ -486,7 +490,7 @@ UNREAD = "(not read)"  # stands for the content of a file whose problem is repor
 
 def check(source: Source, model: type[M], faults: list[str]) -> M | None:
     try:
-        return model.model_validate(source.data, context=reading(model, source.data))
+        return model.model_validate(source.data, context=reading_context(model, source.data))
     except ValidationError as error:
         details = error.errors()
         faults += [text for detail in details[:MAX_EXPLAINED] if (text := explain(source, model, detail, UNREAD))]
@@ -495,7 +499,7 @@ def check(source: Source, model: type[M], faults: list[str]) -> M | None:
         return None
 
 
-def reading(model: Any, data: dict[str, Any]) -> Reading:
+def reading_context(model: Any, data: dict[str, Any]) -> ReadingContext:
     """What single values of a file read as `model` can be checked against, as far as its machine can be read."""
     place: Place = ("machine",) if "machine" in data else ()
     machine = data.get("machine", data)
@@ -507,12 +511,12 @@ def reading(model: Any, data: dict[str, Any]) -> Reading:
     )
     if control and position and not is_multiple(position, control):
         position = None
-    return Reading(tuple(axes) if isinstance(axes, dict) and axes else None, control, position)
+    return ReadingContext(tuple(axes) if isinstance(axes, dict) and axes else None, control, position)
 
 
 def _cycle(model: Any, data: dict[str, Any], place: Place) -> float | None:
     """A cycle [s]; None where it cannot be read, which is reported where it stands."""
-    quantity = quantity_of(child(expected(model, data, place[:-1]), place[-1]))
+    quantity = quantity_of(child(expected_annotation(model, data, place[:-1]), place[-1]))
     with suppress(PydanticCustomError):
-        return quantity.read(at(data, place[:-1]).get(place[-1])) if quantity else None
+        return quantity.read(value_at(data, place[:-1]).get(place[-1])) if quantity else None
     return None

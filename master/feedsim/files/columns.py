@@ -23,12 +23,12 @@ from pydantic import (
 )
 from pydantic import model_validator as whole
 
-from feedsim.files.checked import checked, read_checked, read_group
+from feedsim.files.checked import check_tree, read_checked, read_group
 from feedsim.files.fields import AxisName, Model, Quantity, brief, fault
 from feedsim.files.source import Place
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.units import spelled
+from feedsim.foundation.units import spell_unit
 
 # role -> units of the dimensions that its values may have, the usual one first
 DIMENSIONS: dict[str, tuple[str, ...]] = {
@@ -46,12 +46,12 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
 }
 # The same of records of circles alone: angle and radius of a ballbar, or what its radius deviates by.
 CIRCLE_DIMENSIONS: dict[str, tuple[str, ...]] = {"angle": ("rad",), "radius": ("m",), "radial_deviation": ("m",)}
-DRIVING = ("torque", "current", "force")
+DRIVING_SIGNALS = ("torque", "current", "force")
 
 
-def resulting(unit: str, factor_unit: str) -> units.Unit:
+def resulting_unit(unit: str, factor_unit: str) -> units.Unit:
     """Unit of a column's values times the factor. InputError: not known."""
-    plain = spelled(unit)
+    plain = spell_unit(unit)
     return units.unit(plain if factor_unit == "1" else factor_unit if plain == "1" else f"({plain})*({factor_unit})")
 
 
@@ -67,15 +67,15 @@ def target_of(role: str, given: units.Unit) -> str:
     )
 
 
-def _checked(unit: str) -> str:
+def _check_unit(unit: str) -> str:
     try:
-        units.unit(spelled(unit))
+        units.unit(spell_unit(unit))
     except InputError as error:
         raise fault(str(error)) from None
     return unit
 
 
-UnitText = Annotated[StrictStr, AfterValidator(_checked)]
+UnitText = Annotated[StrictStr, AfterValidator(_check_unit)]
 
 
 class Factor(Model):
@@ -228,7 +228,7 @@ def load_columns(path: str | Path) -> Columns:
     """Read and check a mapping file. InputError lists every problem with file and line."""
     path = Path(path)
     source = read_group(path)
-    columns = checked(source, Columns, path, contradictions)
+    columns = check_tree(source, Columns, path, contradictions)
     columns._file = path
     columns._origins = {place: mark.where for place, mark in source.marks.items()}
     return columns
@@ -241,7 +241,7 @@ def contradictions(columns: Columns) -> Iterator[tuple[Place, str]]:
         yield ("time",), "'interval' is for traces without a column of time; give either the interval or the column"
     if clock.column is None and clock.factor is not None:
         yield ("time",), "'factor' needs the 'column' that it belongs to"
-    given = [role for role in DRIVING if columns.signal(role) is not None]
+    given = [role for role in DRIVING_SIGNALS if columns.signal(role) is not None]
     for role in given[1:]:
         yield (role,), f"stands beside {given[0]}; one of the two is enough, and they could contradict one another"
     if columns.position is None and columns.speed is None and columns.angle is None:
@@ -262,12 +262,12 @@ def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place
     if signal.unit is None:
         return  # the trace's header may give it
     try:
-        given = resulting(signal.unit, factor)
+        given = resulting_unit(signal.unit, factor)
         target = target_of(role, given)
     except InputError as error:
         text = f"{signal.unit} times {factor}: " if signal.factor is not None else f"{signal.unit}: "
         hint = ""
-        if units.unit(spelled(signal.unit)).dimension == units.unit("1").dimension:
+        if units.unit(spell_unit(signal.unit)).dimension == units.unit("1").dimension:
             hint = (
                 f"; give the factor of one unit, for example factor: 0.001 {(DIMENSIONS | CIRCLE_DIMENSIONS)[role][0]}"
             )

@@ -28,17 +28,17 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import InputError, nearest, no_such_file
+from feedsim.foundation.errors import InputError, find_nearest_name, no_such_file
 from feedsim.foundation.units import Variable
 
 # Studies check a scenario for every run, most of whose texts are those of the run before.
-_parsed = lru_cache(maxsize=4096)(units.parse)
+_parse_cached = lru_cache(maxsize=4096)(units.parse)
 
-RESERVED = ("time", "tool", "tcp", "pose")  # first parts of other column names
+RESERVED_PREFIXES = ("time", "tool", "tcp", "pose")  # first parts of other column names
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadingContext:
     """What a file's values are checked against while the models are built from text.
 
     Without it (models built in Python) bare numbers are SI values. None: not known, so not checked.
@@ -115,7 +115,7 @@ class Quantity:
             raise fault(f"{brief(value)} is no quantity; {units.article(self.kind)} is expected, for example {shown}")
         if isinstance(value, str):
             try:
-                number = _parsed(value, self.unit, shown)
+                number = _parse_cached(value, self.unit, shown)
             except InputError as error:
                 raise fault(str(error)) from None
         else:
@@ -167,7 +167,7 @@ class Quantity:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         def validate(value: Any, info: ValidationInfo) -> float:
-            return self.read(value, text=isinstance(info.context, Reading))
+            return self.read(value, text=isinstance(info.context, ReadingContext))
 
         schema: core_schema.CoreSchema = core_schema.with_info_plain_validator_function(
             validate, serialization=core_schema.plain_serializer_function_ser_schema(lambda value: value)
@@ -207,9 +207,11 @@ def _symbols() -> dict[str, str]:
 
 
 def _axis(value: Any, info: ValidationInfo) -> str:
-    if not isinstance(value, str) or not re.fullmatch(_NAME_PATTERN, value) or value in RESERVED:
-        raise fault(f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED)})")
-    if isinstance(info.context, Reading) and info.context.axes is not None and value not in info.context.axes:
+    if not isinstance(value, str) or not re.fullmatch(_NAME_PATTERN, value) or value in RESERVED_PREFIXES:
+        raise fault(
+            f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED_PREFIXES)})"
+        )
+    if isinstance(info.context, ReadingContext) and info.context.axes is not None and value not in info.context.axes:
         raise fault(no_axis(value, info.context.axes))
     return value
 
@@ -261,5 +263,5 @@ def brief(value: Any) -> str:
 
 def did_you_mean(word: str, known: list[str]) -> str:
     """'; did you mean ...?', else '; allowed: ...', as the tail of a message."""
-    near = nearest(word, known)
+    near = find_nearest_name(word, known)
     return f"; did you mean {near!r}?" if near else f"; allowed: {', '.join(known)}"

@@ -29,7 +29,7 @@ from feedsim.foundation.errors import InputError, no_such_file
 
 MAX_JSON_DEPTH = 100  # levels of groups and lists
 # What else a name may stand for, in words.
-_OTHERS = (
+_OTHER_FILE_TYPES = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
     (stat.S_ISSOCK, "a socket"),
@@ -69,7 +69,7 @@ UNREAD = {
         "a model that is not read", "export mass and stiffness there as Matrix Market (kind: matrices)"
     )),
 }  # fmt: skip
-_OPENING = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_BINARY", "O_CLOEXEC", "O_NONBLOCK", "O_NOCTTY"))
+_OPEN_FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_BINARY", "O_CLOEXEC", "O_NONBLOCK", "O_NOCTTY"))
 
 
 def refuse_unread(path: Path) -> None:
@@ -80,15 +80,15 @@ def refuse_unread(path: Path) -> None:
 
 
 @contextmanager
-def opened(path: Path, *, pipes: bool = False) -> Iterator[BufferedReader]:
+def open_file(path: Path, *, pipes: bool = False) -> Iterator[BufferedReader]:
     """A file to be read piece by piece. pipes, errors: as of content(), without its limit."""
     refuse_unread(path)
     try:
-        number = os.open(path, _OPENING)
+        number = os.open(path, _OPEN_FLAGS)
         with os.fdopen(number, "rb") as file:
             result = os.fstat(number)
             if not (stat.S_ISREG(result.st_mode) or (pipes and stat.S_ISFIFO(result.st_mode))):
-                what = next(name for is_one, name in _OTHERS if is_one(result.st_mode))
+                what = next(name for is_one, name in _OTHER_FILE_TYPES if is_one(result.st_mode))
                 raise InputError(f"{path} is {what}, not a file")
             if hasattr(os, "O_NONBLOCK"):
                 os.set_blocking(number, True)
@@ -111,7 +111,7 @@ def content(path: Path, largest: int | None = None, *, pipes: bool = False) -> b
     Raises:
         InputError: no such file, one that cannot be read, is too large, or is no regular one.
     """
-    with opened(path, pipes=pipes) as file:
+    with open_file(path, pipes=pipes) as file:
         read = file.read() if largest is None else file.read(largest + 1)
         size = max(os.fstat(file.fileno()).st_size, len(read))
     if largest is not None and len(read) > largest:
@@ -119,9 +119,9 @@ def content(path: Path, largest: int | None = None, *, pipes: bool = False) -> b
     return read
 
 
-def digest(path: Path) -> str:
+def content_digest(path: Path) -> str:
     """SHA-256 of what is in a file, which may be larger than the memory. InputError: as of content()."""
-    with opened(path) as file:
+    with open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -164,21 +164,21 @@ def _too_deep(where: str) -> InputError:
 
 
 MAX_NAME_BYTES, MAX_PART_BYTES = 4096, 255  # bytes of a name that Linux takes, and of each part of it
-_CLOSED: list[str] = []  # folders that hold what archives were unpacked to
+_CLOSED_FOLDERS: list[str] = []  # folders that hold what archives were unpacked to
 
 
 @contextmanager
-def closed(folder: Path) -> Iterator[None]:
+def confine_references(folder: Path) -> Iterator[None]:
     """For as long as the block lasts, what is written in files of `folder` names no file outside of it."""
     root = _absolute(folder)
-    _CLOSED.append(root)
+    _CLOSED_FOLDERS.append(root)
     try:
         yield
     finally:
-        _CLOSED.remove(root)
+        _CLOSED_FOLDERS.remove(root)
 
 
-def referred(folder: Path, name: str) -> Path:
+def resolve_reference(folder: Path, name: str) -> Path:
     """The file that a text in a file of `folder` names. No file is looked at.
 
     Raises:
@@ -186,11 +186,11 @@ def referred(folder: Path, name: str) -> Path:
     """
     from feedsim.files.fields import brief  # loads pydantic, which who asks for the kind of a file has no need of
 
-    if not _possible(name):
+    if not _is_possible_name(name):
         raise InputError(f"{brief(name)} is no file name")
     path = folder / name
-    root = next((name for name in reversed(_CLOSED) if _inside(_absolute(folder), name)), None)
-    if root is not None and not _inside(_absolute(path), root):
+    root = next((name for name in reversed(_CLOSED_FOLDERS) if _is_inside(_absolute(folder), name)), None)
+    if root is not None and not _is_inside(_absolute(path), root):
         raise InputError(f"{brief(name)} leads out of the archive; what is written in one names files in it alone")
     return path
 
@@ -200,7 +200,7 @@ def _absolute(path: Path) -> str:
     return os.path.abspath(path)  # noqa: PTH100
 
 
-def _possible(name: str) -> bool:
+def _is_possible_name(name: str) -> bool:
     """Whether a system can be asked for such a name: what it answers otherwise is an error of the caller's."""
     try:
         return (
@@ -212,7 +212,7 @@ def _possible(name: str) -> bool:
         return False
 
 
-def _inside(path: str, root: str) -> bool:
+def _is_inside(path: str, root: str) -> bool:
     return path == root or path.startswith(root + os.sep)
 
 
@@ -256,7 +256,7 @@ class Source:
 
     def copy(self) -> Source:
         """An equal one that shares no list or group with this one."""
-        return Source(copied(self.data), dict(self.marks))
+        return Source(copy_tree(self.data), dict(self.marks))
 
     def put(self, place: Place, other: Source) -> None:
         """Replace the value at `place` (its parent exists) by another tree, with its marks."""
@@ -272,7 +272,7 @@ class Source:
         self.marks = {known: mark for known, mark in self.marks.items() if known[: len(place)] != place}
 
 
-def at(data: Any, place: Place) -> Any:
+def value_at(data: Any, place: Place) -> Any:
     """The value at a place of a tree of plain values."""
     for key in place:
         data = data[key]
@@ -287,14 +287,14 @@ def places(data: Any, place: Place = ()) -> Iterator[Place]:
             yield from places(value, (*place, key))
 
 
-def copied(data: Any) -> Any:
+def copy_tree(data: Any) -> Any:
     """Plain values with lists and groups of their own."""
     if isinstance(data, dict):
-        return {key: copied(value) for key, value in data.items()}
-    return [copied(item) for item in data] if isinstance(data, list) else data
+        return {key: copy_tree(value) for key, value in data.items()}
+    return [copy_tree(item) for item in data] if isinstance(data, list) else data
 
 
-def read(path: Path) -> Source:
+def read_yaml(path: Path) -> Source:
     """Read a YAML file.
 
     InputError (file, line): missing, no regular file, too large, not UTF-8, empty, bad syntax, duplicate key.
@@ -314,13 +314,13 @@ def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
     """Read YAML text. `name` stands before the line in messages; with lines=False it stands alone (one-line texts)."""
     builder = _Builder(name, folder, lines)
     try:
-        node = _composed(text)
+        node = _compose_document(text)
     except RecursionError:
         raise InputError(f"{name}: nested too deeply") from None
     except _TooLarge:
         raise InputError(f"{name}: {_MANY}") from None
     except yaml.MarkedYAMLError as error:
-        raise builder.error(_wording(error), error.problem_mark or error.context_mark) from None
+        raise builder.error(_describe_yaml_error(error), error.problem_mark or error.context_mark) from None
     except yaml.YAMLError as error:
         raise InputError(f"{name}: {_control_character(error, text)}") from None
     if node is None:
@@ -332,7 +332,7 @@ def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
     return source
 
 
-def _composed(text: str) -> yaml.Node | None:
+def _compose_document(text: str) -> yaml.Node | None:
     """The document's root, by libyaml where there is one, ten times faster.
 
     PyYAML's own parser words the faults and has the say where the two differ: a file means the same on every machine.
@@ -498,7 +498,7 @@ class _Builder:
             raise self.error(f"tag {node.tag!r} is not known here", node.start_mark)
 
 
-def _wording(error: yaml.MarkedYAMLError) -> str:
+def _describe_yaml_error(error: yaml.MarkedYAMLError) -> str:
     problem = error.problem or error.context or "bad YAML"
     if "'\\t'" in problem:
         return "a tab cannot indent or start a value; use blanks"
@@ -533,7 +533,7 @@ def is_program(path: Path) -> bool:
 def is_study(path: Path) -> bool:
     """Whether a file that can be read is a study, by its keys."""
     try:
-        data = None if is_program(path) else read(path).data
+        data = None if is_program(path) else read_yaml(path).data
     except InputError:
         return False
     return isinstance(data, dict) and "sampling" in data and "parameters" in data and "machine" not in data

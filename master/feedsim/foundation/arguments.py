@@ -1,7 +1,7 @@
 """Arguments of jobs: how messages spell them, and how values with units are read from them.
 
 A job is called from Python, ``circle(..., radius="150 mm")``, and by a command, ``--radius "150 mm"``. A message about
-a wrong argument spells it as the caller did. May use: units, errors. Start reading at spelt() and quantity().
+a wrong argument spells it as the caller did. May use: units, errors. Start reading at spell_argument() and quantity().
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ def as_options() -> Iterator[None]:
         _AS_OPTIONS.reset(before)
 
 
-def spelt(name: str) -> str:
+def spell_argument(name: str) -> str:
     """The argument as its caller writes it.
 
-    >>> spelt("position_cycle")
+    >>> spell_argument("position_cycle")
     'position_cycle'
     """
     return f"--{name.replace('_', '-')}" if _AS_OPTIONS.get() else name
@@ -69,7 +69,7 @@ def call() -> Call | None:
 
 
 @contextmanager
-def calling(of: Call | None) -> Iterator[None]:
+def call_context(of: Call | None) -> Iterator[None]:
     """A block that belongs to a call."""
     before = _CALL.set(of)
     try:
@@ -79,19 +79,19 @@ def calling(of: Call | None) -> Iterator[None]:
 
 
 @contextmanager
-def given(name: str, value: object) -> Iterator[None]:
+def prefix_argument_errors(name: str, value: object) -> Iterator[None]:
     """Put argument and value in front of the message of an InputError that the block raises: "--delay 3 kg: ..."."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{spelt(name)} {value}: {error}") from None
+        raise InputError(f"{spell_argument(name)} {value}: {error}") from None
 
 
 def quantity(name: str, value: Value, unit: str, example: str = "", *, positive: bool = False) -> float:
     """The value of an argument in `unit`; a number has that unit already. positive: above 0. Raises InputError."""
     if (present := call()) is not None:
         present.units[name] = unit
-    with given(name, value):
+    with prefix_argument_errors(name, value):
         return amount(value, unit, example, positive=positive)
 
 
@@ -110,17 +110,17 @@ def amount(value: Value, unit: str, example: str = "", *, positive: bool = False
     return number
 
 
-def between(name: str, band: Band, lowest: str, highest: str) -> tuple[float, float]:
+def parse_frequency_band(name: str, band: Band, lowest: str, highest: str) -> tuple[float, float]:
     """Lowest and highest frequency [Hz] of an argument; lowest, highest: examples, with a unit. Raises InputError.
 
-    >>> between("band", "1Hz..1kHz", "1 Hz", "1000 Hz")
+    >>> parse_frequency_band("band", "1Hz..1kHz", "1 Hz", "1000 Hz")
     (1.0, 1000.0)
     """
     if isinstance(band, str):
         first, dots, last = band.partition("..")
         if not dots:
             example = f"{lowest}..{highest}".replace(" ", "")
-            raise InputError(f"{spelt(name)} {band}: LOW..HIGH is needed, such as {example}")
+            raise InputError(f"{spell_argument(name)} {band}: LOW..HIGH is needed, such as {example}")
         return quantity(name, first, "Hz", lowest), quantity(name, last, "Hz", highest)
     low, high = band
     return quantity(name, low, "Hz", lowest), quantity(name, high, "Hz", highest)
@@ -130,7 +130,7 @@ def by_name(name: str, values: Mapping[str, V], read: Callable[[str, V], T]) -> 
     """Key -> what `read` makes of key and value. Raises InputError, which names argument, key and value."""
     result: dict[str, T] = {}
     for key, value in values.items():
-        with given(name, f"{key}={value}" if key else value):
+        with prefix_argument_errors(name, f"{key}={value}" if key else value):
             result[key] = read(key, value)
     return result
 
@@ -181,22 +181,22 @@ def pairs(
     if isinstance(given, Mapping):
         return {str(key): value for key, value in given.items()}
     result: dict[str, Any] = {}
-    for text in [part for entry in ([given] if isinstance(given, str) else given or ()) for part in listed(entry)]:
+    for text in [part for entry in ([given] if isinstance(given, str) else given or ()) for part in split_names(entry)]:
         key, equals, value = (part.strip() for part in text.partition("="))
         if common and not equals:
             key, value = "", text
         elif not (key and equals and value):
-            raise InputError(f"{spelt(name)} {text}: {needed}")
+            raise InputError(f"{spell_argument(name)} {text}: {needed}")
         if key in result:
-            raise InputError(f"{spelt(name)} {text}: {key or 'that of all axes'} is given twice")
+            raise InputError(f"{spell_argument(name)} {text}: {key or 'that of all axes'} is given twice")
         result[key] = value
     return result
 
 
-def listed(names: str | Sequence[str]) -> tuple[str, ...]:
+def split_names(names: str | Sequence[str]) -> tuple[str, ...]:
     """Names of a list, of a text with commas, or of several such texts.
 
-    >>> listed("X, Z")
+    >>> split_names("X, Z")
     ('X', 'Z')
     """
     # Commas within brackets are of a name, data(:,2).

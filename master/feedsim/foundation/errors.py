@@ -93,7 +93,7 @@ class OutputError(FeedsimError):
     exit_code = 4
 
 
-def few(names: Sequence[str], most: int) -> str:
+def shorten_list(names: Sequence[str], most: int) -> str:
     """The first names, and how many there are beyond."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
@@ -101,7 +101,7 @@ def few(names: Sequence[str], most: int) -> str:
 MAX_WORD, MAX_KNOWN = 200, 500  # characters of a word, and names, that a suggestion is looked for in
 
 
-def nearest(word: str, known: Sequence[str]) -> str:
+def find_nearest_name(word: str, known: Sequence[str]) -> str:
     """The name that a word most likely means; "" where it resembles none. Of many names the first are compared."""
     from difflib import get_close_matches  # not for those who make no mistakes
 
@@ -114,7 +114,7 @@ def nearest(word: str, known: Sequence[str]) -> str:
 def no_such_file(path: str | Path, what: str = "file") -> str:
     """Message about a file, or folder, that is not there, with the one beside it that was most likely meant."""
     try:
-        near = nearest(Path(path).name, [other.name for other in Path(path).parent.iterdir()])
+        near = find_nearest_name(Path(path).name, [other.name for other in Path(path).parent.iterdir()])
     except (OSError, ValueError):
         near = ""
     return f"no such {what}: {path}" + (f"; did you mean {Path(path).parent / near}?" if near else "")
@@ -163,6 +163,6 @@ class Finding:
 WRONG = "WRONG: "
 
 
-def ranked(findings: Iterable[Finding]) -> list[Finding]:
+def rank_findings(findings: Iterable[Finding]) -> list[Finding]:
     """Each once, the wrong ones first and notes last, else in their order."""
     return sorted(dict.fromkeys(findings), key=lambda finding: get_args(Severity).index(finding.severity))

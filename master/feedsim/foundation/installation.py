@@ -21,7 +21,7 @@ from typing import Any
 from feedsim.foundation.errors import InputError
 
 PACKAGE = Path(__file__).resolve().parents[1]
-INSIDE = "shipped"  # folder within the package
+SHIPPED_FOLDER = "shipped"  # folder within the package
 
 
 @cache
@@ -42,7 +42,7 @@ def version(package: str) -> str | None:
 
 def shipped(name: str) -> Path:
     """The folder `name` ("fmus", "scenarios"): of the checkout, where make fills it, else inside the package."""
-    return (checkout() or PACKAGE / INSIDE) / name
+    return (checkout() or PACKAGE / SHIPPED_FOLDER) / name
 
 
 def fmus_directory() -> Path:
@@ -55,11 +55,15 @@ def documentation() -> Path | None:
     """First page of the documentation: of the site, or of its sources in a checkout that has not built it; None where
     this installation has neither."""
     root = checkout()
-    pages = [root / "build/site/index.html", root / "docs/index.md"] if root else [PACKAGE / INSIDE / "site/index.html"]
+    pages = (
+        [root / "build/site/index.html", root / "docs/index.md"]
+        if root
+        else [PACKAGE / SHIPPED_FOLDER / "site/index.html"]
+    )
     return next((page for page in pages if page.is_file()), None)
 
 
-def mend(what: str) -> str:
+def repair_advice(what: str) -> str:
     """What to do where `what` (such as "the archives") is missing or does not fit."""
     if checkout():
         return f"`make fmus` builds {what}"
@@ -68,8 +72,8 @@ def mend(what: str) -> str:
 
 # --- Packages that only some of the work needs: what is said where one is missing -------------------------------------
 # A command says which extra it needs (``@job(..., needs=...)``), and is not begun without; work that finds
-# out later, such as drawing, calls :func:`ask` ahead of its imports. Whoever meets the person asks :func:`missing` what
-# to say of an import that failed all the same. May use: errors.
+# out later, such as drawing, calls :func:`require_extras` ahead of its imports. Whoever meets the person asks
+# :func:`missing_package_error` what to say of an import that failed all the same. May use: errors.
 
 
 # Extra of pyproject.toml -> the modules that it brings, smaller extras first.
@@ -85,17 +89,17 @@ class MissingPackage(InputError):
     """Packages that this work needs are not installed; the message has the line that installs them."""
 
 
-def ask(what: str, *extras: str) -> None:
+def require_extras(what: str, *extras: str) -> None:
     """Raise MissingPackage where packages of the extras are missing that `what` (such as "feedsim run") needs.
 
-    >>> ask("a comparison")
+    >>> require_extras("a comparison")
     """
     lacking = [module for extra in extras for module in EXTRAS[extra] if not _is_there(module)]
     if lacking:
-        raise _told(what, lacking, extras)
+        raise _missing_extras_error(what, lacking, extras)
 
 
-def missing(error: ImportError, what: str = "this") -> MissingPackage | None:
+def missing_package_error(error: ImportError, what: str = "this") -> MissingPackage | None:
     """What to say of an import that failed; None: it was of no package of an extra.
 
     All is asked for that the work's extra lacks: the one of its name ("feedsim.sweep"), else the smallest that has the
@@ -107,20 +111,20 @@ def missing(error: ImportError, what: str = "this") -> MissingPackage | None:
         for extra in (work, *EXTRAS):
             if module in EXTRAS.get(extra, ()):
                 lacking = (name for name in EXTRAS[extra] if name == module or not _is_there(name))
-                return _told(what, lacking, [extra])
+                return _missing_extras_error(what, lacking, [extra])
     return None
 
 
-def need(module: str, what: str) -> Any:
+def require_module(module: str, what: str) -> Any:
     """The module, for `what` (such as "a DataFrame") needs it. Raises MissingPackage.
 
-    >>> need("json", "a page").dumps([1])
+    >>> require_module("json", "a page").dumps([1])
     '[1]'
     """
     try:
         return import_module(module)
     except ImportError as error:
-        raise missing(error, what) or error from None
+        raise missing_package_error(error, what) or error from None
 
 
 def _is_there(module: str) -> bool:
@@ -130,7 +134,7 @@ def _is_there(module: str) -> bool:
         return False
 
 
-def _told(what: str, lacking: Iterable[str], extras: Iterable[str]) -> MissingPackage:
+def _missing_extras_error(what: str, lacking: Iterable[str], extras: Iterable[str]) -> MissingPackage:
     *others, last = dict.fromkeys(lacking)
     names, verb = (f"{', '.join(others)} and {last}", "are") if others else (last, "is")
     asked = f"feedsim[{','.join(dict.fromkeys(extras))}]"
@@ -147,7 +151,7 @@ if hasattr(os, "uname") and (sys.platform, os.uname().machine) == ("linux", "aar
     _SUFFIX = "-aarch64.so"
 
 # By name and SHA-256 of the file: each study lays out a copy of its own, and what is loaded stays until the end.
-_loaded: dict[tuple[str, bytes], ctypes.CDLL] = {}
+_loaded_libraries: dict[tuple[str, bytes], ctypes.CDLL] = {}
 
 
 def library_name(name: str) -> str:
@@ -165,7 +169,7 @@ def library(name: str, folder: Path, interface: str) -> ctypes.CDLL | str:
     path = folder.resolve() / file
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
-        if (known := _loaded.get((name, digest))) is not None:
+        if (known := _loaded_libraries.get((name, digest))) is not None:
             return known
         loaded = ctypes.CDLL(str(path))
         asked = getattr(loaded, f"{name}_interface")
@@ -177,5 +181,5 @@ def library(name: str, folder: Path, interface: str) -> ctypes.CDLL | str:
         return f"{file}: cannot be used: {str(error).replace(str(path), file)}"
     if result != interface:
         return f"{file}: built from other sources (its interface is {result!r}, wanted is {interface!r})"
-    _loaded[name, digest] = loaded
+    _loaded_libraries[name, digest] = loaded
     return loaded

@@ -18,25 +18,25 @@ from pathlib import Path
 from feedsim.foundation.errors import OutputError
 
 HEAD_BYTES = 4096  # bytes of a file that are read to see what it is
-_FORCED = ContextVar("forced", default=False)
+_REPLACEMENT_ALLOWED = ContextVar("forced", default=False)
 
 
 @contextmanager
-def replacing(allowed: bool = True) -> Iterator[None]:
+def allow_replacement(allowed: bool = True) -> Iterator[None]:
     """A block in which files may be replaced that feedsim did not write: what --force asks for. Inputs never are."""
-    before = _FORCED.set(allowed)
+    before = _REPLACEMENT_ALLOWED.set(allowed)
     try:
         yield
     finally:
-        _FORCED.reset(before)
+        _REPLACEMENT_ALLOWED.reset(before)
 
 
-def forced() -> bool:
+def is_replacement_allowed() -> bool:
     """Whether files of others may be replaced."""
-    return _FORCED.get()
+    return _REPLACEMENT_ALLOWED.get()
 
 
-def same(one: Path, other: Path) -> bool:
+def is_same_file(one: Path, other: Path) -> bool:
     """Whether both are one file, by whatever names, links included."""
     try:
         return one.samefile(other)
@@ -57,11 +57,11 @@ def check_file(
     Raises:
         OutputError: `path` is an input or a folder, or a file is there that feedsim did not write.
     """
-    if any(same(path, given) for given in inputs):
+    if any(is_same_file(path, given) for given in inputs):
         raise OutputError(f"{path}: is an input and would be replaced; take another name")
     if path.is_dir():
         raise OutputError(f"{path}: is a directory; the name of a file is needed")
-    if path.is_file() and not forced() and not ours(path):
+    if path.is_file() and not is_replacement_allowed() and not ours(path):
         raise OutputError(
             f"{path}: exists already, and is no {what} that feedsim wrote; take another name, or replace it with "
             "--force"
@@ -95,7 +95,7 @@ def archive_with(member: str, mark: bytes) -> Callable[[Path], bool]:
     return one
 
 
-def unchanged(content: bytes) -> Callable[[Path], bool]:
+def content_check(content: bytes) -> Callable[[Path], bool]:
     """What shows a file that holds these bytes already: writing them again loses nothing."""
 
     def one(path: Path) -> bool:
@@ -110,12 +110,12 @@ def unchanged(content: bytes) -> Callable[[Path], bool]:
 # --- CSV tables that people open in a spreadsheet: text of other people's files never becomes a formula there ---------
 # A spreadsheet takes a cell that begins with = + - or @, or with a tab or a carriage return ahead of them, for a
 # formula, which may start programs or fetch pages. Such a text gets an apostrophe ahead; numbers stay as they are. A
-# text that begins with apostrophes and goes on like that gets one more, so that original() gives every text back.
+# text that begins with apostrophes and goes on like that gets one more, so that original_text() gives every text back.
 
 
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
 _SPECIAL = re.compile(r'[,"\r\n]')
-_EMPTY = '""'  # a row of one empty cell
+_EMPTY_ROW = '""'  # a row of one empty cell
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|nan)")
 
 
@@ -128,10 +128,10 @@ def as_text(cell: str) -> str:
     return f"'{cell}" if _FORMULA.match(cell) and not _NUMBER.fullmatch(cell) else cell
 
 
-def original(cell: str) -> str:
+def original_text(cell: str) -> str:
     """The text of a cell of a sheet.
 
-    >>> original("'=1+1"), original("'H0003'")
+    >>> original_text("'=1+1"), original_text("'H0003'")
     ('=1+1', "'H0003'")
     """
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
@@ -140,11 +140,11 @@ def original(cell: str) -> str:
 def write_rows(file: io.TextIOBase, rows: Iterable[Sequence[object]]) -> None:
     """Write rows to a file that is open with newline=""."""
     for row in rows:
-        cells = [_quoted(as_text(str(cell))) for cell in row]
-        file.write(f"{','.join(cells) if cells != [''] else _EMPTY}\n")
+        cells = [_quote_cell(as_text(str(cell))) for cell in row]
+        file.write(f"{','.join(cells) if cells != [''] else _EMPTY_ROW}\n")
 
 
-def _quoted(cell: str) -> str:
+def _quote_cell(cell: str) -> str:
     """The writer of Python's csv leaves a carriage return without quotes where rows end with a line feed."""
     return '"' + cell.replace('"', '""') + '"' if _SPECIAL.search(cell) else cell
 
@@ -159,4 +159,4 @@ def text_of(rows: Iterable[Sequence[object]]) -> str:
 def read_rows(file: Iterable[str]) -> Iterator[list[str]]:
     """Rows of a sheet as they were given; csv.Error: none."""
     for row in csv.reader(file):
-        yield [original(cell) for cell in row]
+        yield [original_text(cell) for cell in row]

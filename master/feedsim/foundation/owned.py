@@ -1,6 +1,6 @@
 """What belongs to one process as long as it lives: a folder of results, folders for temporary files, a file that grows.
 
-May use: signals and errors. Start reading at claimed().
+May use: signals and errors. Start reading at claim_folder().
 
 A lock of the system on an open file shows whether its owner lives: it goes with the process, whatever has ended that.
 So nothing that a killed process has left keeps others waiting, and the next start removes it.
@@ -37,7 +37,7 @@ from feedsim.foundation.errors import OutputError
 from feedsim.foundation.installation import version
 
 # --- Signals that end a program: none is lost, and none stops what has to come to its end -----------------------------
-# May use: nothing. Start reading at end_program(); held() is for a few steps that belong together.
+# May use: nothing. Start reading at end_program(); defer_signals() is for a few steps that belong together.
 #
 # A handler of Python raises wherever the main thread is at work. In a callback from C, in that of a weak reference, in
 # ``__del__`` and in a library with a bare ``except:`` the exception vanishes. An exception that is on its way lives; so
@@ -45,11 +45,13 @@ from feedsim.foundation.installation import version
 # imported none is raised: there libraries make another exception of it, "import failed".
 
 
-ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))  # Windows
-LOOK = 0.02  # s between two looks at whether an exception lives
+END_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)  # Windows
+EXCEPTION_POLL_INTERVAL = 0.02  # s between two looks at whether an exception lives
 
 
-class Ended(KeyboardInterrupt, SystemExit):
+class EndRequest(KeyboardInterrupt, SystemExit):
     """A signal asks the program to end; whoever lets an interrupt or an exit pass lets this one pass."""
 
 
@@ -61,8 +63,8 @@ def end_program(program: Callable[[], object]) -> None:
     stays so (nohup).
     """
     arrived: list[int] = []
-    raised: list[weakref.ref[Ended]] = []
-    dead: list[weakref.ref[Ended]] = []
+    raised: list[weakref.ref[EndRequest]] = []
+    dead: list[weakref.ref[EndRequest]] = []
     main, shown, hook = threading.main_thread().ident or 0, sys.unraisablehook, sys.excepthook
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -76,7 +78,7 @@ def end_program(program: Callable[[], object]) -> None:
             frame = frame.f_back
         if frame is None or len(dead) < len(raised):
             return
-        ended = Ended(128 + arrived[0])
+        ended = EndRequest(128 + arrived[0])
         raised.append(weakref.ref(ended, dead.append))
         try:
             raise ended
@@ -85,7 +87,7 @@ def end_program(program: Callable[[], object]) -> None:
 
     def watch() -> None:
         while True:
-            time.sleep(LOOK)
+            time.sleep(EXCEPTION_POLL_INTERVAL)
             if len(dead) < len(raised):
                 continue
             if hasattr(signal, "pthread_kill"):
@@ -94,7 +96,7 @@ def end_program(program: Callable[[], object]) -> None:
                 _thread.interrupt_main(signal.Signals(arrived[0]))
 
     def show(unraisable: Any) -> None:
-        if unraisable.exc_type is not Ended:
+        if unraisable.exc_type is not EndRequest:
             shown(unraisable)
 
     def tell(*error: Any) -> None:
@@ -110,7 +112,7 @@ def end_program(program: Callable[[], object]) -> None:
         for number in taken:  # nothing is left to be done
             signal.signal(number, signal.SIG_DFL)
 
-    taken = [number for number in ENDING if signal.getsignal(number) not in (signal.SIG_IGN, None)]
+    taken = [number for number in END_SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
     sys.unraisablehook, sys.excepthook = show, tell
     atexit.register(leave)  # the first, so that it is called last
     for number in taken:
@@ -118,7 +120,7 @@ def end_program(program: Callable[[], object]) -> None:
 
 
 @contextmanager
-def held() -> Iterator[None]:
+def defer_signals() -> Iterator[None]:
     """Let interrupts and requests to end arrive behind the block, not in it.
 
     For short blocks: steps of which all are done or none, and calls of what would swallow the exception of a handler.
@@ -131,7 +133,7 @@ def held() -> Iterator[None]:
     with ExitStack() as last:
         last.callback(lambda: [*map(signal.raise_signal, arrived)])
         # What is ignored stays so; None is a handler that was not set from Python and could not be put back.
-        for number in ENDING:
+        for number in END_SIGNALS:
             if (handler := signal.getsignal(number)) not in (signal.SIG_IGN, None):
                 last.callback(signal.signal, number, handler)
                 signal.signal(number, lambda number, _: arrived.append(number))
@@ -146,20 +148,20 @@ PREFIX = "feedsim-"  # of folders for temporary files
 _NAME_LETTERS, _LENGTH = "abcdefghijklmnopqrstuvwxyz0123456789_", 8  # of their names behind it, as tempfile has them
 _OWNED_NAME = re.compile(rf"{PREFIX}[{_NAME_LETTERS}]{{{_LENGTH}}}")
 LOCK = ".feedsim.lock"  # in a folder that belongs to a process
-WRITING = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
-YOUNG = 60.0  # s within which a folder without a lock may be one that is just being made
-_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is known by
-_FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
-_LOOK = 0.02  # s between two looks at a lock that is waited for
-_BETWEEN = 1e-4  # s between two attempts at what others may remove at the same moment
-_UNSETTLED = 5.0  # s for which they may
+WRITE_GRACE_TIME = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
+LOCK_GRACE_TIME = 60.0  # s within which a folder without a lock may be one that is just being made
+_LOCKED_ERRORS = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is known by
+_LOCK_OFFSET = 1 << 30  # where Windows locks: there a locked byte cannot be read
+_LOCK_POLL_INTERVAL = 0.02  # s between two looks at a lock that is waited for
+_RETRY_INTERVAL = 1e-4  # s between two attempts at what others may remove at the same moment
+_RETRY_TIME = 5.0  # s for which they may
 _folders: dict[tuple[int, str], TemporaryFolder] = {}  # by process and where the system keeps what is temporary
 # What blocks have: locks and folders that were made, by path of the lock, thread and process.
 _claims: dict[tuple[str, int, int], tuple[list[_Lock], list[Path]]] = {}
 
 
 @contextmanager
-def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[None]:
+def claim_folder(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[None]:
     """Have a folder alone, among all processes and threads that claim it; it is made where it is missing.
 
     What is made is removed with the block if nothing is in it then. Blocks of one thread may stand in one another.
@@ -187,14 +189,14 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
         break
     _claims[key] = [], made
     try:
-        _take(directory, lock, time.monotonic() + wait, _claims[key][0])
+        _take_locks(directory, lock, time.monotonic() + wait, _claims[key][0])
         yield
     finally:
         _give_back(key)
 
 
 def _give_back(key: tuple[str, int, int]) -> None:
-    with held():
+    with defer_signals():
         locks, made = _claims[key]
         while locks:
             locks.pop().release()
@@ -211,18 +213,18 @@ def _give_all_back() -> None:
         _give_back(key)
 
 
-def _take(directory: Path, name: str, until: float, locks: list[_Lock]) -> None:
+def _take_locks(directory: Path, name: str, until: float, locks: list[_Lock]) -> None:
     """Add the locks that make a folder ours. OutputError."""
     began = time.monotonic()
     while True:
         try:
             directory.mkdir(parents=True, exist_ok=True)
-            with held():
+            with defer_signals():
                 locks.append(lock := _Lock(directory / name))
         except OSError as error:
             between = isinstance(error, (FileNotFoundError, FileExistsError))  # made or removed by another just now
-            if between and not directory.is_symlink() and time.monotonic() < began + _UNSETTLED:
-                time.sleep(_BETWEEN)  # not in step with the other
+            if between and not directory.is_symlink() and time.monotonic() < began + _RETRY_TIME:
+                time.sleep(_RETRY_INTERVAL)  # not in step with the other
                 continue
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
         if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
@@ -234,10 +236,10 @@ def _take(directory: Path, name: str, until: float, locks: list[_Lock]) -> None:
                     "not at work any more, remove that file; or take another directory"
                 )
             unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]
-            with suppress(OSError), held():
+            with suppress(OSError), defer_signals():
                 locks.append(_Lock(Path(tempfile.gettempdir()) / f"{PREFIX}{unique}.lock"))
         if all(lock.state is not False for lock in locks):
-            lock.tell(_self())
+            lock.tell(_describe_process())
             return
         holder = lock.content()
         while locks:
@@ -248,10 +250,10 @@ def _take(directory: Path, name: str, until: float, locks: list[_Lock]) -> None:
                 f"{directory}: another process writes its results there{who}; wait until it has ended, or take another "
                 "directory"
             )
-        time.sleep(_LOOK)
+        time.sleep(_LOCK_POLL_INTERVAL)
 
 
-def _self() -> str:
+def _describe_process() -> str:
     """This process, for those that meet its lock."""
     words = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv else "python"
     shown = "".join(c if c.isprintable() else "?" for c in words)
@@ -274,8 +276,8 @@ class _Lock:
                 if not path.is_file():
                     raise
                 self._file = os.open(path, os.O_RDONLY)
-            self.state = locked(self._file)
-            if self.state is not True or _is(path, self._file):
+            self.state = lock_file(self._file)
+            if self.state is not True or _has_name(path, self._file):
                 return
             os.close(self._file)  # removed by who had it, between our opening and our locking it
 
@@ -301,7 +303,7 @@ class _Lock:
     def release(self) -> None:
         """Remove the file and give it back; ahead of that where the system can, so that none is removed of another."""
         with suppress(OSError):
-            if os.name != "nt" and _is(self.path, self._file):
+            if os.name != "nt" and _has_name(self.path, self._file):
                 self.path.unlink()
         self.close()
         if os.name == "nt":
@@ -309,7 +311,7 @@ class _Lock:
                 self.path.unlink()
 
 
-def locked(file: int) -> bool | None:
+def lock_file(file: int) -> bool | None:
     """Lock an open file for this process; False: another has; None: its file system has no locks."""
     try:
         try:
@@ -317,16 +319,16 @@ def locked(file: int) -> bool | None:
         except ImportError:  # Windows
             import msvcrt
 
-            os.lseek(file, _FAR, os.SEEK_SET)
+            os.lseek(file, _LOCK_OFFSET, os.SEEK_SET)
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
         else:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        return False if error.errno in _HELD else None
+        return False if error.errno in _LOCKED_ERRORS else None
     return True
 
 
-def _is(path: Path, file: int) -> bool:
+def _has_name(path: Path, file: int) -> bool:
     """Whether an open file is the one that has this name now."""
     try:
         return os.path.samestat(path.stat(), os.fstat(file))
@@ -334,7 +336,7 @@ def _is(path: Path, file: int) -> bool:
         return False
 
 
-class Closing:
+class BlockResource:
     """What is closed at the end of the block that it is opened for."""
 
     def close(self) -> None:
@@ -381,7 +383,7 @@ class TemporaryFolder:
             self.path.mkdir(0o700)
             if lock:
                 files.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
-            if not lock or (locked(files[0]) is not False and _is(self.path / LOCK, files[0])):
+            if not lock or (lock_file(files[0]) is not False and _has_name(self.path / LOCK, files[0])):
                 return True
         except (FileExistsError, FileNotFoundError):
             if not parent.is_dir():
@@ -427,16 +429,16 @@ def _remove(folder: Path, files: list[int], owner: int) -> None:
     """Remove a folder and close its lock. A process that was forked off leaves its parent's folders alone."""
     if os.getpid() != owner:
         return
-    with held():  # also where an exception of a handler would vanish, and the folder stay
-        until = time.monotonic() + WRITING
-        while not _emptied(folder) and time.monotonic() < until:
-            time.sleep(_LOOK)
+    with defer_signals():  # also where an exception of a handler would vanish, and the folder stay
+        until = time.monotonic() + WRITE_GRACE_TIME
+        while not _empty_folder(folder) and time.monotonic() < until:
+            time.sleep(_LOCK_POLL_INTERVAL)
         while files:  # ahead of the rest: Windows does not remove what is open
             os.close(files.pop())
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _emptied(folder: Path) -> bool:
+def _empty_folder(folder: Path) -> bool:
     """Remove what is in a folder, but for what shows whose it is: a folder that is half removed still has an owner."""
     remaining = [path for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else []
     for path in remaining:
@@ -469,11 +471,11 @@ def _remove_orphan(folder: Path, age: float) -> None:
     try:
         file = os.open(folder / LOCK, os.O_RDWR)
     except FileNotFoundError:
-        if age > YOUNG:
+        if age > LOCK_GRACE_TIME:
             folder.rmdir()
         return
     try:
-        gone = locked(file) is True and _emptied(folder)
+        gone = lock_file(file) is True and _empty_folder(folder)
     finally:
         os.close(file)
     if gone:
@@ -484,22 +486,22 @@ def _remove_orphan(folder: Path, age: float) -> None:
 # An answer belongs to all that it follows from: the bytes of the user's files, the arguments, and the code that finds
 # it. Where one of these changes it is found anew, so that a kept answer is the very one that would be found. What
 # cannot be read or written is found as if nothing had been kept. May use: signals and installation. Start reading at
-# cached().
+# cache_answer().
 
 
-FOLDER = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
+CACHE_VARIABLE = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
 MAX_ANSWERS = 256  # answers of one kind; the oldest go first
 MAX_ANSWER_BYTES = 1 << 20  # bytes of an answer; a larger file is none of ours
 LIBRARIES = ("numpy", "scipy", "jinja2")
 
 
-def cached(kind: str, follows_from: Sequence[Any], code: Sequence[Path], find: Callable[[], Any]) -> Any:
+def cache_answer(kind: str, follows_from: Sequence[Any], code: Sequence[Path], find: Callable[[], Any]) -> Any:
     """What `find` returns, numbers and texts as JSON has them; kept from an earlier process where nothing has changed.
 
     kind: letters, the beginning of the file's name. follows_from: what the answer depends on, as JSON has it. code:
     folders with the code that finds it.
     """
-    place = folder()
+    place = cache_folder()
     if place is None:
         return find()
     asked = json.dumps([kind, _versions(tuple(code)), *follows_from], sort_keys=True)
@@ -511,13 +513,13 @@ def cached(kind: str, follows_from: Sequence[Any], code: Sequence[Path], find: C
                 return kept["answer"]
     answer = find()
     with suppress(OSError):
-        _keep(file, kind, json.dumps({"asked": asked, "answer": answer}))
+        _store_answer(file, kind, json.dumps({"asked": asked, "answer": answer}))
     return answer
 
 
-def folder() -> Path | None:
+def cache_folder() -> Path | None:
     """Where answers are kept; None: nowhere."""
-    if (given := os.environ.get(FOLDER)) is not None:
+    if (given := os.environ.get(CACHE_VARIABLE)) is not None:
         return Path(given) if given else None
     if sys.platform == "win32":
         home = Path(os.environ.get("LOCALAPPDATA", ""))
@@ -531,7 +533,7 @@ def own_folder(kind: str, code: Sequence[Path]) -> Path | None:
 
     Folders of the kind for other code are removed but for the last four: programs of several versions may take turns.
     """
-    place = folder()
+    place = cache_folder()
     if place is None:
         return None
     name = hashlib.sha256(json.dumps(_versions(tuple(code))).encode()).hexdigest()[:20]
@@ -542,12 +544,12 @@ def own_folder(kind: str, code: Sequence[Path]) -> Path | None:
             others = sorted(place.glob(f"{kind}-*/"), key=lambda path: path.stat().st_mtime)
             for old in others[:-5]:
                 shutil.rmtree(old, ignore_errors=True)
-        return own if _private(own) else None
+        return own if _is_private(own) else None
     except OSError:
         return None
 
 
-def _private(place: Path) -> bool:
+def _is_private(place: Path) -> bool:
     """Whether nobody else can write there: what is compiled is executed. Raises OSError."""
     if sys.platform == "win32":  # the folder is below the user's profile, where no other user writes
         return True
@@ -555,7 +557,7 @@ def _private(place: Path) -> bool:
     return result.st_uid == os.getuid() and not result.st_mode & 0o022
 
 
-def digest(file: Path) -> str:
+def file_digest(file: Path) -> str:
     """SHA-256 of a file's bytes. Raises OSError."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
@@ -571,12 +573,15 @@ def _versions(code: tuple[Path, ...]) -> list[str]:
     return [sources.hexdigest(), *libraries, platform.machine(), sys.byteorder]
 
 
-def _keep(file: Path, kind: str, text: str) -> None:
+def _store_answer(file: Path, kind: str, text: str) -> None:
     """Write it whole; others may read and write the same one meanwhile. Raises OSError."""
     if len(text) > MAX_ANSWER_BYTES:
         return
     file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with held(), tempfile.NamedTemporaryFile("w", encoding="utf-8", prefix=".", dir=file.parent, delete=False) as out:
+    with (
+        defer_signals(),
+        tempfile.NamedTemporaryFile("w", encoding="utf-8", prefix=".", dir=file.parent, delete=False) as out,
+    ):
         fresh = Path(out.name)
         try:
             out.write(text)

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 S = TypeVar("S")
 T = TypeVar("T")
-Say = Callable[..., None]
+Reporter = Callable[..., None]
 
 _state = {"forked": False}  # whether this process is one of those that work side by side
 
@@ -34,7 +34,7 @@ def may_fork() -> bool:
     return alone and not _state["forked"] and cores() > 1
 
 
-def in_parallel(tasks: Sequence[Callable[[Say], T]], say: Say = lambda *_: None) -> list[T]:
+def in_parallel(tasks: Sequence[Callable[[Reporter], T]], say: Reporter = lambda *_: None) -> list[T]:
     """The result of every task, in their order; the error of the first one that raises.
 
     Args:
@@ -54,7 +54,7 @@ def in_parallel(tasks: Sequence[Callable[[Say], T]], say: Say = lambda *_: None)
     try:
         for first in range(count):
             here, there = context.Pipe(duplex=False)
-            process = context.Process(target=_work, args=(tasks, first, count, there), daemon=True)
+            process = context.Process(target=_run_tasks, args=(tasks, first, count, there), daemon=True)
             process.start()
             there.close()
             ends[here] = process
@@ -83,7 +83,7 @@ def in_parallel(tasks: Sequence[Callable[[Say], T]], say: Say = lambda *_: None)
     return [results[k][1] for k in range(len(tasks))]
 
 
-def _work(tasks: Sequence[Callable[[Say], Any]], first: int, step: int, there: Any) -> None:
+def _run_tasks(tasks: Sequence[Callable[[Reporter], Any]], first: int, step: int, there: Any) -> None:
     """Every `step`-th task from the `first` one on, in a process of its own."""
     _state["forked"] = True
     for k in range(first, len(tasks), step):

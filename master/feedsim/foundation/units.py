@@ -22,8 +22,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
-from feedsim.foundation.errors import InputError, nearest
-from feedsim.foundation.installation import mend
+from feedsim.foundation.errors import InputError, find_nearest_name
+from feedsim.foundation.installation import repair_advice
 from feedsim_packager import units as algebra
 
 # What may be written, in the order of messages.
@@ -122,7 +122,7 @@ class UnknownSymbol(InputError):
 
     def __init__(self, symbol: str) -> None:
         self.symbol = symbol
-        super().__init__(f"unknown unit {symbol!r}{_suggest(symbol)}")
+        super().__init__(f"unknown unit {symbol!r}{_suggest_unit(symbol)}")
 
 
 def example(text: str) -> str:
@@ -205,7 +205,7 @@ def unit(text: str) -> Unit:
     if _product_behind_division(plain):
         raise InputError(f"unit {text!r} is ambiguous; put what stands under the line in brackets, as in N.m/(rad.s)")
     # Beside the units: powers of one digit, 1 as in 1/s, and each bracket closed.
-    if not _EXPRESSION.fullmatch(plain) or _unbalanced(plain):
+    if not _EXPRESSION.fullmatch(plain) or _has_unbalanced_brackets(plain):
         raise InputError(f"unit {text!r} cannot be read")
     try:
         result = algebra.parse(plain.replace("^+", "^") or DIMENSIONLESS)
@@ -250,7 +250,7 @@ def _dimension(exponents: tuple[int, ...]) -> str:
     return "/".join(["*".join(over) or "1", *under])
 
 
-def _unbalanced(plain: str) -> bool:
+def _has_unbalanced_brackets(plain: str) -> bool:
     depth = 0
     for c in plain:
         depth += (c == "(") - (c == ")")
@@ -280,8 +280,8 @@ def _hint(given: Unit, target: Unit) -> str:
     return ""
 
 
-def _suggest(symbol: str) -> str:
-    near = nearest(symbol, [*UNIT_SYMBOLS, *ALIASES])
+def _suggest_unit(symbol: str) -> str:
+    near = find_nearest_name(symbol, [*UNIT_SYMBOLS, *ALIASES])
     return f"; did you mean {near!r}?" if near else f"; known are {', '.join(UNIT_SYMBOLS)}"
 
 
@@ -311,7 +311,7 @@ SPELLINGS: dict[str, str] = {
 RMS = ("a rms", "arms", "a(rms)", "a_rms", "aeff", "a eff")
 
 
-def spelled(text: str) -> str:
+def spell_unit(text: str) -> str:
     """A unit as drives write it in the spelling of this module: "U/min" is rpm, "increments" a plain number."""
     return SPELLINGS.get(" ".join(text.split()).lower(), text)
 
@@ -324,7 +324,7 @@ def is_rms(text: str) -> bool:
 def known_unit(text: str) -> bool:
     """Whether text is a unit at all."""
     try:
-        unit(spelled(text))
+        unit(spell_unit(text))
     except InputError:
         return False
     return True
@@ -374,7 +374,7 @@ class Variable:
 @cache
 def table(unit: str) -> Mapping[str, Variable]:
     """Name -> variable of a shipped unit, in the order of its table. InputError: the tables have not been made yet."""
-    return {name: Variable(**entry) for name, entry in _read()[unit].items()}
+    return {name: Variable(**entry) for name, entry in _read_tables()[unit].items()}
 
 
 def parameters(unit: str) -> Mapping[str, Variable]:
@@ -384,14 +384,14 @@ def parameters(unit: str) -> Mapping[str, Variable]:
 
 def cycle() -> Mapping[str, list[list[Any]]]:
     """Rows of the control cycle by their tables (src/machine_fmu/cycle.h, which says what they mean)."""
-    rows: dict[str, list[list[Any]]] = _read()["machine/cycle"]
+    rows: dict[str, list[list[Any]]] = _read_tables()["machine/cycle"]
     return rows
 
 
 @cache
-def _read() -> dict[str, Any]:
+def _read_tables() -> dict[str, Any]:
     try:
         content: dict[str, Any] = json.loads(FILE.read_bytes())
     except FileNotFoundError:
-        raise InputError(f"{FILE} is missing; {mend('it from the tables of the units')}") from None
+        raise InputError(f"{FILE} is missing; {repair_advice('it from the tables of the units')}") from None
     return content

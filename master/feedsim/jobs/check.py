@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from feedsim import analysis
 from feedsim.files.source import is_study
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, File, MachineChoice, Option, Settings, Watch, job
-from feedsim.jobs.result import announce
-from feedsim.jobs.run import on_machine, opened
+from feedsim.jobs.result import announce_programs
+from feedsim.jobs.run import on_machine, open_run
 from feedsim.scenario import Scenario
 from feedsim.simulation import judge
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckReport:
     """What can be said of a valid scenario or study before it is run. A faulty one raises InputError instead.
 
     Attributes:
@@ -60,7 +60,7 @@ def check(
     row: Annotated[int | None, Option("RUN", "of a study: print the command that makes this one run by itself")] = None,
     fmus: Archives = None,
     watch: Watch = NO_WATCH,
-) -> Checked:
+) -> CheckReport:
     """Check a scenario, an SSP or a study, its machine and its motion without running it.
 
     The shipped units judge their parameters. No program of another maker is executed; a finding says what is therefore
@@ -84,8 +84,8 @@ def check(
         return _study(Path(scenario), changes, runs, trial, row, None if fmus is None else Path(fmus), watch)
     for name, value in (("runs", runs), ("trial", "" if trial else None), ("row", row)):
         if value is not None:
-            raise InputError(f"{f'{spelt(name)} {value}'.strip()}: is for a study; {scenario} is none")
-    with opened(scenario, changes, fmus) as subject:
+            raise InputError(f"{f'{spell_argument(name)} {value}'.strip()}: is for a study; {scenario} is none")
+    with open_run(scenario, changes, fmus) as subject:
         plan, program = subject.plan, subject.program
         analysis.check(plan, program)
         warnings = (*subject.warnings(judge.check(plan, program, fmus=subject.fmus)), *analysis.program_notes(program))
@@ -96,40 +96,42 @@ def check(
         if any(warning.code == "unit-not-checked" for warning in warnings)
         else ""
     )
-    return Checked([f"{shown}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"], warnings)
+    return CheckReport([f"{shown}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"], warnings)
 
 
 def _study(
     file: Path, changes: list[str], runs: int | None, trial: bool, row: int | None, fmus: Path | None, watch: Watch
-) -> Checked:
+) -> CheckReport:
     """A study, its scenario, and a run from the middle; with `trial` some that are made; or the command of one run."""
     from feedsim.design.sweep import design
     from feedsim.design.sweep import trial as trials
     from feedsim.scenario.study import load_study
 
     if trial and row is not None:
-        raise InputError(f"{spelt('trial')} and {spelt('row')} {row}: one of them; a row is not made, but named")
+        raise InputError(
+            f"{spell_argument('trial')} and {spell_argument('row')} {row}: one of them; a row is not made, but named"
+        )
     study = load_study(file, changes, runs=runs)
     planned = design(study)
     if row is not None:
-        return Checked([_command(study, planned, row, fmus)], study.warnings)
+        return CheckReport([_command(study, planned, row, fmus)], study.warnings)
     head = f"{file}: valid; {planned.runs} runs of {study.scenario}"
     if trial:
-        announce(watch, study.base.scenario.machine, fmus, study.base.scenario.coupling)
+        announce_programs(watch, study.base.scenario.machine, fmus, study.base.scenario.coupling)
         tried = _trial(study, planned, fmus)
-        return Checked([head, *tried.answers], (*study.warnings, *tried.findings))
+        return CheckReport([head, *tried.answers], (*study.warnings, *tried.findings))
     run, warnings, failed = trials.check(study, planned, fmus)
     refused = [
         Finding("run-refused", "doubt", f"run {other} is refused, run {run} is not: {why}", f"run {other}")
         for other, why in failed.items()
     ]
-    return Checked([head], (*study.warnings, *refused, *warnings))
+    return CheckReport([head], (*study.warnings, *refused, *warnings))
 
 
 def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
     """The command that makes one run of a study: the same figures, bit for bit."""
     if not 0 <= row < planned.runs:
-        raise InputError(f"{spelt('row')} {row} is outside the allowed range: from 0 to {planned.runs - 1}")
+        raise InputError(f"{spell_argument('row')} {row} is outside the allowed range: from 0 to {planned.runs - 1}")
     words = ["feedsim", "run", str(study.scenario)]
     words += ["--fmus", str(fmus)] if fmus is not None else []
     for option in (*study.settings, *study.overrides, *planned.options(row)):
@@ -137,7 +139,7 @@ def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
     return shlex.join([*words, "--out", str(Path("results") / f"{study.file.stem}_{row}")])
 
 
-def _trial(study: Study, planned: Design, fmus: Path | None) -> Checked:
+def _trial(study: Study, planned: Design, fmus: Path | None) -> CheckReport:
     """What the study is, and how long it would take by the durations of some runs."""
     from feedsim.design.sweep.table import chosen
     from feedsim.design.sweep.trial import trial
@@ -164,7 +166,7 @@ def _trial(study: Study, planned: Design, fmus: Path | None) -> Checked:
     fails = (
         Finding("run-fails", "doubt", f"run {run} fails: {why}", f"run {run}") for run, why in result.failed.items()
     )
-    return Checked(lines, tuple(fails))
+    return CheckReport(lines, tuple(fails))
 
 
 def _range(least: float, most: float, shown: Callable[[float], str]) -> str:

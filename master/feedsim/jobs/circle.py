@@ -8,16 +8,27 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated
 
-from feedsim.analysis import Diagnosis, Named
-from feedsim.analysis.circle import diagnose, further
+from feedsim.analysis import Diagnosis, FigureTable
+from feedsim.analysis.circle import diagnose, suggest_circles
 from feedsim.analysis.circle.records import SAME_FEED, RecordedCircle, read_circle
 from feedsim.analysis.circle.words import Change
 from feedsim.analysis.circularity import axis_letters
 from feedsim.files.columns import load_columns
-from feedsim.foundation.arguments import Pairs, Value, lengths, listed, pairs, quantity, spelt
+from feedsim.foundation.arguments import Pairs, Value, lengths, pairs, quantity, spell_argument, split_names
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Argument,
+    ControlName,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Watch,
+    job,
+    output_option,
+)
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report import circle as page
 from feedsim.report.page import sheet_html
 from feedsim.report.results import Content
@@ -48,10 +59,10 @@ class CircleDiagnosis:
         return [] if self.after is None else page.changes_of(self.taken, self.after.taken)
 
     @cached_property
-    def taken(self) -> page.Taken:
+    def taken(self) -> page.DiagnosedRecords:
         """With its figures."""
         figures = page.figures_of(self.recorded, self.diagnosis)
-        return page.Taken(self.recorded, self.diagnosis, figures, self.records)
+        return page.DiagnosedRecords(self.recorded, self.diagnosis, figures, self.records)
 
 
 def result_of(circle: CircleDiagnosis) -> Result[CircleDiagnosis]:
@@ -63,14 +74,16 @@ def result_of(circle: CircleDiagnosis) -> Result[CircleDiagnosis]:
         KIND,
         circle,
         lambda: page.report_of(circle.recorded, diagnosis, circle.taken.figures, circle.records),
-        figures=Named(circle.taken.figures),
+        figures=FigureTable(circle.taken.figures),
         details=lambda: page.details(circle.recorded, diagnosis, circle.records),
         inputs=circle.records,
-        rows=[*further(diagnosis), *(f"  {note}" for note in circle.recorded.notes)],
+        rows=[*suggest_circles(diagnosis), *(f"  {note}" for note in circle.recorded.notes)],
     )
 
 
-def _result_of_both(circle: CircleDiagnosis, before: page.Taken, after: page.Taken) -> Result[CircleDiagnosis]:
+def _result_of_both(
+    circle: CircleDiagnosis, before: page.DiagnosedRecords, after: page.DiagnosedRecords
+) -> Result[CircleDiagnosis]:
     """What a change has done to a circle; figures of the records after it are "after.XY.G", ..."""
     inputs = [*before.files, *after.files]
 
@@ -83,7 +96,7 @@ def _result_of_both(circle: CircleDiagnosis, before: page.Taken, after: page.Tak
         KIND,
         circle,
         partial(page.report_of_both, before, after),
-        figures=Named({**before.figures, **{f"after.{name}": one for name, one in after.figures.items()}}),
+        figures=FigureTable({**before.figures, **{f"after.{name}": one for name, one in after.figures.items()}}),
         details=lambda: {
             **page.details(circle.recorded, circle.diagnosis, inputs),
             "changed": page.changes_part(before, after),
@@ -115,7 +128,7 @@ def circle(
         File | Sequence[File],
         Option("MAPPING.yaml", "which columns of the records are what; one for each axis (docs/traces.md)", many=True),
     ] = (),
-    out: Annotated[File | None, out("circle_{records}")] = None,
+    out: Annotated[File | None, output_option("circle_{records}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
@@ -143,9 +156,9 @@ def circle(
     >>> result.figures["XZ.servo_mismatch"].unit
     'ms'
     """
-    plane = listed(axes)
+    plane = split_names(axes)
     if len(plane) != 2 or plane[0] == plane[1]:
-        option = spelt("axes")
+        option = spell_argument("axes")
         raise InputError(
             f"{option} {','.join(plane)}: two different axes of the plane are needed, for example {option} X,Z"
         )
@@ -155,11 +168,12 @@ def circle(
     for name, values in (("centre", about), ("pitch", pitches)):
         if other := [axis for axis in values if axis not in plane]:
             raise InputError(
-                f"{spelt(name)}: {other[0]} is no axis of the plane; {spelt('axes')} says {', '.join(plane)}"
+                f"{spell_argument(name)}: {other[0]} is no axis of the plane; {spell_argument('axes')} says "
+                f"{', '.join(plane)}"
             )
     if about and len(about) != 2:
         raise InputError(
-            f"{spelt('centre')}: is given of {' and '.join(about)} alone; give it of {plane[0]} and {plane[1]}"
+            f"{spell_argument('centre')}: is given of {' and '.join(about)} alone; give it of {plane[0]} and {plane[1]}"
         )
     r = None if radius is None else quantity("radius", radius, "m", "150 mm", positive=True)
     v = None if feed is None else quantity("feed", feed, "m/s", "1000 mm/min", positive=True)
@@ -180,14 +194,15 @@ def circle(
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
         return CircleDiagnosis(recorded, diagnosis, from_files)
 
-    with kept(out, KIND, watch, [*files, *later, *mappings], force=force):
+    with claim_result_folder(out, KIND, watch, [*files, *later, *mappings], force=force):
         circle = taken(files, r)
         if later:
             own = circle.recorded.circle  # its radius counts for both: files of positions do not have it
             second = taken(later, own.radius)
             if abs(second.recorded.circle.speed / own.speed - 1) > SAME_FEED:
                 raise InputError(
-                    f"{spelt('after')}: the feed is {6e4 * second.recorded.circle.speed:.4g} mm/min, that of the "
+                    f"{spell_argument('after')}: the feed is {6e4 * second.recorded.circle.speed:.4g} mm/min, "
+                    f"that of the "
                     f"records before {6e4 * own.speed:.4g} mm/min; allowed: {100 * SAME_FEED:g} % apart, as peaks and "
                     "lags grow with it"
                 )

@@ -20,9 +20,9 @@ from feedsim.comparison.shift import estimated_shift
 from feedsim.comparison.tolerance import Tolerances
 from feedsim.files.trace import Series, Trace, as_series, read_series
 from feedsim.foundation import units
-from feedsim.foundation.arguments import Value, amount, spelt
+from feedsim.foundation.arguments import Value, amount, spell_argument
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.outputs import forced, replacing
+from feedsim.foundation.outputs import allow_replacement, is_replacement_allowed
 from feedsim.jobs.parameters import Argument, Force, Option, job
 from feedsim.jobs.result import Kind, Result
 from feedsim.report import compare as page
@@ -92,9 +92,9 @@ def result_of(value: Comparisons) -> Result[Comparisons]:
     pairs = value.comparisons
 
     def figures() -> Figures:
-        from feedsim.analysis import Figure, Named
+        from feedsim.analysis import Figure, FigureTable
 
-        return Named(
+        return FigureTable(
             (
                 variable.name if len(pairs) == 1 else f"{pair.result}: {variable.name}",
                 Figure(variable.deviation, variable.unit, f"largest deviation; allowed {variable.allowed:.4g}"),
@@ -257,8 +257,8 @@ def compare(
     for option, given in (("axes", axes), ("machine", machine)):
         if given is not None and columns is None and reference_columns is None:
             raise InputError(
-                f"{spelt(option)} {given}: is for the record of a drive; {spelt('columns')} or "
-                f"{spelt('reference_columns')} says which"
+                f"{spell_argument(option)} {given}: is for the record of a drive; {spell_argument('columns')} or "
+                f"{spell_argument('reference_columns')} says which"
             )
     choice = Options(
         columns=_pairs("column", column, "RESULT=REFERENCE"),
@@ -275,7 +275,7 @@ def compare(
         at=at,
         cover=_share(cover),
     )
-    asked = _Asked(
+    asked = _ShiftOptions(
         texts,
         None if tolerances is None else Path(tolerances),
         choice,
@@ -289,7 +289,7 @@ def compare(
     paths = [Path(file) for file in files if isinstance(file, str | Path)]
     outputs = {name: None if file is None else Path(file) for name, file in
                (("html", report), ("xml", junit))}  # fmt: skip
-    with replacing(force or forced()):
+    with allow_replacement(force or is_replacement_allowed()):
         if len(paths) < len(files):
             comparisons, durations = asked.in_memory(files)
             page.check_writable(outputs, paths)
@@ -312,7 +312,7 @@ class _Side:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _ShiftOptions:
     """How pairs are compared. most: the largest shift that is estimated [s]; None: none is."""
 
     tol: Sequence[str]
@@ -353,7 +353,7 @@ class _Asked:
             names = tuple(str(value) if isinstance(value, str | Path) else what
                           for value, what in ((result, "result"), (reference, "reference")))  # fmt: skip
             limits = tolerances_of(Path("reference"), self.tolerances, self.tol)
-            choice, notes = self._shifted(ours, theirs, limits)
+            choice, notes = self._estimate_shift(ours, theirs, limits)
             comparison = compared(ours, theirs, limits, choice, names=(names[0], names[1]))
             comparisons.append(replace(comparison, notes=(*notes, *comparison.notes)))
             durations.append(perf_counter() - begin)
@@ -363,14 +363,14 @@ class _Asked:
         limits = tolerances_of(reference, self.tolerances, self.tol)
         ours = self._read(result, self.ours)
         theirs = self._read(reference, self.theirs)
-        choice, notes = self._shifted(ours, theirs, limits)
+        choice, notes = self._estimate_shift(ours, theirs, limits)
         between = bounds_of(reference) if self.theirs.mapping is None else None
         comparison = compare_series(ours, theirs, limits, choice, between=between, names=(str(result), str(reference)))
         if result.exists() and result.samefile(reference):
             notes.append("result and reference are the same file")
         return replace(comparison, notes=(*notes, *comparison.notes))
 
-    def _shifted(self, ours: Series, theirs: Series, limits: Tolerances) -> tuple[Options, list[str]]:
+    def _estimate_shift(self, ours: Series, theirs: Series, limits: Tolerances) -> tuple[Options, list[str]]:
         """The choice with the shift that is estimated, and a note on it."""
         if self.most is None:
             return self.choice, []
@@ -401,7 +401,7 @@ def _pairs(option: str, given: Pairs, form: str) -> list[tuple[str, str]]:
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
-            raise InputError(f"{spelt(option)} {text}: {form} is needed")
+            raise InputError(f"{spell_argument(option)} {text}: {form} is needed")
         result.append((name, value))
     return result
 
@@ -421,7 +421,7 @@ def _share(value: Value) -> float:
     """Of 0.9, "90 %" or "0.9". InputError."""
     share = amount(value, "1", "90 %")
     if not 0 <= share <= 1:
-        raise InputError(f"{spelt('cover')} {value}: is outside the allowed range: 0 to 100 %")
+        raise InputError(f"{spell_argument('cover')} {value}: is outside the allowed range: 0 to 100 %")
     return share
 
 
@@ -431,7 +431,7 @@ def _matched_nowhere(comparisons: Sequence[Comparison], texts: Sequence[str]) ->
     for pattern, _ in Tolerances.parse(texts).rules:
         if compared and all(pattern in comparison.unused for comparison in compared):
             names = dict.fromkeys(variable.name for comparison in compared for variable in comparison.variables)
-            return f"{spelt('tol')} given for {no_match(pattern, tuple(names))}"
+            return f"{spell_argument('tol')} given for {no_match(pattern, tuple(names))}"
     return ""
 
 
@@ -450,7 +450,8 @@ def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | No
     named = source.axis or axis
     if not named:
         raise InputError(
-            f"{path}: the record does not say which axis it is of; give {spelt('axes')}, for example {spelt('axes')} Z"
+            f"{path}: the record does not say which axis it is of; give {spell_argument('axes')}, for example "
+            f"{spell_argument('axes')} Z"
         )
     lead = None if source.pitch is None else source.pitch / (2 * np.pi)
     pieces: dict[str, list[Array]] = {"time": []}

@@ -9,21 +9,32 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-from feedsim.analysis import Figure, Named
-from feedsim.analysis.side_by_side import Source, aligned, differing, named_apart, read_sources
+from feedsim.analysis import Figure, FigureTable
+from feedsim.analysis.side_by_side import Source, align_sources, differing_parameters, named_apart, read_sources
 from feedsim.design.sweep.bundle import case, scenario_of
 from feedsim.files.columns import Columns, load_columns
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
-from feedsim.jobs.parameters import NO_WATCH, Argument, ControlName, FigureKinds, File, Force, Option, Watch, job, out
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Argument,
+    ControlName,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Watch,
+    job,
+    output_option,
+)
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.jobs.run import EvaluatedRun
 from feedsim.jobs.run import result_of as result_of_run
 from feedsim.report import show as page
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 
-Shown = str | Path | Result[EvaluatedRun]
+ResultSource = str | Path | Result[EvaluatedRun]
 
 
 KIND = Kind("diff")
@@ -36,7 +47,7 @@ class Overlay:
         names: of the results, in their order.
     """
 
-    def __init__(self, results: Mapping[str, Shown], mappings: Sequence[Columns] = ()) -> None:
+    def __init__(self, results: Mapping[str, ResultSource], mappings: Sequence[Columns] = ()) -> None:
         """results: name -> a result, its folder, or a CSV file. mappings: which columns of records are what.
 
         Raises InputError: nothing, or what is no result.
@@ -46,9 +57,9 @@ class Overlay:
         self.names = tuple(results)
         # The report reads results from where they are written; those of a prompt are written for as long as this lives.
         self._folder = TemporaryFolder()
-        paths = [_at(value, self._folder.path / str(k)) for k, value in enumerate(results.values())]
+        paths = [_result_path(value, self._folder.path / str(k)) for k, value in enumerate(results.values())]
         result = zip(self.names, read_sources(paths, mappings), strict=True)
-        self.sources = aligned([replace(source, name=name) for name, source in result])
+        self.sources = align_sources([replace(source, name=name) for name, source in result])
 
     @property
     def side_by_side(self) -> dict[str, tuple[Figure | None, ...]]:
@@ -59,7 +70,7 @@ class Overlay:
     @property
     def parameters(self) -> dict[str, tuple[str, ...]]:
         """Parameters in which the results differ: name -> the value of every result, "" of records."""
-        return {name: tuple(values) for name, values in differing(self.sources)}
+        return {name: tuple(values) for name, values in differing_parameters(self.sources)}
 
 
 Laid = TypeVar("Laid", bound=Overlay)
@@ -81,7 +92,7 @@ def result_of(
         KIND,
         over,
         partial(page.report_of, sources),
-        figures=Named(
+        figures=FigureTable(
             (name, Figure(*source.figures[name], "")) for source in reversed(sources) for name in source.figures
         ),
         details=partial(page.details, sources),
@@ -95,18 +106,19 @@ def result_of(
 @job("what differs between results and records, for people")
 def diff(
     *results: Annotated[
-        Shown, Argument("RESULT", "folder of feedsim run, CSV file with a column of time, or run of a study", many=True)
+        ResultSource,
+        Argument("RESULT", "folder of feedsim run, CSV file with a column of time, or run of a study", many=True),
     ],
     columns: Annotated[
         File | Sequence[File],
         Option("MAPPING.yaml", "which columns of the records are what; one for each axis (docs/traces.md)", many=True),
     ] = (),
-    out: Annotated[File | None, out("diff")] = None,
+    out: Annotated[File | None, output_option("diff")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-    **named: Shown,
+    **named: ResultSource,
 ) -> Result[Overlay]:
     """Lay results over each other.
 
@@ -138,14 +150,14 @@ def diff(
         raise InputError(
             f"a result of kind {other[0]} cannot be laid over others; runs, their folders and CSV files can"
         )
-    given: dict[str, Shown] = {}
+    given: dict[str, ResultSource] = {}
     files = list(dict.fromkeys(str(result) for result in results if not isinstance(result, Result)))
     names = dict(zip(files, named_apart([Path(file) for file in files]), strict=True))
     for run_result in results:
         plain = (
             run_result.scenario.name
             if isinstance(run_result, Result)
-            else _called(str(run_result), names[str(run_result)])
+            else _display_name(str(run_result), names[str(run_result)])
         )
         same = sum(re.fullmatch(rf"{re.escape(plain)}( \(\d+\))?", name) is not None for name in given)
         given[f"{plain} ({same + 1})" if same else plain] = run_result
@@ -156,24 +168,24 @@ def diff(
     mappings = [columns] if isinstance(columns, str | Path) else columns
     over = result_of(Overlay(given, [load_columns(file) for file in mappings]))
     if out is not None:
-        with kept(out, KIND, watch, over.inputs, force=force):
+        with claim_result_folder(out, KIND, watch, over.inputs, force=force):
             over.save(out, figures=figures, force=force, control=control)
     return over
 
 
-def _called(text: str, name: str) -> str:
+def _display_name(text: str, name: str) -> str:
     chosen = case(text)
     return name if chosen is None else chosen.name
 
 
-def _at(entry: Shown, folder: Path) -> Path:
+def _result_path(entry: ResultSource, folder: Path) -> Path:
     """Where a result stands; one of the prompt, and a run of a study, is written there."""
     if not isinstance(entry, Result):
         chosen = case(str(entry))
         if chosen is None:
             return Path(entry)
         scenario, fmus = scenario_of(chosen)
-        entry = result_of_run(EvaluatedRun.of(judged(cosim.run(scenario, fmus=fmus))))
+        entry = result_of_run(EvaluatedRun.of(judge_run(cosim.run(scenario, fmus=fmus))))
     entry.save(folder)
     return folder
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-from feedsim.files.source import at, is_program, places, read
+from feedsim.files.source import is_program, places, read_yaml, value_at
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.installation import mend, shipped
-from feedsim.foundation.owned import held
+from feedsim.foundation.installation import repair_advice, shipped
+from feedsim.foundation.owned import defer_signals
 
 # Kind -> the file that stands for one, in the folder of all of them; of a kind whose files lie in a folder each, that
 # folder is the example.
@@ -60,12 +60,12 @@ def examples() -> list[Example]:
     """
     root = shipped("scenarios")
     result = [
-        Example(file.parent.name if kind in _IN_FOLDERS else file.stem, kind, file, _about(file))
+        Example(file.parent.name if kind in _IN_FOLDERS else file.stem, kind, file, _describe_example(file))
         for kind, pattern in _KINDS.items()
         for file in sorted(root.glob(pattern))
     ]
     if not result:
-        raise InputError(f"{root}: has no scenarios; {mend('them')}")
+        raise InputError(f"{root}: has no scenarios; {repair_advice('them')}")
     return result
 
 
@@ -106,15 +106,17 @@ def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
     """
     root, folder = shipped("scenarios"), Path(folder)
     names = [names] if isinstance(names, str) else names
-    contents = {folder / file.relative_to(root): file.read_bytes() for file in _needed(_asked(names), root)}
-    if changed := [path for path in contents if _exists(path) and not _holds(path, contents[path])]:
+    contents = {
+        folder / file.relative_to(root): file.read_bytes() for file in _collect_files(_select_examples(names), root)
+    }
+    if changed := [path for path in contents if _exists(path) and not _has_content(path, contents[path])]:
         raise OutputError(
             f"{', '.join(map(str, changed))}: there already, with another content; nothing is overwritten, "
             "--to takes another folder"
         )
     written: list[Path] = []
     try:
-        with held():
+        with defer_signals():
             for path, content in contents.items():
                 if not _exists(path):
                     path.parent.mkdir(parents=True, exist_ok=True)
@@ -129,7 +131,7 @@ def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
     return written
 
 
-def _asked(names: Iterable[str]) -> list[Example]:
+def _select_examples(names: Iterable[str]) -> list[Example]:
     known = examples()
     result: list[Example] = []
     for name in names:
@@ -142,7 +144,7 @@ def _asked(names: Iterable[str]) -> list[Example]:
     return result
 
 
-def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
+def _collect_files(asked: Iterable[Example], root: Path) -> list[Path]:
     """What stands for the examples, and every file that one of them names, or that lies in a folder that it names."""
     waiting = [example.file for example in asked]
     result: dict[Path, None] = {}
@@ -157,17 +159,17 @@ def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
             waiting.append(root / MACHINE_OF_PROGRAMS)
         if file.suffix == ".yaml":
             waiting += _schema(file)
-            for named in _named(file):
+            for named in _named_files(file):
                 inside = [named] if named.is_file() else [other for other in named.rglob("*") if other.is_file()]
                 waiting += [other for other in inside if other.is_relative_to(root)]
     return sorted(result)
 
 
-def _named(file: Path) -> Iterator[Path]:
+def _named_files(file: Path) -> Iterator[Path]:
     """Files and folders that texts of a YAML file name."""
-    data = read(file).data
+    data = read_yaml(file).data
     for place in places(data):
-        text = at(data, place)
+        text = value_at(data, place)
         if isinstance(text, str) and re.fullmatch(r"[\w./-]+", text) and (file.parent / text).exists():
             yield (file.parent / text).resolve()
 
@@ -179,7 +181,7 @@ def _schema(file: Path) -> list[Path]:
     return [(file.parent / said[1]).resolve()] if said else []
 
 
-def _about(file: Path) -> str:
+def _describe_example(file: Path) -> str:
     """The first sentence of the comment that a file begins with, or of a notebook's text below its heading."""
     if file.suffix == ".ipynb":
         _, _, text = "".join(json.loads(file.read_text(encoding="utf-8"))["cells"][0]["source"]).partition("\n\n")
@@ -200,7 +202,7 @@ def _exists(path: Path) -> bool:
     return path.exists() or path.is_symlink()
 
 
-def _holds(path: Path, content: bytes) -> bool:
+def _has_content(path: Path, content: bytes) -> bool:
     try:
         return path.read_bytes() == content
     except OSError:

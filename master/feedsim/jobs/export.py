@@ -11,9 +11,9 @@ from feedsim import scenario
 from feedsim.analysis import check
 from feedsim.files.source import is_ssp
 from feedsim.foundation import units
-from feedsim.foundation.arguments import Changes, Pairs, Value, by_name, listed, pairs, settings, spelt
+from feedsim.foundation.arguments import Changes, Pairs, Value, by_name, pairs, settings, spell_argument, split_names
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.outputs import archive_with, begins_with, same
+from feedsim.foundation.outputs import archive_with, begins_with, is_same_file
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.machine import positions
 from feedsim.jobs.parameters import (
@@ -40,8 +40,8 @@ from feedsim.scenario.load import load, load_described
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation import cosim, judge, nc, ssp
 from feedsim.simulation.cosim.whole import UNIT, pack_whole
-from feedsim.simulation.judge import judged
-from feedsim.simulation.ssp import Exported
+from feedsim.simulation.judge import judge_run
+from feedsim.simulation.ssp import ExportedSystem
 from feedsim.simulation.ssp.archive import STRUCTURE
 from feedsim.structure import checked_modes
 from feedsim.structure import pack as archive
@@ -156,7 +156,9 @@ def export(
     """
     ending = f".{kind}" if out is None else Path(out).suffix.lower()
     if ending not in ENDINGS:
-        raise InputError(f"{spelt('out')} {out}: the name must end in {', '.join(ENDINGS)}, which says what is written")
+        raise InputError(
+            f"{spell_argument('out')} {out}: the name must end in {', '.join(ENDINGS)}, which says what is written"
+        )
     given: dict[str, Any] = {
         "inputs": inputs, "plant": plant, "base": base, "at": at, "poses": poses, "name": name, "note": note,
         "one": one, "knobs": knobs, "terminals": not terminals,
@@ -164,12 +166,14 @@ def export(
     asked = {key: value for key, value in given.items() if value}
     known = (*ENDINGS[ending], *(OF_PLANT if plant else ()))
     if plant and inputs:
-        raise InputError(f"{spelt('inputs')}: {spelt('plant')} has no motion to leave out")
+        raise InputError(f"{spell_argument('inputs')}: {spell_argument('plant')} has no motion to leave out")
     if wrong := next((key for key in asked if key not in known), ""):
         needs = (
-            f"{spelt('plant')}" if wrong in OF_PLANT else next(end for end, keys in ENDINGS.items() if wrong in keys)
+            f"{spell_argument('plant')}"
+            if wrong in OF_PLANT
+            else next(end for end, keys in ENDINGS.items() if wrong in keys)
         )
-        raise InputError(f"{spelt(wrong)}: is for {needs}, not for {ending}")
+        raise InputError(f"{spell_argument(wrong)}: is for {needs}, not for {ending}")
     set = on_machine(machine, set)
     if ending == ".ssp":
         return write_ssp(subject, out, one=one, fmus=fmus, set=set, force=force)
@@ -178,7 +182,8 @@ def export(
     if plant:
         if set:
             raise InputError(
-                f"{spelt('set')}: changes are for a scenario; {spelt('plant')} takes the machine file as it is"
+                f"{spell_argument('set')}: changes are for a scenario; {spell_argument('plant')} takes the "
+                f"machine file as it is"
             )
         return machine_pack(
             subject,
@@ -201,8 +206,8 @@ def export(
 # --- A scenario, or a machine, as one unit for other people's simulators ----------------------------------------------
 
 
-PACKED = archive_with("modelDescription.xml", b'generationTool="feedsim')
-UNIT_KIND = MadeKind("pack", "unit", PACKED)
+IS_PACKED_UNIT = archive_with("modelDescription.xml", b'generationTool="feedsim')
+UNIT_KIND = MadeKind("pack", "unit", IS_PACKED_UNIT)
 
 
 def pack(
@@ -329,14 +334,14 @@ def write_page(
     """
     PAGE_KIND.check_folder(out)
     file, archives = Path(scenario), None if fmus is None else Path(fmus)
-    wanted = listed(knobs)
+    wanted = split_names(knobs)
     asked = load(file, settings(set))
     read = [file, *input_paths(asked)]
     with PAGE_KIND.checked(out, read, force=force) as path:
         program = nc.plan(asked)
         content(asked, program, wanted, archives)  # what cannot be shown should not be run
         check(asked, program)
-        run = judged(cosim.run(asked, program=program, fmus=archives, progress=watch.of("simulation")))
+        run = judge_run(cosim.run(asked, program=program, fmus=archives, progress=watch.of("simulation")))
         page_of_run = page(run, wanted, archives)
         line = f"{len(page_of_run) / 1000:.0f} kB; axes {', '.join(asked.machine.axes)}; open it in a browser"
         made = Made(PAGE_KIND, f"{file.stem}.html", page_of_run, [line], run.warnings, inputs=read)
@@ -380,7 +385,7 @@ def write_ssp(
     b'PK'
     """
     if out is not None and not is_ssp(Path(out)):
-        raise InputError(f"{spelt('out')} {out}: an SSP file ends in .ssp; simulators recognise it by that")
+        raise InputError(f"{spell_argument('out')} {out}: an SSP file ends in .ssp; simulators recognise it by that")
     file = Path(scenario)
     if is_ssp(file):
         raise InputError(f"{file}: is an SSP file already; a scenario is expected")
@@ -392,7 +397,7 @@ def write_ssp(
             done = ssp.export(plan, folder / "machine.ssp", fmus=None if fmus is None else Path(fmus))
             content = done.path.read_bytes()
         line = (
-            f"{done.size / 1024:.0f} KiB, {_inside(done, plan.machine.cycles.T_c)}; "
+            f"{done.size / 1024:.0f} KiB, {_describe_system(done, plan.machine.cycles.T_c)}; "
             f"runs on {', '.join(done.platforms) or 'no platform'}"
         )
         made = Made(SSP_KIND, f"{file.stem}.ssp", content, [line], done.warnings, inputs=read)
@@ -401,7 +406,7 @@ def write_ssp(
     return made
 
 
-def _inside(done: Exported, T_c: float) -> str:
+def _describe_system(done: ExportedSystem, T_c: float) -> str:
     if len(done.instances) == 1:
         return f"one instance, {done.duration:.4g} s at any step; parameters in its archive"
     return (
@@ -412,7 +417,7 @@ def _inside(done: Exported, T_c: float) -> str:
 # --- A machine at a pose, or over a grid of poses, in a plant archive -------------------------------------------------
 
 
-PLANT_KIND = MadeKind("machine pack", "unit", PACKED, makes_folder=True)
+PLANT_KIND = MadeKind("machine pack", "unit", IS_PACKED_UNIT, makes_folder=True)
 # A cell takes a tenth of a second and, with two axes and a hundred modes, 0.2 MB in the archive and in the plant.
 MOST_CELLS = 3000
 # Positions that are typed twice are the same where they differ by less [m].
@@ -461,7 +466,7 @@ def machine_pack(
     own = None if base is None else Path(base)
     # The archive that the machine file names as its plant, and one that is packed in place, are made anew here.
     made = [path for path in (loaded.plant, own) if path is not None]
-    files = [file for _, file in described.files if not any(same(file, path) for path in made)]
+    files = [file for _, file in described.files if not any(is_same_file(file, path) for path in made)]
     read = [Path(machine), loaded.modes, *files]
     with PLANT_KIND.checked(out, read, force=force) as path:
         announce_archive(watch, own, "the packed plant's trial")
@@ -471,12 +476,13 @@ def machine_pack(
             # what a run would refuse should not be packed
             checked_modes(loaded.model_copy(update={"modes": modes} | ({"mounts": None} if at else {})))
             if not at and (doubt := table_mismatch(loaded)) is not None:
-                raise InputError(f"{doubt}, or let the modes be computed: {spelt('at')}")
+                raise InputError(f"{doubt}, or let the modes be computed: {spell_argument('at')}")
             mounts = folder / MOUNTS_FILE if at and loaded.mounts_table is not None else loaded.mounts_table
             grid, follows = None, ""
             if poses and mounts is not None:
                 raise InputError(
-                    f"{spelt('poses')}: {loaded.name} has mounts that are not linear ({loaded.mounts_table}), which "
+                    f"{spell_argument('poses')}: {loaded.name} has mounts that are not linear "
+                    f"({loaded.mounts_table}), which "
                     "belong to one pose; leave one of the two out"
                 )
             if poses:
@@ -514,11 +520,11 @@ def _pose_of(machine: Machine, at: Positions) -> dict[str, float]:
     pose = {axis: machine.pose[axis] for axis in machine.axes}
     for axis, position in positions(at).items():
         if axis not in pose:
-            raise InputError(f"{spelt('at')}: the machine has no axis {axis}; axes are {', '.join(pose)}")
+            raise InputError(f"{spell_argument('at')}: the machine has no axis {axis}; axes are {', '.join(pose)}")
         low, high = machine.axes[axis].travel
         if not low <= position <= high:
             raise InputError(
-                f"{spelt('at')} {axis}: {units.show(position, 'm')} is outside of the travel, "
+                f"{spell_argument('at')} {axis}: {units.show(position, 'm')} is outside of the travel, "
                 f"{units.show(low, 'm')} to {units.show(high, 'm')}"
             )
         pose[axis] = position
@@ -535,7 +541,7 @@ def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
     if machine.structure is None:
         raise InputError(
             f"{machine.name}: has no structure to compute modes from at another pose; give it the key structure, or "
-            f"leave {spelt('at')} out"
+            f"leave {spell_argument('at')} out"
         )
     built = build(load_structure(machine.structure), pose)
     write_modes(out, built.solution.modes)
@@ -561,7 +567,7 @@ def _write_grid(
     if machine.structure is None:
         raise InputError(
             f"{machine.name}: has no structure to compute the modes of other poses from; give the machine file the key "
-            f"structure, or leave {spelt('poses')} out"
+            f"structure, or leave {spell_argument('poses')} out"
         )
     structure = load_structure(machine.structure)
     movable(structure)
@@ -584,16 +590,17 @@ def _size(machine: Machine, pose: Mapping[str, float], grid: Sequence[GridAxis],
         low, high = axis.reach
         if not low - START_TOLERANCE <= pose[axis.axis] <= high + START_TOLERANCE:
             raise InputError(
-                f"{spelt('poses')}: the machine stands at {axis.axis} {pose[axis.axis] * 1e3:.6g} mm, outside of the "
+                f"{spell_argument('poses')}: the machine stands at {axis.axis} {pose[axis.axis] * 1e3:.6g} mm, "
+                f"outside of the "
                 f"grid, {low * 1e3:.6g} mm to {high * 1e3:.6g} mm; choose a range that holds it, or another pose with "
-                f"{spelt('at')}"
+                f"{spell_argument('at')}"
             )
     cells = math.prod(len(axis.centres) for axis in grid)
     numbers = cells * (1 + count * (5 + 2 * len(machine.axes)) + len(grid) * count**2)
     size = f"{cells} cells of about {count} modes, about {8 * numbers / 2**20:.3g} MiB"
     if cells > MOST_CELLS:
         raise InputError(
-            f"{spelt('poses')}: {size}; at most {MOST_CELLS} cells are allowed: larger cells, or fewer axes"
+            f"{spell_argument('poses')}: {size}; at most {MOST_CELLS} cells are allowed: larger cells, or fewer axes"
         )
     return size
 

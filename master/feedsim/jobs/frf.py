@@ -8,13 +8,21 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from feedsim.analysis import Named, linear, responses, truncation
+from feedsim.analysis import FigureTable, linear, responses, truncation
 from feedsim.analysis.campaign import Plan, run_campaign
 from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
 from feedsim.analysis.truncation import Truncation
 from feedsim.files.trace import Array
 from feedsim.files.trace.response import Complexes, FrequencyResponse
-from feedsim.foundation.arguments import Band, Value, between, listed, quantity, settings, spelt
+from feedsim.foundation.arguments import (
+    Band,
+    Value,
+    parse_frequency_band,
+    quantity,
+    settings,
+    spell_argument,
+    split_names,
+)
 from feedsim.foundation.errors import FeedsimError, Finding, InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -27,15 +35,15 @@ from feedsim.jobs.parameters import (
     SubjectArgument,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.scenario import Coupling, Machine, Subject, load_subject
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation.cosim.plant import plant_modes
-from feedsim.simulation.judge import control as control_findings
+from feedsim.simulation.judge import warn_control_loops as control_findings
 from feedsim.structure.pose_change import table_mismatch
 
 REALISATIONS_WITH_FRICTION = 4
@@ -102,7 +110,7 @@ def result_of(value: MachineResponses) -> Result[MachineResponses]:
         KIND,
         value,
         lambda: page.report_of(subject, responses, page.draw(responses)),
-        figures=Named(responses.figures),
+        figures=FigureTable(responses.figures),
         details=partial(page.details, subject, responses),
         files=partial(page.files_of, responses),
         inputs=[*(file for _, file in subject.files), *(overlay.file for overlay in responses.overlays)],
@@ -197,7 +205,7 @@ def frf(
         ),
     ] = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("frf_{subject}")] = None,
+    out: Annotated[File | None, output_option("frf_{subject}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
@@ -247,7 +255,9 @@ def frf(
     if mount_amplitude is not None:
         deflection = quantity("mount_amplitude", mount_amplitude, "m", "10 um", positive=True)
         if machine.mounts is None:
-            raise InputError(f"{spelt('mount_amplitude')}: the machine has no mounts that are not linear (key mounts)")
+            raise InputError(
+                f"{spell_argument('mount_amplitude')}: the machine has no mounts that are not linear (key mounts)"
+            )
     modes, doubts = plant_modes(machine, deflection)
     frequency = responses.frequencies(machine, modes, plan.band, responses.BAND_RATIO)
     wanted = linear.names(chosen, tool=tool)
@@ -256,7 +266,7 @@ def frf(
     if machine.mounts is not None:
         warnings.append(mount_state(machine, deflection))
     inputs = [*(file for _, file in loaded.files), *(overlay.file for overlay in overlays)]
-    with kept(out, KIND, watch, inputs, texts, force=force):
+    with claim_result_folder(out, KIND, watch, inputs, texts, force=force):
         watch.progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
         linear_result = linear.evaluate(system, chosen)
@@ -276,7 +286,7 @@ def frf(
         full = _full_model(machine, watch, warnings) if full_model else None
         campaign = None
         if measure and not linear_result.unstable_poles:
-            announce(watch, machine, archives)
+            announce_programs(watch, machine, archives)
             coupling = loaded.scenario.coupling if loaded.scenario is not None else Coupling()
             campaign = run_campaign(
                 machine, chosen, plan, fmus=archives, progress=watch.progress, call_limit=coupling.call_limit
@@ -333,7 +343,7 @@ def mount_state(machine: Machine, deflection: float) -> Finding:
     assert machine.mounts is not None
     how = (
         f"at {1e6 * deflection:.4g} um of deflection (describing function)" if deflection
-        else f"as they are at rest; {spelt('mount_amplitude')} has them at a deflection"
+        else f"as they are at rest; {spell_argument('mount_amplitude')} has them at a deflection"
     )  # fmt: skip
     text = f"closed form and margins have the mounts of {machine.mounts.table.name}, which are not linear, {how}"
     return Finding("mounts-linearised", "doubt", text, machine.mounts.table.name)
@@ -341,11 +351,11 @@ def mount_state(machine: Machine, deflection: float) -> Finding:
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
     """The axes asked for, in the machine's order."""
-    chosen = listed(axes or ())
+    chosen = split_names(axes or ())
     for name in chosen:
         if name not in machine.axes:
             raise InputError(
-                f"{spelt('axes')} {','.join(chosen)}: no axis {name!r}; there is {', '.join(machine.axes)}"
+                f"{spell_argument('axes')} {','.join(chosen)}: no axis {name!r}; there is {', '.join(machine.axes)}"
             )
     return tuple(axis for axis in machine.axes if not chosen or axis in chosen)
 
@@ -359,12 +369,12 @@ def _band(band: Band | None, machine: Machine) -> tuple[float, float]:
     """Lowest and highest frequency [Hz]."""
     if band is None:
         return DEFAULT_LOWEST, min(DEFAULT_HIGHEST, highest_frequency(machine))
-    return between("band", band, "1 Hz", "1000 Hz")
+    return parse_frequency_band("band", band, "1 Hz", "1000 Hz")
 
 
 def _count(name: str, number: int) -> int:
     if number < 1:
-        raise InputError(f"{spelt(name)} {number}: at least 1 is needed")
+        raise InputError(f"{spell_argument(name)} {number}: at least 1 is needed")
     return number
 
 

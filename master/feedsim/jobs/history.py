@@ -13,14 +13,23 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from feedsim.analysis import Named
-from feedsim.analysis.history import Array, Scatter, Series, changes, crossing, scatter
+from feedsim.analysis import FigureTable
+from feedsim.analysis.history import Array, Scatter, Series, changes, find_limit_crossing, scatter
 from feedsim.estimation.identify.friction_file import fleet_yaml
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.files.source import json_file
 from feedsim.files.trace.trace import MAX_MAGNITUDE
-from feedsim.foundation.arguments import Pairs, Value, amount, given, listed, pairs, settings, spelt
-from feedsim.foundation.errors import Finding, InputError, few, nearest
+from feedsim.foundation.arguments import (
+    Pairs,
+    Value,
+    amount,
+    pairs,
+    prefix_argument_errors,
+    settings,
+    spell_argument,
+    split_names,
+)
+from feedsim.foundation.errors import Finding, InputError, find_nearest_name, shorten_list
 from feedsim.foundation.outputs import read_rows
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -33,12 +42,12 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.jobs.run import load, run
 from feedsim.report import history as page
-from feedsim.report.history import Entry, Followed, History
+from feedsim.report.history import Entry, FollowedValue, History
 from feedsim.report.results import SUMMARY, Content
 from feedsim.scenario import Friction, GmsFriction
 from feedsim.scenario.roles import GMS
@@ -55,7 +64,7 @@ KIND = Kind("history", page.FILES, keeps=(page.FLEET,))
 
 def result_of(history: History) -> Result[History]:
     """Results over time: values with their dates, what has changed of them, and the scatter between machines."""
-    figures = Named(page.figures_of(history))
+    figures = FigureTable(page.figures_of(history))
 
     def files() -> Mapping[str, Content]:
         fleet = {page.FLEET: fleet_yaml(page.fleet_axes(history), history.machines)} if history.scatters else {}
@@ -114,7 +123,7 @@ def history(
         ),
     ] = False,
     fmus: Archives = None,
-    out: Annotated[File | None, out("history")] = None,
+    out: Annotated[File | None, output_option("history")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
@@ -150,9 +159,11 @@ def history(
     if not entries:
         raise InputError(f"nothing to compare: a result is needed, for example {EXAMPLE}")
     if machines and (limit or scenario is not None):
-        raise InputError(f"{spelt('machines')}: limits are of one machine; leave {spelt('limit')} or it out")
+        raise InputError(
+            f"{spell_argument('machines')}: limits are of one machine; leave {spell_argument('limit')} or it out"
+        )
     _check_same(entries, machines)
-    chosen = [_called(name, entries) for name in listed(quantities)]
+    chosen = [_find_quantity(name, entries) for name in split_names(quantities)]
     files = list(dict.fromkeys(entry.file for entry in entries))
     files += [Path(scenario)] if scenario is not None else []
     texts = settings(set)
@@ -162,7 +173,7 @@ def history(
         "set": " ".join(texts), "machines": "yes" if machines else "",
     }  # fmt: skip
     asked = {name: text for name, text in asked.items() if text}
-    with kept(out, KIND, watch, files, [f"{name}={text}" for name, text in asked.items()], force=force):
+    with claim_result_folder(out, KIND, watch, files, [f"{name}={text}" for name, text in asked.items()], force=force):
         if machines:
             fields = _of_machines(entries, chosen)
         else:
@@ -187,7 +198,7 @@ def _entries(name: str) -> Iterator[Entry]:
     if path.suffix.lower() == ".csv":
         if moment is not None:
             raise InputError(f"{name}: the dates of a list stand in its column date")
-        yield from _listed(path)
+        yield from _read_list(path)
     else:
         yield _of_result(path, name, moment)
 
@@ -237,7 +248,7 @@ def _of_result(
     )
 
 
-def _values_of(kind: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Followed]]:
+def _values_of(kind: str, content: Mapping[str, Any]) -> Iterator[tuple[str, FollowedValue]]:
     if kind == "identify":
         yield from _parameters(content["axis"], content["parameters"])
     elif kind == "identify-drive":
@@ -253,18 +264,18 @@ def _values_of(kind: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Fol
         for name, figure in content["figures"].items():
             if figure["value"] is not None:
                 sigma = half.get(name, math.nan) * abs(figure["value"]) / NORMAL_95
-                yield name, Followed(float(figure["value"]), figure["unit"], sigma)
+                yield name, FollowedValue(float(figure["value"]), figure["unit"], sigma)
 
 
-def _parameters(axis: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Followed]]:
+def _parameters(axis: str, values: Mapping[str, Any]) -> Iterator[tuple[str, FollowedValue]]:
     for name, entry in values.items():
         if entry["value"] is None:
             continue
         sigma = math.nan if entry["sigma"] is None else float(entry["sigma"])
-        yield f"{axis}.{name}", Followed(float(entry["value"]), entry["unit"], sigma, entry["status"])
+        yield f"{axis}.{name}", FollowedValue(float(entry["value"]), entry["unit"], sigma, entry["status"])
 
 
-def _listed(path: Path) -> Iterator[Entry]:
+def _read_list(path: Path) -> Iterator[Entry]:
     """Rows of a list: results with their dates, or values."""
     try:
         text = path.read_text(encoding="utf-8-sig").splitlines()
@@ -316,7 +327,7 @@ def _of_values(
         key = tuple(row.get(name, "") for name in ("result", "date", "machine", "kind", "law"))
         groups.setdefault(key, []).append((where, row))
     for (result, day, machine, kind, law), rows in groups.items():
-        fields: dict[str, Followed] = {}
+        fields: dict[str, FollowedValue] = {}
         for where, row in rows:
             if row["quantity"] in fields:
                 raise InputError(f"{where}: {row['quantity']} is there twice of {day or 'one result'}")
@@ -324,7 +335,7 @@ def _of_values(
             sigma = _number(row["sigma"], where, "sigma") if row.get("sigma") else math.nan
             if sigma < 0:
                 raise InputError(f"{where}: sigma {sigma:g}; a standard deviation is not below 0")
-            fields[row["quantity"]] = Followed(value, row["unit"], sigma, row.get("status") or "estimated")
+            fields[row["quantity"]] = FollowedValue(value, row["unit"], sigma, row.get("status") or "estimated")
         where, first = rows[0]
         moment = _moment(day, where) if day else None
         name = result or f"{path.name} of {day or machine}"
@@ -369,7 +380,7 @@ def _check_same(entries: Sequence[Entry], machines: bool) -> None:
         (a, first), (b, second) = list(owners.items())[:2]
         raise InputError(
             f"{first} is of the machine {a}, {second} of {b}: a history is of one machine; for the scatter "
-            f"between several give {spelt('machines')}"
+            f"between several give {spell_argument('machines')}"
         )
     units: dict[str, tuple[str, str]] = {}
     for entry in entries:
@@ -379,18 +390,18 @@ def _check_same(entries: Sequence[Entry], machines: bool) -> None:
                 raise InputError(f"{name} is in {unit} in {before}, in {followed.unit} in {entry.name}")
 
 
-def _called(name: str, entries: Sequence[Entry], more: str = "") -> str:
+def _find_quantity(name: str, entries: Sequence[Entry], more: str = "") -> str:
     """The quantity that is meant: "Z.F_C", or "F_C_Z". InputError: there is none."""
     known = list(dict.fromkeys(name for entry in entries for name in entry.values))
-    result = _meant(name, known)
+    result = _match_quantity(name, known)
     if result is None:
-        near = nearest(name, known)
-        there = f"did you mean {near}?" if near else f"there are {few(known, 20)}"
+        near = find_nearest_name(name, known)
+        there = f"did you mean {near}?" if near else f"there are {shorten_list(known, 20)}"
         raise InputError(f"no quantity {name!r}; {there}{more}")
     return result
 
 
-def _meant(name: str, known: Sequence[str]) -> str | None:
+def _match_quantity(name: str, known: Sequence[str]) -> str | None:
     parameter, _, axis = name.rpartition("_")
     return next((quantity for quantity in (name, f"{axis}.{parameter}") if quantity in known), None)
 
@@ -416,33 +427,37 @@ def _of_dates(
     limits: dict[str, float] = {}
     simulated: list[str] = []
     for name, value in asked.items():
-        with given("limit", f"{name}={value}"):
-            meant = _meant(name, known)
+        with prefix_argument_errors("limit", f"{name}={value}"):
+            meant = _match_quantity(name, known)
             if meant is None and scenario is None:
-                more = f"; a figure of a run needs {spelt('scenario')}"
-                _called(name, entries, more)
-                raise InputError(f"{name} is determined on one date alone, or is not among {spelt('quantities')}")
+                more = f"; a figure of a run needs {spell_argument('scenario')}"
+                _find_quantity(name, entries, more)
+                raise InputError(
+                    f"{name} is determined on one date alone, or is not among {spell_argument('quantities')}"
+                )
             if meant is None:
                 simulated.append(name)
             else:
                 unit = next(one.unit for one in series if one.name == meant)
                 limits[meant] = amount(value, unit, f"3 {unit}")
     if scenario is not None and not simulated:
-        raise InputError(f"{spelt('scenario')} {scenario}: no {spelt('limit')} is of a figure of its run")
+        raise InputError(
+            f"{spell_argument('scenario')} {scenario}: no {spell_argument('limit')} is of a figure of its run"
+        )
     runs: list[Series] = []
     if scenario is not None:
-        runs = _simulated(entries, simulated, scenario, texts, fmus, watch)
+        runs = _simulate_figures(entries, simulated, scenario, texts, fmus, watch)
         for one in runs:
             if one.name in asked:
-                with given("limit", f"{one.name}={asked[one.name]}"):
+                with prefix_argument_errors("limit", f"{one.name}={asked[one.name]}"):
                     limits[one.name] = amount(asked[one.name], one.unit, f"3 {one.unit}", positive=True)
             else:
                 limits[one.name] = 0.0
     results = changes([*series, *runs])
     # Against no compensation a figure is below 0 as long as that helps.
     crossings = {
-        one.series.name: crossing(
-            one.model, limits[one.series.name], 1 if one.series.name.endswith(page.COMPENSATED) else 0
+        one.series.name: find_limit_crossing(
+            one.model, limits[one.series.name], 1 if one.series.name.endswith(page.COMPENSATION_SUFFIX) else 0
         )
         for one in results
         if one.series.name in limits
@@ -472,7 +487,7 @@ def _series(entries: Sequence[Entry], chosen: Sequence[str]) -> tuple[list[Serie
                     "of them out"
                 )
         if good and omitted:
-            text = f"{name}: left out, as not determined by the record: {few(omitted, 6)}"
+            text = f"{name}: left out, as not determined by the record: {shorten_list(omitted, 6)}"
             findings.append(Finding("parameter-undetermined", "note", text, name))
         if len(good) < 2:
             if good and len(order) > 1:
@@ -514,7 +529,7 @@ def _common(entries: Sequence[Entry]) -> dict[str, Array]:
     }
 
 
-def _simulated(
+def _simulate_figures(
     entries: Sequence[Entry],
     names: Sequence[str],
     scenario: File,
@@ -527,7 +542,7 @@ def _simulated(
     order = sorted((entry for entry in entries if _frictions(entry)), key=lambda entry: entry.moment or datetime.min)
     if len(order) < 2:
         raise InputError(
-            f"{spelt('scenario')} {scenario}: two results with friction are needed; there are {len(order)}"
+            f"{spell_argument('scenario')} {scenario}: two results with friction are needed; there are {len(order)}"
         )
     days: list[float] = []
     dated: list[Entry] = []
@@ -541,9 +556,9 @@ def _simulated(
         figures = run(plan, fmus=fmus).figures
         for name in names:
             if name not in figures:
-                near = nearest(name, list(figures))
-                there = f"did you mean {near}?" if near else f"there are {few(list(figures), 12)}"
-                raise InputError(f"{spelt('limit')} {name}: no figure of {scenario}; {there}")
+                near = find_nearest_name(name, list(figures))
+                there = f"did you mean {near}?" if near else f"there are {shorten_list(list(figures), 12)}"
+                raise InputError(f"{spell_argument('limit')} {name}: no figure of {scenario}; {there}")
         axes = {
             name: axis.model_copy(update={"drive": axis.drive.model_copy(update=off)})
             for name, axis in plan.machine.axes.items()
@@ -555,9 +570,10 @@ def _simulated(
             machine = plan.machine.model_copy(update={"axes": {**plan.machine.axes, **axes}})
             without = run(plan.model_copy(update={"machine": machine}), fmus=fmus).figures
             values |= {
-                f"{name} {page.COMPENSATED}": abs(figures[name].value) - abs(without[name].value) for name in names
+                f"{name} {page.COMPENSATION_SUFFIX}": abs(figures[name].value) - abs(without[name].value)
+                for name in names
             }
-            units |= {f"{name} {page.COMPENSATED}": figures[name].unit for name in names}
+            units |= {f"{name} {page.COMPENSATION_SUFFIX}": figures[name].unit for name in names}
         if days and entry.days == days[-1]:  # another axis on the same day
             for name, value in values.items():
                 columns[name][-1] = value
@@ -599,7 +615,8 @@ def _of_machines(entries: Sequence[Entry], chosen: Sequence[str]) -> dict[str, A
     owners = list(dict.fromkeys(entry.owner for entry in entries))
     if len(owners) < 2:
         raise InputError(
-            f"{spelt('machines')}: all results are of {owners[0]}; two machines are needed, named in a list's column "
+            f"{spell_argument('machines')}: all results are of {owners[0]}; two machines are needed, named in a "
+            f"list's column "
             "machine, or by a folder each"
         )
     names = chosen or list(dict.fromkeys(name for entry in entries for name in entry.values))

@@ -10,17 +10,28 @@ from pathlib import Path
 from time import perf_counter
 from typing import Annotated
 
-from feedsim.analysis import Figure, Named
-from feedsim.estimation.identify import STAGES, Asked, Identified, named_apart, read_traces
+from feedsim.analysis import Figure, FigureTable
+from feedsim.estimation.identify import STAGES, AxisRequest, IdentifiedFriction, named_apart, read_traces
 from feedsim.estimation.identify.friction_file import FRICTION_FILE, read_fleet
 from feedsim.estimation.identify.parameters import PARAMETER_KINDS
 from feedsim.estimation.identify.stages import identify as identified_from
 from feedsim.estimation.parameter import Prior
 from feedsim.files.columns import load_columns
-from feedsim.foundation.arguments import Pairs, Value, amount, by_name, listed, pairs, quantity, spelt
+from feedsim.foundation.arguments import Pairs, Value, amount, by_name, pairs, quantity, spell_argument, split_names
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import NO_WATCH, Archives, Argument, FigureKinds, File, Force, Option, Watch, job, out
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Archives,
+    Argument,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Watch,
+    job,
+    output_option,
+)
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report import identify as page
 from feedsim.scenario import Friction, load_subject
 from feedsim.scenario.roles import FRICTION_ROLE, FRICTION_UNITS
@@ -34,7 +45,9 @@ AXIS = "{axis}"  # in the name of a folder: the axis, in small letters
 KIND = Kind("identify", page.FILES, keeps=(FRICTION_FILE,))
 
 
-def result_of(identified: Identified, inputs: Sequence[Path] = (), place: Path | None = None) -> Result[Identified]:
+def result_of(
+    identified: IdentifiedFriction, inputs: Sequence[Path] = (), place: Path | None = None
+) -> Result[IdentifiedFriction]:
     """Friction of an axis, identified. inputs: files that it rests on. place: the folder that it is written to."""
     found = identified.found
     in_table = page.terminal_warnings(identified)
@@ -42,7 +55,7 @@ def result_of(identified: Identified, inputs: Sequence[Path] = (), place: Path |
         KIND,
         identified,
         lambda: page.report_of(identified, page.draw(identified)),
-        figures=Named(
+        figures=FigureTable(
             (f"{found.axis}.{name}", Figure(one.value, one.unit, one.meaning)) for name, one in found.estimates.items()
         ).with_intervals({f"{found.axis}.{name}": one.interval for name, one in found.estimates.items()}),
         details=partial(page.details, identified),
@@ -123,11 +136,11 @@ def identify_friction(
         ),
     ] = Friction.law,
     fmus: Archives = None,
-    out: Annotated[File | None, out("identify_{axis}")] = None,
+    out: Annotated[File | None, output_option("identify_{axis}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> Result[Identified]:
+) -> Result[IdentifiedFriction]:
     r"""Identify the friction of an axis: the Stribeck curve from constant speeds, pre-sliding from reversals.
 
     Leaves friction.yaml, which scenarios and machine files take as it is, a report with figures, and what the figures
@@ -153,11 +166,11 @@ def identify_friction(
     """
     files = [Path(file) for file in ([traces] if isinstance(traces, str | Path) else traces)]
     if law not in (laws := (Friction.law, *FRICTION_UNITS)):
-        raise InputError(f"{spelt('law')} {law}: {' or '.join(laws)} is needed")
+        raise InputError(f"{spell_argument('law')} {law}: {' or '.join(laws)} is needed")
     kept_values = pairs("hold", hold, "NAME=VALUE is needed, for example beta=1 or v_log='3 rad/s'")
     fleets = read_fleet(prior) if prior is not None else {}
-    asked = _asked(axes, inertia, mass, delay, kept_values, listed(free), stages, law, fleets)
-    settings = _settings(inertia, mass, delay, kept_values, listed(free), stages)
+    asked = _axis_options(axes, inertia, mass, delay, kept_values, split_names(free), stages, law, fleets)
+    settings = _settings(inertia, mass, delay, kept_values, split_names(free), stages)
     if law != Friction.law:
         settings["law"] = law
     if prior is not None:
@@ -177,20 +190,22 @@ def identify_friction(
     inputs += [file for _, file in subject.files] if subject is not None else []
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
     asked_for = [f"{name}={value}" for name, value in settings.items()]
-    with kept(folder, KIND, watch, inputs, asked_for, force=force):
-        for sentence in cosim.executing(archives / f"{unit}.fmu", "friction law") if archives is not None else ():
+    with claim_result_folder(folder, KIND, watch, inputs, asked_for, force=force):
+        for sentence in (
+            cosim.describe_archive_programs(archives / f"{unit}.fmu", "friction law") if archives is not None else ()
+        ):
             watch.announce(sentence)
         with FrictionLaw(archives, unit) as friction:
             identification = identified_from(records, friction, known, watch.progress)
         identification = replace(identification, seconds=reading | dict(identification.seconds))
-        identified = Identified(identification, records, sources, subject, settings, date.today().isoformat())
+        identified = IdentifiedFriction(identification, records, sources, subject, settings, date.today().isoformat())
         result = result_of(identified, inputs, folder)
         if folder is not None:
             result.save(folder, figures=figures, force=force)
     return result
 
 
-def _asked(
+def _axis_options(
     axis: str | None,
     inertia: Value | None,
     mass: Value | None,
@@ -200,10 +215,10 @@ def _asked(
     stages: str | int | Sequence[int],
     law: str,
     fleets: Mapping[str, Prior],
-) -> Asked:
+) -> AxisRequest:
     """What the arguments say of the axis, as values. Raises InputError."""
     if inertia is not None and mass is not None:
-        raise InputError(f"{spelt('inertia')} and {spelt('mass')}: one of them, not both")
+        raise InputError(f"{spell_argument('inertia')} and {spell_argument('mass')}: one of them, not both")
     given = None
     if inertia not in (None, ESTIMATE):
         given = quantity("inertia", inertia, "kg.m^2")
@@ -220,11 +235,11 @@ def _asked(
         return amount(value, PARAMETER_KINDS[name].unit)
 
     estimated = tuple(name for name, value in (("inertia", inertia), ("delay", delay)) if value == ESTIMATE)
-    return Asked(
+    return AxisRequest(
         axis=axis,
         inertia=given,
         mass=None if mass is None else quantity("mass", mass, "kg"),
-        mass_reason=f"{spelt('mass')} {mass}",
+        mass_reason=f"{spell_argument('mass')} {mass}",
         delay=later,
         estimated=estimated,
         hold=by_name("hold", hold, value_of),
@@ -240,7 +255,7 @@ def _stages(stages: str | int | Sequence[int]) -> tuple[int, ...]:
         return STAGES
     chosen = tuple(int(stage) for stage in ([stages] if isinstance(stages, str | int) else stages))
     if not chosen or any(stage not in STAGES for stage in chosen):
-        raise InputError(f"{spelt('stages')} {stages}: 1, 2 or 'both' is needed")
+        raise InputError(f"{spell_argument('stages')} {stages}: 1, 2 or 'both' is needed")
     return chosen
 
 

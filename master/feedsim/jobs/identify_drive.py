@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.estimation.replay.identified import identify_drives
 from feedsim.estimation.replay.machine_files import MOST_MODES
-from feedsim.foundation.arguments import Value, quantity, spelt
+from feedsim.foundation.arguments import Value, quantity, spell_argument
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -29,10 +29,10 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.replay import Asked
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.replay import ReplayRequest
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.report.replay import drive as page
 from feedsim.report.replay.drive import DriveReport
 
@@ -45,7 +45,7 @@ def result_of(drives: DriveReport, inputs: Sequence[Path]) -> Result[DriveReport
         KIND,
         drives,
         partial(page.report_of, drives),
-        figures=Named(drives.figures),
+        figures=FigureTable(drives.figures),
         details=partial(page.details, drives),
         files=lambda: drives.found.files,
         inputs=inputs,
@@ -86,7 +86,7 @@ def identify_drive(
     name: Annotated[str | None, Option("NAME", "of the machine that is written (default: name of the record)")] = None,
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("drive_{record}")] = None,
+    out: Annotated[File | None, output_option("drive_{record}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
@@ -113,19 +113,19 @@ def identify_drive(
     Traceback (most recent call last):
     feedsim.foundation.errors.InputError: no such file: machines/nowhere
     """
-    asked = Asked.of(record, machine, axes, columns, window, set)
+    asked = ReplayRequest.of(record, machine, axes, columns, window, set)
     path = asked.recording.path
     title = name or path.stem
     cycle = quantity("position_cycle", position_cycle, "s", "1 ms") if position_cycle else None
     count = count_of_modes(modes, asked.machine is not None)
     archives = None if fmus is None else Path(fmus)
-    with kept(
+    with claim_result_folder(
         out, replace(KIND, may_write=page.files_of(asked.axes)), watch, asked.inputs, asked.asked_for, force=force
     ):
         watch.progress("reading", 0, 1)
         read, records, refused = asked.each_axis()
         if asked.machine is not None:
-            announce(watch, asked.machine, archives)
+            announce_programs(watch, asked.machine, archives)
         head = page.head(path, asked.window, date.today().isoformat())
         drives_found = identify_drives(
             read,
@@ -154,8 +154,8 @@ def count_of_modes(modes: int | str, structure_known: bool) -> int | None:
     """0 to 5, or None of "auto". InputError: neither, or modes where the machine has its own."""
     text = str(modes)
     if text != "auto" and not (text.isdecimal() and int(text) <= MOST_MODES):
-        raise InputError(f"{spelt('modes')} {text}: 0 to {MOST_MODES}, or auto")
+        raise InputError(f"{spell_argument('modes')} {text}: 0 to {MOST_MODES}, or auto")
     if structure_known and text != "0":
-        known = f"the structure is that of {spelt('machine')}"
-        raise InputError(f"{spelt('modes')} {text}: {known}; leave one of the two out")
+        known = f"the structure is that of {spell_argument('machine')}"
+        raise InputError(f"{spell_argument('modes')} {text}: {known}; leave one of the two out")
     return None if text == "auto" else int(text)

@@ -7,16 +7,27 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.estimation.modal.measured import Channel, from_responses, from_signals
 from feedsim.estimation.modal.rational import MOST_MODES
 from feedsim.estimation.modal.rational import identify_modes as identified
 from feedsim.files.fields import no_axis
 from feedsim.files.trace.response_files import read_response
-from feedsim.foundation.arguments import Band, Value, between, quantity, settings, spelt
+from feedsim.foundation.arguments import Band, Value, parse_frequency_band, quantity, settings, spell_argument
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.parameters import NO_WATCH, Argument, FigureKinds, File, Force, Option, Settings, Watch, job, out
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.parameters import (
+    NO_WATCH,
+    Argument,
+    FigureKinds,
+    File,
+    Force,
+    Option,
+    Settings,
+    Watch,
+    job,
+    output_option,
+)
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report import modal as page
 from feedsim.scenario import Machine, load_subject
 from feedsim.structure import checked_modes
@@ -30,7 +41,7 @@ def result_of(identified: page.ModesReport) -> Result[page.ModesReport]:
         KIND,
         identified,
         partial(page.report_of, identified),
-        figures=Named(identified.figures),
+        figures=FigureTable(identified.figures),
         details=partial(page.details, identified),
         files=partial(page.files_of, identified),
         inputs=[identified.file, *(file for _, file in identified.subject.files)],
@@ -68,7 +79,7 @@ def identify_modes(
     time: Annotated[str | None, Option("NAME[:UNIT]", "column of the time (default: time or t)")] = None,
     interval: Annotated[Value | None, Option("VALUE", "of the samples, in place of a time, e.g. 0.4ms")] = None,
     set: Settings = None,
-    out: Annotated[File | None, out("modes_{response}")] = None,
+    out: Annotated[File | None, output_option("modes_{response}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
@@ -97,11 +108,11 @@ def identify_modes(
     subject = load_subject(machine, texts)
     chosen = _axis(axes, subject.machine)
     path = Path(response)
-    outputs = {"motor": Channel.of(_motor(motor, input, path), spelt("motor"))}
+    outputs = {"motor": Channel.of(_motor(motor, input, path), spell_argument("motor"))}
     if scale is not None:
-        outputs["scale"] = Channel.of(scale, spelt("scale"))
+        outputs["scale"] = Channel.of(scale, spell_argument("scale"))
     for text in sensor:
-        more = Channel.of(text, spelt("sensor"))
+        more = Channel.of(text, spell_argument("sensor"))
         outputs[more.names[0]] = more
     count = _count(modes)
     asked = {
@@ -111,13 +122,13 @@ def identify_modes(
     given = {name: str(value) for name, value in asked.items() if value is not None}
     inputs = [path, *(file for _, file in subject.files)]
     named = [f"{name}={text}" for name, text in given.items()]
-    with kept(out, KIND, watch, inputs, [*texts, *named], force=force):
+    with claim_result_folder(out, KIND, watch, inputs, [*texts, *named], force=force):
         watch.progress("reading", 0, 2)
         if input is not None:
             step = quantity("interval", interval, "s", "0.4 ms") if interval else None
-            column = Channel.of(time, spelt("time")) if time else None
+            column = Channel.of(time, spell_argument("time")) if time else None
             measured = from_signals(
-                path, Channel.of(input, spelt("input")), outputs, time=column, interval=step, period=period
+                path, Channel.of(input, spell_argument("input")), outputs, time=column, interval=step, period=period
             )
         else:
             measured = from_responses(path, outputs)
@@ -134,7 +145,7 @@ def identify_modes(
 def _axis(axis: str | None, machine: Machine) -> str:
     chosen = axis or next(iter(machine.axes))
     if chosen not in machine.axes:
-        raise InputError(f"{spelt('axes')} {chosen}: {no_axis(chosen, machine.axes)}")
+        raise InputError(f"{spell_argument('axes')} {chosen}: {no_axis(chosen, machine.axes)}")
     return chosen
 
 
@@ -144,11 +155,11 @@ def _motor(motor: str | None, input: str | None, response: Path) -> str:
         return motor
     if input is not None:
         raise InputError(
-            f"{spelt('input')} without {spelt('motor')}: which signal is the motor's? For example "
-            f"{spelt('motor')} n_act:rpm"
+            f"{spell_argument('input')} without {spell_argument('motor')}: which signal is the motor's? For example "
+            f"{spell_argument('motor')} n_act:rpm"
         )
     if len(names := read_response(response).names) != 1:
-        raise InputError(f"{response}: which response is the motor's? {spelt('motor')} NAME; there is {names}")
+        raise InputError(f"{response}: which response is the motor's? {spell_argument('motor')} NAME; there is {names}")
     return names[0]
 
 
@@ -158,12 +169,12 @@ def _count(modes: int | str) -> int | None:
     if text == "auto":
         return None
     if not (text.isdecimal() and int(text) <= MOST_MODES):
-        raise InputError(f"{spelt('modes')} {text}: 0 to {MOST_MODES}, or auto")
+        raise InputError(f"{spell_argument('modes')} {text}: 0 to {MOST_MODES}, or auto")
     return int(text)
 
 
 def _band(band: Band) -> tuple[float, float]:
-    low, high = between("band", band, "11 Hz", "250 Hz")
+    low, high = parse_frequency_band("band", band, "11 Hz", "250 Hz")
     if not 0 < low < high:
-        raise InputError(f"{spelt('band')} {band}: the lower end is not below the upper one")
+        raise InputError(f"{spell_argument('band')} {band}: the lower end is not below the upper one")
     return low, high

@@ -8,14 +8,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
 
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.estimation.modal.measured import Channel
 from feedsim.estimation.replay.mounts import Accelerometer, read_stops, start_factors, with_accelerometer
 from feedsim.estimation.replay.mounts import identify_mounts as identified
 from feedsim.files.columns import load_columns
 from feedsim.files.fields import no_axis
 from feedsim.files.trace import read_recording
-from feedsim.foundation.arguments import Value, amount, given, settings, spelt
+from feedsim.foundation.arguments import Value, amount, prefix_argument_errors, settings, spell_argument
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -29,12 +29,12 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.report import mounts as page
 from feedsim.scenario import load_subject
-from feedsim.simulation.judge import mounts as damped_twice
+from feedsim.simulation.judge import warn_mount_damping as damped_twice
 
 SIGNALS = ("position", "speed")
 
@@ -48,7 +48,7 @@ def result_of(identified: page.MountsReport) -> Result[page.MountsReport]:
         KIND,
         identified,
         partial(page.report_of, identified),
-        figures=Named(identified.figures).with_intervals(
+        figures=FigureTable(identified.figures).with_intervals(
             {name: (100 * one.interval[0], 100 * one.interval[1]) for name, one in identified.estimates.items()}
         ),
         details=partial(page.details, identified),
@@ -95,7 +95,7 @@ def identify_mounts(
     ] = (),
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("mounts_{logs}")] = None,
+    out: Annotated[File | None, output_option("mounts_{logs}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
@@ -128,9 +128,9 @@ them (key mounts of the machine file, written by machine build), whose friction 
     subject = load_subject(machine, texts)
     own = subject.machine
     if axes is not None and axes not in own.axes:
-        raise InputError(f"{spelt('axes')} {axes}: {no_axis(axes, own.axes)}")
+        raise InputError(f"{spell_argument('axes')} {axes}: {no_axis(axes, own.axes)}")
     if signal is not None and signal not in SIGNALS:
-        raise InputError(f"{spelt('signal')} {signal}: {' or '.join(SIGNALS)}")
+        raise InputError(f"{spell_argument('signal')} {signal}: {' or '.join(SIGNALS)}")
     sensor = _accelerometer(accelerometer) if accelerometer is not None else None
     each_jerk = _jerks(jerks, len(files), sensor is not None and subject.scenario is not None)
     mapping = load_columns(columns) if columns is not None else None
@@ -139,7 +139,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
     chosen = {name: str(value) for name, value in asked.items() if value is not None}
     inputs = [*files, *([Path(columns)] if columns is not None else []), *(file for _, file in subject.files)]
     asked_for = [*texts, *(f"{name}={text}" for name, text in chosen.items())]
-    with kept(out, KIND, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
+    with claim_result_folder(out, KIND, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
         watch.progress("reading", 0, 1)
         stops, notes = [], list[Finding]()
         for file, jerk in zip(files, each_jerk, strict=True):
@@ -148,7 +148,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
             )
             stops.append(log)
             notes += said
-        announce(watch, own, None if fmus is None else Path(fmus))
+        announce_programs(watch, own, None if fmus is None else Path(fmus))
         seen = own if sensor is None else with_accelerometer(own, Path(folder))
         mounts = identified(seen, stops, None if fmus is None else Path(fmus), watch.progress)
         findings = [*dict.fromkeys(notes), *damped_twice(own)]
@@ -162,11 +162,14 @@ def _accelerometer(text: str) -> Accelerometer:
     direction, equals, column = text.partition("=")
     if not equals or direction.strip() not in ("X", "Y", "Z") or not column.strip():
         raise InputError(
-            f"{spelt('accelerometer')} {text}: DIRECTION=NAME or DIRECTION=NAME:UNIT is needed, such as Z=a:m/s^2"
+            f"{spell_argument('accelerometer')} {text}: DIRECTION=NAME or DIRECTION=NAME:UNIT is needed, such as "
+            f"Z=a:m/s^2"
         )
     name, colon, unit = column.strip().rpartition(":")
     if colon and not unit.startswith(("+", "-")):  # the direction of a name in a universal file, 1:+Z
-        return Accelerometer(direction.strip(), Channel.of(name, spelt("accelerometer")).names[0], unit.strip())
+        return Accelerometer(
+            direction.strip(), Channel.of(name, spell_argument("accelerometer")).names[0], unit.strip()
+        )
     return Accelerometer(direction.strip(), column.strip())
 
 
@@ -180,10 +183,13 @@ def _jerks(jerks: str | Sequence[Value], logs: int, used: bool) -> list[float | 
         return [None] * logs
     if not used:
         raise InputError(
-            f"{spelt('jerks')} {_text(jerks)}: are those of a scenario, for logs of an accelerometer; here the logs "
+            f"{spell_argument('jerks')} {_text(jerks)}: are those of a scenario, for logs of an accelerometer; "
+            f"here the logs "
             "have their setpoints"
         )
     if len(values) != logs:
-        raise InputError(f"{spelt('jerks')} {_text(jerks)}: {len(values)} values for {logs} logs; one a log is needed")
-    with given("jerks", _text(jerks)):
+        raise InputError(
+            f"{spell_argument('jerks')} {_text(jerks)}: {len(values)} values for {logs} logs; one a log is needed"
+        )
+    with prefix_argument_errors("jerks", _text(jerks)):
         return [amount(value, "m/s^3", "150 m/s^3", positive=True) for value in values]

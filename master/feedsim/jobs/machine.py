@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from feedsim.analysis import Figure, Named
-from feedsim.foundation.arguments import Value, lengths, pairs, quantity, spelt
+from feedsim.analysis import Figure, FigureTable
+from feedsim.foundation.arguments import Value, lengths, pairs, quantity, spell_argument
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.outputs import begins_with
 from feedsim.jobs.parameters import (
@@ -28,20 +28,20 @@ from feedsim.jobs.parameters import (
     StructureArgument,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report.content import PICTURE_FORMATS, Report
 from feedsim.report.machine import record as shown
 from feedsim.report.provenance import to_json
-from feedsim.scenario.load import Described, load_described
+from feedsim.scenario.load import MachineDescription, load_described
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.parts import GeometryStructure
 from feedsim.structure.build import build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
 from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
 from feedsim.structure.mounts import MOUNTS_FILE, MountTable, table_of, write_mounts
-from feedsim.structure.pose_change import stale
+from feedsim.structure.pose_change import describe_stale_table
 
 if TYPE_CHECKING:
     from feedsim.report.machine.report import Drawings
@@ -71,7 +71,7 @@ class PosedMachine:
     """A machine at a pose. info: masses, inertias, coupling limits, modes. described: what its files say of it."""
 
     info: MachineInfo
-    described: Described
+    described: MachineDescription
 
     @property
     def structure(self) -> Structure:
@@ -100,7 +100,7 @@ class PosedMachine:
         return to_json(shown.record(self.info, [*self.described.files, *modes]))
 
 
-def figures_of(info: MachineInfo) -> Named:
+def figures_of(info: MachineInfo) -> FigureTable:
     """ "total_mass", "lowest_mode", "X.J_tot", "X.coupling_limit", ...; what is not known is not there."""
     result = {"total_mass": Figure(info.total_mass, "kg", "mass of everything")}
     elastic = info.modes.frequency[info.modes.frequency > 0].tolist()
@@ -109,7 +109,7 @@ def figures_of(info: MachineInfo) -> Named:
     for axis in info.axes:
         for key, (unit, meaning) in shown.MEANINGS.items():
             result[f"{axis.name}.{key}"] = Figure(getattr(axis, key), unit, meaning)
-    return Named((name, figure) for name, figure in result.items() if math.isfinite(figure.value))
+    return FigureTable((name, figure) for name, figure in result.items() if math.isfinite(figure.value))
 
 
 def result_of(
@@ -128,9 +128,9 @@ def result_of(
 
     @cache
     def drawn() -> Drawings:
-        from feedsim.report.machine.report import drawn
+        from feedsim.report.machine.report import draw_machine
 
-        return drawn(machine.structure, info, modes=modes, scale=scale, animate=animate)
+        return draw_machine(machine.structure, info, modes=modes, scale=scale, animate=animate)
 
     def report() -> Report:
         from feedsim.report.machine.report import report_of
@@ -213,7 +213,7 @@ def machine_info(
     >>> fs.machine_info("machines/test_centre").figures["X.lead"].unit
     'm/rad'
     """
-    most = _listed(modes)
+    most = _mode_count(modes)
     described = load_described(machine)
     info = _info(machine, described, at, cutoff, static_correction, step, watch)
     return result_of(PosedMachine(info, described), listed=most)
@@ -222,7 +222,7 @@ def machine_info(
 @job("compute a machine's modes from its structure")
 def machine_build(
     machine: StructureArgument,
-    out: Annotated[File | None, out("build_{machine}")] = None,
+    out: Annotated[File | None, output_option("build_{machine}")] = None,
     *,
     at: AxisPositions = None,
     cutoff: Cutoff = None,
@@ -248,7 +248,7 @@ def machine_build(
             f"{machine}: has no key structure; modes are computed from a structure file (docs/structure.md)"
         )
 
-    with kept(out, BUILT, watch, [file for _, file in described.files], force=force):
+    with claim_result_folder(out, BUILT, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at, cutoff, static_correction, None, watch, fresh=True)
         result = result_of_build(PosedMachine(info, described))
         if out is not None:
@@ -259,7 +259,7 @@ def machine_build(
 @job("draw a machine's structure and its modes", needs=("figures",))
 def machine_view(
     machine: StructureArgument,
-    out: Annotated[File | None, out("view_{machine}")] = None,
+    out: Annotated[File | None, output_option("view_{machine}")] = None,
     *,
     at: AxisPositions = None,
     cutoff: Cutoff = None,
@@ -298,7 +298,10 @@ def machine_view(
     """
     factor = _scale(scale)
     if animate and not mode:
-        raise InputError(f"{spelt('animate')}: which mode? Give {spelt('mode')} too, e.g. {spelt('mode')} 21Hz")
+        raise InputError(
+            f"{spell_argument('animate')}: which mode? Give {spell_argument('mode')} too, e.g. "
+            f"{spell_argument('mode')} 21Hz"
+        )
     described = load_described(machine)
     if described.structure is None:
         raise InputError(
@@ -306,7 +309,7 @@ def machine_view(
             "file (key structure, docs/structure.md)"
         )
 
-    with kept(out, KIND, watch, [file for _, file in described.files], force=force):
+    with claim_result_folder(out, KIND, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at, cutoff, static_correction, step, watch)
         chosen = list(dict.fromkeys(_mode(entry, info.modes) for entry in mode))
         result = result_of(PosedMachine(info, described), chosen, factor, animate)
@@ -317,7 +320,7 @@ def machine_view(
 
 def _info(
     machine: File,
-    described: Described,
+    described: MachineDescription,
     at: Positions,
     cutoff: Value | None,
     static_correction: bool,
@@ -337,7 +340,8 @@ def _info(
         for option, given in (("at", at), ("cutoff", cutoff), ("static_correction", static_correction)):
             if given:
                 raise InputError(
-                    f"{spelt(option)}: {machine} has a table of modes alone; other modes need a structure file (key "
+                    f"{spell_argument(option)}: {machine} has a table of modes alone; other modes need a "
+                    f"structure file (key "
                     "structure, docs/structure.md)"
                 )
         return info_of_table(described.name, described.note, checked_modes(loaded), described.pose, h, friction)
@@ -349,7 +353,7 @@ def _info(
         progress=lambda text: watch.progress(text, 0, 1),
     )  # fmt: skip
     as_it_is = pose == dict(described.pose) and limit is None and not static_correction and not fresh
-    warnings = _stale(described, built.solution.modes) if as_it_is else []
+    warnings = _warn_stale_modes(described, built.solution.modes) if as_it_is else []
     if (mounts := table_of(built.assembly, built.solution.shapes)) is not None:
         warnings += damped_twice(built.solution.modes, mounts, mounts.element)
         if loaded is not None and loaded.mounts is None:
@@ -363,12 +367,12 @@ def _info(
     return info_of_model(described.name, described.note, built, h, friction, warnings)
 
 
-def _stale(described: Described, modes: Modes) -> list[Finding]:
+def _warn_stale_modes(described: MachineDescription, modes: Modes) -> list[Finding]:
     """That the machine's table of modes is another one than its structure gives."""
     machine = described.machine
     if machine is None or described.modes is None:
         return []
-    how = stale(read_modes(described.modes, list(machine.axes)), modes)
+    how = describe_stale_table(read_modes(described.modes, list(machine.axes)), modes)
     if not how:
         return []
     remedy = "Build it anew (feedsim machine build --force), or name the structure that it belongs to"
@@ -388,7 +392,7 @@ def _check_complete(structure: Structure, pose: Mapping[str, float]) -> None:
         example = " ".join(f"{axis}={position:.6g}mm" for axis, position in middle.items())
         raise InputError(
             f"{structure.name or 'structure'}: nothing says where axis {', '.join(missing)} stands; the structure can "
-            f"be assembled at any position: give one, e.g. {spelt('at')} {example}"
+            f"be assembled at any position: give one, e.g. {spell_argument('at')} {example}"
         )
 
 
@@ -397,12 +401,12 @@ def positions(at: Positions) -> dict[str, float]:
     return lengths("at", pairs("at", at, POSITION_NEEDED), "800mm")
 
 
-def _listed(modes: int | str | None) -> int | None:
+def _mode_count(modes: int | str | None) -> int | None:
     """How many modes are listed; None: all."""
     if modes is None or modes == "all":
         return None
     if not str(modes).isdecimal():
-        raise InputError(f"{spelt('modes')} {modes}: a whole number, or all, is needed")
+        raise InputError(f"{spell_argument('modes')} {modes}: a whole number, or all, is needed")
     return int(modes)
 
 
@@ -411,12 +415,12 @@ def _mode(asked: int | str, modes: Modes) -> int:
     from feedsim.foundation import units
 
     count, text = len(modes.frequency), str(asked)
-    option = f"{spelt('mode')} {text}"
+    option = f"{spell_argument('mode')} {text}"
     if text.isdecimal():
         if int(text) >= count:
             raise InputError(
                 f"{option}: there are {count} modes, 0 to {count - 1}, up to {modes.frequency.max():.1f} Hz; "
-                f"{spelt('cutoff')} gives more"
+                f"{spell_argument('cutoff')} gives more"
             )
         return int(text)
     try:
@@ -443,5 +447,5 @@ def _scale(given: float | str) -> float:
     except ValueError:
         scale = math.nan
     if not (math.isfinite(scale) and 0 < scale <= 100):
-        raise InputError(f"{spelt('scale')} {given}: auto, or a factor above 0 and up to 100, is needed")
+        raise InputError(f"{spell_argument('scale')} {given}: auto, or a factor above 0 and up to 100, is needed")
     return scale

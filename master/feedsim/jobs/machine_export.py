@@ -8,14 +8,14 @@ from functools import reduce
 from pathlib import Path
 from typing import Annotated, Any
 
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.files.control import names_of
 from feedsim.files.control.archive import Archive
 from feedsim.files.control.reading import Value
-from feedsim.files.control.writing import Written, changed
-from feedsim.foundation.arguments import listed, pairs, spelt
+from feedsim.files.control.writing import WrittenFiles, change_files
+from feedsim.foundation.arguments import pairs, spell_argument, split_names
 from feedsim.foundation.errors import InputError
-from feedsim.jobs.machine_import import assumed, axes_of, inputs_of, read_files
+from feedsim.jobs.machine_import import axes_of, inputs_of, parse_assumed_values, read_files
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Argument,
@@ -28,9 +28,9 @@ from feedsim.jobs.parameters import (
     Option,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report.control_files import exported as page
 from feedsim.scenario import load_machine
 from feedsim.scenario.machine import Machine
@@ -39,7 +39,7 @@ KIND = Kind("machine export", (page.SHEET,))
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class ExportedFiles:
     """Files of a control with values of a machine file.
 
     archives: the files as they were. written: files with changed values, and every difference. machine: whose values
@@ -47,21 +47,21 @@ class Exported:
     """
 
     archives: Sequence[Archive]
-    written: Written
+    written: WrittenFiles
     machine: Machine
     axes: Mapping[str, str]
 
 
-def result_of(value: Exported, inputs: Sequence[Path]) -> Result[Exported]:
+def result_of(value: ExportedFiles, inputs: Sequence[Path]) -> Result[ExportedFiles]:
     """Files of a control with values of a machine file, and what is to be typed. inputs: files of both."""
     written, machine, axes = value.written, value.machine, value.axes
     return Result(
         KIND,
         value,
         lambda: page.report_of(value.archives, written, machine, axes, inputs),
-        figures=Named(page.figures_of(written)),
+        figures=FigureTable(page.figures_of(written)),
         details=lambda: page.details(written, machine, axes, inputs),
-        files=lambda: {**page.named(written.contents), page.SHEET: page.sheet(written)},
+        files=lambda: {**page.name_contents(written.contents), page.SHEET: page.sheet(written)},
         inputs=inputs,
         lines=lambda: [f"  {line}" for line in (*page.answers(written, axes), *page.change_lines(written))],
     )
@@ -76,10 +76,10 @@ def machine_export(
     drives: ControlDrives = None,
     assume: AssumedValues = None,
     checked: CheckedUnits = (),
-    out: Annotated[File | None, out("export_{machine}")] = None,
+    out: Annotated[File | None, output_option("export_{machine}")] = None,
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> Result[Exported]:
+) -> Result[ExportedFiles]:
     r"""Write the values of a machine file into copies of a control's files, and a sheet of old and new values.
 
     The bytes of changed values differ, and no others. What cannot be written stands on the sheet, to be typed.
@@ -106,7 +106,7 @@ def machine_export(
     archives = read_files(paths, watch)
     names = [archive.name for archive in archives]
     if twice := next((name for name in names if names.count(name) > 1), ""):
-        raise InputError(f"{spelt('like')}: two files are called {twice}; their copies stand in one folder")
+        raise InputError(f"{spell_argument('like')}: two files are called {twice}; their copies stand in one folder")
     if own.control and own.control != archives[0].control:
         raise InputError(f"{base}: is of the control {own.control}, the files are of {archives[0].control}")
     chosen = axes_of(axes, base, archives)
@@ -114,19 +114,19 @@ def machine_export(
         if axis not in own.axes:
             raise InputError(f"{base}: has no axis {axis!r}; it has {', '.join(own.axes)}")
         own.shipped_drive(axis, "an export to a control")
-    written = changed(
+    written = change_files(
         archives,
         chosen,
         {axis: values_of(own, archives[0].control, axis) for axis in chosen},
         places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
-        assume=assumed(assume),
-        checked=listed(checked),
+        assume=parse_assumed_values(assume),
+        checked=split_names(checked),
     )
     inputs = inputs_of(archives, base)
-    result = result_of(Exported(archives, written, own, chosen), inputs)
+    result = result_of(ExportedFiles(archives, written, own, chosen), inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
     kind = replace(KIND, may_write=(*KIND.may_write, *page.kept_apart(names)))
-    with kept(out, kind, watch, inputs, force=force):
+    with claim_result_folder(out, kind, watch, inputs, force=force):
         if out is not None:
             result.save(out, force=force)
     return result
@@ -136,13 +136,13 @@ def values_of(machine: Machine, control: str, axis: str) -> dict[str, Value]:
     """Our parameter -> SI value of an axis, of all that the control has a name for."""
     result: dict[str, Value] = {}
     for parameter in names_of(control):
-        value = reduce(_inside, parameter.split("."), machine.axes[axis])
+        value = reduce(_value_inside, parameter.split("."), machine.axes[axis])
         if isinstance(value, bool | int | float | str):
             result[parameter] = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
     return result
 
 
-def _inside(value: Any, step: str) -> Any:
+def _value_inside(value: Any, step: str) -> Any:
     if step.isdecimal() and isinstance(value, tuple):
         return value[int(step)] if int(step) < len(value) else None
     return getattr(value, step, None)

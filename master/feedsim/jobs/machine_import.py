@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.files.control.archive import MAX_FILE_BYTES, MAX_INCLUDED_BYTES, Archive, scalar
-from feedsim.files.control.formats import opened
-from feedsim.files.control.reading import Reading, read
+from feedsim.files.control.formats import parse_file
+from feedsim.files.control.reading import Reading, read_values
 from feedsim.files.source import content
-from feedsim.foundation.arguments import listed, pairs, spelt
+from feedsim.foundation.arguments import pairs, spell_argument, split_names
 from feedsim.foundation.errors import InputError, no_such_file
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -29,18 +29,18 @@ from feedsim.jobs.parameters import (
     Option,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report.control_files import imported as page
-from feedsim.scenario.imported import Imported, imported
+from feedsim.scenario.imported import ImportedMachine, import_reading
 from feedsim.scenario.machine import Machine
 
 KIND = Kind("machine import", page.FILES, keeps=("*.yaml", "modes.csv"), main_file=Machine.IN_FOLDER)
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class ImportedFiles:
     """A machine file with values of a control.
 
     archives: the files as they are. reading: values that were taken and refused. made: the machine file.
@@ -48,17 +48,17 @@ class Taken:
 
     archives: Sequence[Archive]
     reading: Reading
-    made: Imported
+    made: ImportedMachine
 
 
-def result_of(value: Taken, inputs: Sequence[Path]) -> Result[Taken]:
+def result_of(value: ImportedFiles, inputs: Sequence[Path]) -> Result[ImportedFiles]:
     """A machine file with values of a control, and what of these was not taken. inputs: files of both."""
     archives, reading, made = value.archives, value.reading, value.made
     return Result(
         KIND,
         value,
         lambda: page.report_of(archives, reading, made, inputs),
-        figures=Named(page.figures_of(archives, reading, made)),
+        figures=FigureTable(page.figures_of(archives, reading, made)),
         details=lambda: page.details(archives, reading, made, inputs),
         files=lambda: {**made.files(), page.SHEET: page.sheet(reading, made)},
         inputs=inputs,
@@ -85,10 +85,10 @@ def machine_import(
     assume: AssumedValues = None,
     checked: CheckedUnits = (),
     name: Annotated[str | None, Option("NAME", "of the machine in a draft (default: name of the file)")] = None,
-    out: Annotated[File | None, out("machine_{files}")] = None,
+    out: Annotated[File | None, output_option("machine_{files}")] = None,
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> Result[Taken]:
+) -> Result[ImportedFiles]:
     r"""Fill drive, limits, filters and compensations of a machine file from the files of a control.
 
     A value is taken where the file has it once, where it acts, and where a public source states its unit. All others
@@ -115,20 +115,20 @@ def machine_import(
     paths = [Path(entry) for entry in ([files] if isinstance(files, str | Path) else files)]
     base = None if machine is None else Path(machine)
     if base is not None and not base.exists():
-        raise InputError(f"{spelt('machine')}: {no_such_file(base)}")
+        raise InputError(f"{spell_argument('machine')}: {no_such_file(base)}")
     archives = read_files(paths, watch)
-    reading = read(
+    reading = read_values(
         archives,
         axes_of(axes, base, archives),
         places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
-        assume=assumed(assume),
-        checked=listed(checked),
+        assume=parse_assumed_values(assume),
+        checked=split_names(checked),
     )
-    made = imported(reading, base, name or paths[0].stem)
+    made = import_reading(reading, base, name or paths[0].stem)
     inputs = inputs_of(archives, base)
-    result = result_of(Taken(archives, reading, made), inputs)
+    result = result_of(ImportedFiles(archives, reading, made), inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
-    with kept(out, KIND, watch, inputs, (), force=force):
+    with claim_result_folder(out, KIND, watch, inputs, (), force=force):
         if out is not None:
             result.save(out, force=force)
     return result
@@ -141,13 +141,13 @@ def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
         watch.progress("reading", k, len(paths))
         if path.is_dir():
             raise InputError(f"{path} is a folder; name the files in it")
-        archive = opened(path.name, content(path, MAX_FILE_BYTES), path, partial(_included, path.parent))
+        archive = parse_file(path.name, content(path, MAX_FILE_BYTES), path, partial(_read_included_file, path.parent))
         others = {id(file): file for file in archive.included.values()}
         archives += [archive, *others.values()]
     return archives
 
 
-def _included(folder: Path, word: str) -> tuple[Path, bytes]:
+def _read_included_file(folder: Path, word: str) -> tuple[Path, bytes]:
     """Path and content of a file that an INI file in the folder names; LinuxCNC looks for it from that folder on."""
     path = folder / os.path.expanduser(word)  # noqa: PTH111 - Path's ends in an exception where there is no such user
     real = os.path.realpath(path)
@@ -156,14 +156,16 @@ def _included(folder: Path, word: str) -> tuple[Path, bytes]:
     return Path(os.path.normpath(path)), content(path, MAX_INCLUDED_BYTES)
 
 
-def assumed(given: Names) -> Mapping[str, str]:
+def parse_assumed_values(given: Names) -> Mapping[str, str]:
     """Parameter -> text of --assume. InputError: no value of a control."""
     result = pairs("assume", given)
     for key, text in result.items():
         try:
             scalar(text)
         except ValueError:
-            raise InputError(f"{spelt('assume')} {key}={text}: a number, TRUE, FALSE or 'H..' is needed") from None
+            raise InputError(
+                f"{spell_argument('assume')} {key}={text}: a number, TRUE, FALSE or 'H..' is needed"
+            ) from None
     return result
 
 
@@ -171,7 +173,7 @@ def axes_of(given: Names, machine: Path | None, archives: Sequence[Archive]) -> 
     """Machine's axis -> the control's."""
     if isinstance(given, Mapping):
         return {str(key): str(value) for key, value in given.items()}
-    texts = () if given is None else listed(given)
+    texts = () if given is None else split_names(given)
     if not texts and machine is not None:
         from feedsim.scenario import load_machine
 
@@ -180,14 +182,18 @@ def axes_of(given: Names, machine: Path | None, archives: Sequence[Archive]) -> 
         has = dict.fromkeys(entry.axis for archive in archives for entry in archive.entries if entry.axis)
         names = {axis: name for archive in archives for axis, name in archive.axis_names.items()}
         shown = ", ".join(f"{axis} ({names[axis]})" if axis in names else axis for axis in [*has][:40])
-        raise InputError(f"{spelt('axes')}: which axes? The files have {shown or 'lists without an axis: name one, X'}")
+        raise InputError(
+            f"{spell_argument('axes')}: which axes? The files have {shown or 'lists without an axis: name one, X'}"
+        )
     result: dict[str, str] = {}
     for text in texts:
         axis, equals, theirs = (part.strip() for part in text.partition("="))
         if not axis or (equals and not theirs):
-            raise InputError(f"{spelt('axes')} {text}: AXIS or AXIS=NAME IN THE CONTROL is needed, such as X=X1")
+            raise InputError(
+                f"{spell_argument('axes')} {text}: AXIS or AXIS=NAME IN THE CONTROL is needed, such as X=X1"
+            )
         if axis in result:
-            raise InputError(f"{spelt('axes')} {text}: {axis} is named twice")
+            raise InputError(f"{spell_argument('axes')} {text}: {axis} is named twice")
         result[axis] = theirs or axis
     return result
 

@@ -20,7 +20,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from feedsim.foundation.arguments import Call, Changes, Pairs, Value, calling, settings
+from feedsim.foundation.arguments import Call, Changes, Pairs, Value, call_context, settings
 from feedsim.foundation.errors import Finding
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -232,10 +232,14 @@ CheckedUnits = Annotated[
 ]
 
 
-def out(default: str) -> Option:
+def output_option(default: str) -> Option:
     """The option for the folder of a result. default: below results/, where a command does not name one."""
     return Option(
-        "DIR", f"where the result goes (default: results/{_shown(default)})", short="-o", writes=True, default=default
+        "DIR",
+        f"where the result goes (default: results/{_template_text(default)})",
+        short="-o",
+        writes=True,
+        default=default,
     )
 
 
@@ -244,7 +248,7 @@ def out_file(value: str, help: str) -> Option:
     return Option(value, help, short="-o", writes=True)
 
 
-def _shown(template: str) -> str:
+def _template_text(template: str) -> str:
     """A name of a folder as the help shows it: "circle_{records}" is circle_RECORDS."""
     return re.sub(r"{(\w+)}", lambda match: match[1].upper(), template)
 
@@ -264,7 +268,7 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
                 arguments = signature.bind(*given, **named).arguments
             except TypeError:  # the function says itself what it was not given
                 return function(*given, **named)
-            with calling(Call({key: value for key, value in arguments.items() if key != "watch"}, command_line)):
+            with call_context(Call({key: value for key, value in arguments.items() if key != "watch"}, command_line)):
                 return function(*given, **named)
 
         lines = [_argument_line(entry) for entry in _parameters(inspect.signature(function))]
@@ -274,11 +278,13 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
         sections.insert(at, "Args:\n" + "\n".join(lines))
         # Options belong to the command line: help() and editors show types alone.
         plain = [
-            entry.replace(annotation=_Shown(read_annotation(str(entry.annotation))[0].replace("File", "str | Path")))
+            entry.replace(
+                annotation=_UnquotedText(read_annotation(str(entry.annotation))[0].replace("File", "str | Path"))
+            )
             for entry in signature.parameters.values()
         ]
         called.__signature__ = signature.replace(  # type: ignore[attr-defined]
-            parameters=plain, return_annotation=_Shown(signature.return_annotation)
+            parameters=plain, return_annotation=_UnquotedText(signature.return_annotation)
         )
         called.__doc__ = function.__doc__ = "\n\n".join([summary, *sections])
         return called  # type: ignore[return-value]
@@ -286,7 +292,7 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
     return documented
 
 
-class _Shown(str):
+class _UnquotedText(str):
     """A type as text, which signatures show without quotation marks."""
 
     def __repr__(self) -> str:
@@ -375,7 +381,7 @@ def declaration(file: Path, name: str) -> Declaration:
     )
 
 
-def declared(command: str) -> Declaration:
+def job_of_command(command: str) -> Declaration:
     """The job of a command, such as "machine info"."""
     module, _, function = COMMANDS[command].partition(":")
     return declaration(PACKAGE / f"{module.replace('.', '/')}.py", function)
@@ -400,7 +406,7 @@ def command_line(call: Call, command: str, arguments: Mapping[str, Any]) -> str:
     given |= arguments
     places: list[str] = []
     options: list[str] = []
-    for parameter in declared(command).parameters:
+    for parameter in job_of_command(command).parameters:
         value = given.get(parameter.name)
         if parameter.option is None or value is None:
             continue

@@ -8,18 +8,18 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated
 
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.design.tune import Proposal
 from feedsim.design.tune.proposals import of_drives
-from feedsim.estimation.identify import Recorded
-from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.estimation.identify import RecordedAxis
+from feedsim.estimation.replay.closed_loop import AxisRecord, cut_window, read_axes
 from feedsim.estimation.replay.closed_loop import window as window_of
-from feedsim.estimation.replay.compare import driven, replayed
+from feedsim.estimation.replay.compare import drive_axes, replay_records
 from feedsim.files.columns import Columns, load_columns
 from feedsim.files.fields import no_axis
 from feedsim.files.trace import Mark, Recording, read_recording, write_csv
-from feedsim.foundation.arguments import Changes, given, listed, settings, spelt
-from feedsim.foundation.errors import Finding, InputError, few
+from feedsim.foundation.arguments import Changes, prefix_argument_errors, settings, spell_argument, split_names
+from feedsim.foundation.errors import Finding, InputError, shorten_list
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,
@@ -35,11 +35,11 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.report.replay import report as page
-from feedsim.report.replay.report import Replayed
+from feedsim.report.replay.report import ReplayReport
 from feedsim.scenario import Drive, Machine, Subject, load_subject
 from feedsim.structure import checked_modes
 
@@ -50,7 +50,7 @@ MOST_NAMED = 20  # columns that a note names
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class ReplayRequest:
     """A recording, the axes of it, and the part that counts.
 
     window: begin and end [s]; None: all. settings: what was asked for by argument, as the user wrote it, without paths.
@@ -74,7 +74,7 @@ class Asked:
         columns: File | None,
         window: str | None,
         changes: Changes,
-    ) -> Asked:
+    ) -> ReplayRequest:
         """Read machine, mapping and recording. Raises InputError: a faulty file, no such axis, no such window."""
         texts = settings(changes)
         subject = load_subject(machine, texts) if machine is not None else None
@@ -83,7 +83,7 @@ class Asked:
         recording = read_recording(record)
         part = None
         if window is not None:
-            with given("window", window):
+            with prefix_argument_errors("window", window):
                 part = window_of(window, recording.marks)
         text = axes if isinstance(axes, str) else ",".join(axes or ())
         asked = {name: value for name, value in (("axes", text), ("window", window or "")) if value}
@@ -110,51 +110,51 @@ class Asked:
         return [*self.changes, *(f"{name}={text}" for name, text in self.settings.items())]
 
     @cached_property
-    def read(self) -> Mapping[str, Recorded]:
+    def read(self) -> Mapping[str, RecordedAxis]:
         """Axis -> all of its record."""
         return read_axes(self.recording, self.axes, self.machine, self.mapping)
 
     @cached_property
     def records(self) -> dict[str, AxisRecord]:
         """Axis -> the stretch of its record that holds the window."""
-        return {axis: windowed(axis, recorded, self.window) for axis, recorded in self.read.items()}
+        return {axis: cut_window(axis, recorded, self.window) for axis, recorded in self.read.items()}
 
-    def each_axis(self) -> tuple[dict[str, Recorded], dict[str, AxisRecord], dict[str, str]]:
+    def each_axis(self) -> tuple[dict[str, RecordedAxis], dict[str, AxisRecord], dict[str, str]]:
         """`read` and `records` of the axes that have them, and why another one has none.
 
         Raises InputError: none of them has.
         """
-        read: dict[str, Recorded] = {}
+        read: dict[str, RecordedAxis] = {}
         records: dict[str, AxisRecord] = {}
         refused: dict[str, str] = {}
         for axis in self.axes:
             try:
                 recorded = read_axes(self.recording, [axis], self.machine, self.mapping)[axis]
-                records[axis], read[axis] = windowed(axis, recorded, self.window), recorded
+                records[axis], read[axis] = cut_window(axis, recorded, self.window), recorded
             except InputError as error:
                 refused[axis] = str(error)
         if not read:
             raise InputError.of(f"{self.recording.path}", dict.fromkeys(refused.values()))
         return read, records, refused
 
-    def unread(self, read: Mapping[str, Recorded]) -> list[Finding]:
+    def unread(self, read: Mapping[str, RecordedAxis]) -> list[Finding]:
         """A note on the columns of the file that none of the axes is read from; those of the axes come first."""
         used = {column for recorded in read.values() for column in recorded.provenance.columns.values()}
         numbers = {name.rpartition("|")[2] for name in used if "|" in name}  # of the axes of a capture
         used |= {f"POWER|{number}" for number in numbers}  # which their pitch is by
         others = [name for name in self.recording.names if name not in used]
         names = sorted(others, key=lambda name: name.rpartition("|")[2] not in numbers)
-        text = f"{self.recording.path}: columns that are not read: {few(names, MOST_NAMED)}"
+        text = f"{self.recording.path}: columns that are not read: {shorten_list(names, MOST_NAMED)}"
         return [Finding("columns-not-read", "note", text, str(self.recording.path))] if names else []
 
 
 def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[str, ...]:
-    option = spelt("axes")
+    option = spell_argument("axes")
     if axes is None:
         if machine is None:
             raise InputError(f"{option}: which axes of the record are meant? For example {option} X,Y")
         return tuple(machine.axes)
-    result = listed(axes)
+    result = split_names(axes)
     text = axes if isinstance(axes, str) else ",".join(axes)
     for axis in result if machine is not None else ():
         if machine is not None and axis not in machine.axes:
@@ -170,13 +170,13 @@ def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[st
 KIND = Kind("replay", page.FILES)
 
 
-def result_of(done: Replayed, inputs: Sequence[Path]) -> Result[Replayed]:
+def result_of(done: ReplayReport, inputs: Sequence[Path]) -> Result[ReplayReport]:
     """A record beside the simulated machine that follows its setpoints. inputs: files that it rests on."""
     return Result(
         KIND,
         done,
         partial(page.report_of, done),
-        figures=Named(done.figures),
+        figures=FigureTable(done.figures),
         details=partial(page.details, done),
         files=lambda: {page.REPLAY: partial(write_csv, trace=done.trace)},
         inputs=inputs,
@@ -200,12 +200,12 @@ def replay(
     ] = False,
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("replay_{record}")] = None,
+    out: Annotated[File | None, output_option("replay_{record}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> Result[Replayed]:
+) -> Result[ReplayReport]:
     """Run the position setpoints of a record through the simulated axes, in closed loop, and compare.
 
     Shows what is left of position, torque and speed setpoint: over time, as figures, as a spectrum and over the
@@ -230,18 +230,18 @@ def replay(
     >>> result.figures["Z.position_rms"].unit
     'um'
     """
-    asked = Asked.of(record, machine, axes, columns, window, set)
+    asked = ReplayRequest.of(record, machine, axes, columns, window, set)
     assert asked.subject is not None
     own = asked.subject.machine
     archives = None if fmus is None else Path(fmus)
     inputs = [*asked.inputs, own.modes]
     asked_for = [*asked.asked_for, *(["open_loop=yes"] if open_loop else [])]
-    with kept(out, KIND, watch, inputs, asked_for, force=force):
+    with claim_result_folder(out, KIND, watch, inputs, asked_for, force=force):
         watch.progress("reading", 0, 3)
         records = asked.records
-        announce(watch, own, archives)
+        announce_programs(watch, own, archives)
         watch.progress("replay", 1, 3)
-        beside = driven(own, records, asked.read, archives) if open_loop else replayed(own, records, archives)
+        beside = drive_axes(own, records, asked.read, archives) if open_loop else replay_records(own, records, archives)
         comparisons = list(beside.values())
         watch.progress("report", 2, 3)
         sources = [recorded.provenance for recorded in asked.read.values()]
@@ -249,7 +249,7 @@ def replay(
         settings = {**asked.settings, **({"open_loop": "yes"} if open_loop else {})}
         findings = dict.fromkeys([*results, *(warning for source in sources for warning in source.warnings)])
         findings |= dict.fromkeys(asked.unread(asked.read))
-        done = Replayed(
+        done = ReplayReport(
             comparisons, asked.subject, sources, asked.marks, settings, [*findings], _proposals(own, asked.axes)
         )
         result = result_of(done, inputs)

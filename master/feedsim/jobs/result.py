@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from feedsim.files.trace.files import written_whole
-from feedsim.foundation.arguments import Call, call, calling
+from feedsim.foundation.arguments import Call, call, call_context
 from feedsim.foundation.errors import Finding, InputError, OutputError
-from feedsim.foundation.outputs import check_file, forced, replacing
-from feedsim.foundation.owned import claimed
+from feedsim.foundation.outputs import allow_replacement, check_file, is_replacement_allowed
+from feedsim.foundation.owned import claim_folder
 from feedsim.jobs.parameters import File, Watch
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from feedsim.report.provenance import figures_part
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place, replaced, write_report
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, describe_replaced_result, write_report
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure, Figures
@@ -33,14 +33,14 @@ V = TypeVar("V")
 # --- What is said to who watches a job (jobs/parameters.py) before it begins ------------------------------------------
 
 
-def announce(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> None:
+def announce_programs(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> None:
     """Announce the programs that a run of the machine executes besides those of feedsim.
 
     coupling: of the run, where a scenario has it.
     """
     from feedsim.simulation import cosim
 
-    for sentence in cosim.executed(machine, fmus, coupling):
+    for sentence in cosim.describe_programs(machine, fmus, coupling):
         watch.announce(sentence)
 
 
@@ -48,7 +48,7 @@ def announce_archive(watch: Watch, path: Path | None, who: str) -> None:
     """The same of one archive that a user names, for the part that it plays; None: a shipped one."""
     from feedsim.simulation import cosim
 
-    for sentence in cosim.executing(path, who) if path is not None else ():
+    for sentence in cosim.describe_archive_programs(path, who) if path is not None else ():
         watch.announce(sentence)
 
 
@@ -90,14 +90,14 @@ class Kind:
         check_place(folder, list(names), inputs, kind=self.name, own=self.own(folder))
 
 
-class Late(Generic[T]):
+class LazyField(Generic[T]):
     """A field of a data class that is given as a value, or as a function that is called when it is first asked for.
 
     default: the function of the object where neither is given.
     """
 
     def __init__(self, default: Callable[[Any], T]) -> None:
-        self._default = default
+        self._default_function = default
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -107,10 +107,10 @@ class Late(Generic[T]):
 
     def __get__(self, owner: object | None, kind: type) -> T:
         if owner is None:  # the data class asks for the default
-            return cast("T", self._default)
+            return cast("T", self._default_function)
         value = vars(owner)[self._name]
         if callable(value):
-            value = vars(owner)[self._name] = value(owner) if value is self._default else value()
+            value = vars(owner)[self._name] = value(owner) if value is self._default_function else value()
         return cast("T", value)
 
 
@@ -150,16 +150,16 @@ class Result(Generic[V]):
     _kind: Kind
     value: V
     report: Callable[[], Report]
-    figures: Late[Figures] = Late(lambda _: {})
-    details: Late[Mapping[str, Any]] = Late(lambda _: {})
+    figures: LazyField[Figures] = LazyField(lambda _: {})
+    details: LazyField[Mapping[str, Any]] = LazyField(lambda _: {})
     files: Callable[[], Mapping[str, Content]] = dict
-    inputs: Late[Sequence[Path]] = Late(lambda _: ())
-    answers: Late[Sequence[str]] = Late(lambda self: self.report().answer)
-    findings: Late[tuple[Finding, ...]] = Late(lambda self: tuple(self.report().warnings))
-    rows: Late[Sequence[str]] = Late(lambda _: ())
-    lines: Late[Sequence[str]] = Late(lambda self: self._answers_and_rows())
-    all_lines: Late[Sequence[str]] = Late(lambda self: self._lines_and_figures())
-    in_lines: Late[Sequence[Finding]] = Late(lambda _: ())
+    inputs: LazyField[Sequence[Path]] = LazyField(lambda _: ())
+    answers: LazyField[Sequence[str]] = LazyField(lambda self: self.report().answer)
+    findings: LazyField[tuple[Finding, ...]] = LazyField(lambda self: tuple(self.report().warnings))
+    rows: LazyField[Sequence[str]] = LazyField(lambda _: ())
+    lines: LazyField[Sequence[str]] = LazyField(lambda self: self._answers_and_rows())
+    all_lines: LazyField[Sequence[str]] = LazyField(lambda self: self._lines_and_figures())
+    in_lines: LazyField[Sequence[Finding]] = LazyField(lambda _: ())
     place: Path | None = None
     _call: Call | None = field(default_factory=call)
 
@@ -167,7 +167,7 @@ class Result(Generic[V]):
         made = self.report
 
         def report() -> Report:
-            with calling(self._call):
+            with call_context(self._call):
                 return made()
 
         object.__setattr__(self, "_made", report)
@@ -189,7 +189,7 @@ class Result(Generic[V]):
     def next_command(self) -> str:
         """What to do next, as it is typed; "" where there is nothing, or the command needs the folder of the result."""
         step = self.report().next_step
-        with calling(self._call):
+        with call_context(self._call):
             return "" if step is None else step.line(self.place)
 
     @property
@@ -228,7 +228,7 @@ class Result(Generic[V]):
         written or nothing. Raises OutputError.
         """
         kind = self._kind
-        with replacing(force or forced()), in_words_of(control), calling(self._call):
+        with allow_replacement(force or is_replacement_allowed()), in_words_of(control), call_context(self._call):
             files = self.files()
             kind.check_place(Path(folder), self.inputs, files)
             return write_report(
@@ -268,7 +268,7 @@ class Result(Generic[V]):
         return "; ".join([f"Result of {self.kind}: {', '.join(self.answers[:1]) or 'no answer'}", *said])
 
     def _repr_html_(self) -> str:
-        with calling(self._call):
+        with call_context(self._call):
             page = escape(html(self.report(), self.kind), quote=True)
         return f"<iframe style='width:100%;height:{NOTEBOOK_HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
 
@@ -310,7 +310,7 @@ class MadeKind:
             yield None
             return
         path = Path(out)
-        with replacing(force or forced()):
+        with allow_replacement(force or is_replacement_allowed()):
             self.check_folder(path)
             check_file(path, inputs, ours=self.ours, what=self.what)
             yield path
@@ -378,7 +378,7 @@ class Made:
 
 
 @contextmanager
-def kept(
+def claim_result_folder(
     out: File | None,
     kind: Kind,
     watch: Watch,
@@ -399,8 +399,8 @@ def kept(
         yield
         return
     folder = Path(out)
-    with replacing(force or forced()), claimed(folder):
+    with allow_replacement(force or is_replacement_allowed()), claim_folder(folder):
         kind.check_place(folder, inputs)
-        if sentence := replaced(folder, inputs, settings):
+        if sentence := describe_replaced_result(folder, inputs, settings):
             watch.note(sentence)
         yield

@@ -13,7 +13,7 @@ from feedsim import analysis, scenario
 from feedsim.design.tune import Proposal
 from feedsim.files.source import is_ssp, is_study
 from feedsim.files.trace import Array
-from feedsim.foundation.arguments import Changes, settings, spelt
+from feedsim.foundation.arguments import Changes, settings, spell_argument
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -29,14 +29,14 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, kept
+from feedsim.jobs.result import Kind, Result, claim_result_folder
 from feedsim.report import run as report
 from feedsim.report.page import Partial
 from feedsim.scenario import Scenario
 from feedsim.simulation import cosim, nc
-from feedsim.simulation.judge import JudgedRun, judged
+from feedsim.simulation.judge import JudgedRun, judge_run
 from feedsim.simulation.nc import Program
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def on_machine(machine: File | None, changes: Changes) -> list[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
+class OpenedRun:
     """A scenario with its planned motions, ready to be run.
 
     fmus: folder of the archives; None: those that come along. warnings: what makes of a run's warnings all that is to
@@ -81,7 +81,7 @@ class Opened:
 
 
 @contextmanager
-def opened(given: File | Scenario, changes: Changes = None, fmus: File | None = None) -> Iterator[Opened]:
+def open_run(given: File | Scenario, changes: Changes = None, fmus: File | None = None) -> Iterator[OpenedRun]:
     """Read and plan what is given; the archives of an SSP file are there as long as the block lasts.
 
     Raises InputError: a faulty file, a study, changes of a scenario that is loaded, archives beside those of an SSP.
@@ -91,23 +91,23 @@ def opened(given: File | Scenario, changes: Changes = None, fmus: File | None = 
     if isinstance(given, Scenario):
         if texts:
             raise InputError(
-                f"{spelt('set')}: changes are for a file; a scenario that is loaded has its own (feedsim.load)"
+                f"{spell_argument('set')}: changes are for a file; a scenario that is loaded has its own (feedsim.load)"
             )
-        yield Opened(given, nc.plan(given), archives, texts)
+        yield OpenedRun(given, nc.plan(given), archives, texts)
         return
     file = Path(given)
     if not is_ssp(file):
         if is_study(file):
             raise InputError(f"{file}: is a study of many runs: feedsim sweep {file}")
         plan = scenario.load(file, texts)
-        yield Opened(plan, nc.plan(plan), archives, texts)
+        yield OpenedRun(plan, nc.plan(plan), archives, texts)
         return
     if archives is not None:
-        raise InputError(f"{spelt('fmus')} {fmus}: {file} has its own archives; leave the option out")
+        raise InputError(f"{spell_argument('fmus')} {fmus}: {file} has its own archives; leave the option out")
     from feedsim.simulation import ssp  # not for runs of scenario files
 
-    with ssp.opened(file, texts) as result:
-        yield Opened(result.scenario, result.program, result.fmus, texts, result.told, result.named)
+    with ssp.open_system(file, texts) as result:
+        yield OpenedRun(result.scenario, result.program, result.fmus, texts, result.told, result.named)
 
 
 # --- One scenario, run, with its figures, causes and pictures ---------------------------------------------------------
@@ -134,9 +134,9 @@ class EvaluatedRun(JudgedRun):
         return cls(**judged_run, page=page, uncertainty=uncertainty)
 
     @cached_property
-    def figures(self) -> analysis.Named:
+    def figures(self) -> analysis.FigureTable:
         """Name -> figure, such as "XZ.G", as the scenario's `evaluate` asks for them."""
-        figures = analysis.Named(analysis.evaluate(self, self._tasks))
+        figures = analysis.FigureTable(analysis.evaluate(self, self._tasks))
         return figures if self.uncertainty is None else figures.with_intervals(self.uncertainty.figures)
 
     @cached_property
@@ -147,7 +147,7 @@ class EvaluatedRun(JudgedRun):
     @cached_property
     def changes(self) -> Sequence[Proposal]:
         """What to change, from what to what, the first one first; none of a run that is wrong."""
-        return report.changes(self, self.figures, self.causes)
+        return report.proposed_changes(self, self.figures, self.causes)
 
     @cached_property
     def _tasks(self) -> Sequence[analysis.Task]:
@@ -207,7 +207,7 @@ def run(
     ] = True,
     uncertain: Draws = 0,
     fmus: Archives = None,
-    out: Annotated[File | None, out("{scenario}")] = None,
+    out: Annotated[File | None, output_option("{scenario}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
@@ -230,7 +230,7 @@ def run(
     >>> stiff.figures["Z.settling_time"].unit
     'ms'
     """
-    with opened(scenario, on_machine(machine, set), fmus) as subject:
+    with open_run(scenario, on_machine(machine, set), fmus) as subject:
         analysis.check(subject.plan, subject.program)  # an evaluation that cannot be made is refused before the run
         if report.in_workbook(subject.plan):
             report.workbook_needed()
@@ -245,20 +245,20 @@ def run(
 
             content(subject.plan, subject.program, fmus=subject.fmus)  # and so is a page
         inputs = report.input_paths(subject.plan)
-        with kept(out, KIND, watch, inputs, subject.changes, force=force):
-            for sentence in cosim.executed(subject.plan.machine, subject.fmus, subject.plan.coupling):
+        with claim_result_folder(out, KIND, watch, inputs, subject.changes, force=force):
+            for sentence in cosim.describe_programs(subject.plan.machine, subject.fmus, subject.plan.coupling):
                 watch.announce(subject.named(sentence))
             if out is None:
                 done = _run(subject, None, page, friction_share, watch)
                 return result_of(_with_draws(done, subject, cloud, uncertain, watch))
-            with _rows_kept(report.growing(out), watch) as recorded:
+            with _rows_kept(report.growing_result(out), watch) as recorded:
                 done = _run(subject, recorded, page, friction_share, watch)
                 result = result_of(_with_draws(done, subject, cloud, uncertain, watch), recorded)
                 result.save(out, figures=figures, force=force, control=control)
     return result
 
 
-def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: bool, watch: Watch) -> EvaluatedRun:
+def _run(subject: OpenedRun, recorded: Partial | None, page: bool, friction_share: bool, watch: Watch) -> EvaluatedRun:
     raw = cosim.run(
         subject.plan,
         program=subject.program,
@@ -271,7 +271,7 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: 
         raw = analysis.with_frictionless(raw, subject.fmus, watch.of(f"{subject.plan.name} nearly without friction"))
     if analysis.stops_asked(subject.plan, subject.program):
         raw = analysis.with_clamped(raw, subject.fmus, watch.of(f"{subject.plan.name} on mounts that hold still"))
-    done = judged(raw)
+    done = judge_run(raw)
     done = replace(done, warnings=subject.warnings(done.warnings))
     if not page:
         return EvaluatedRun.of(done)
@@ -280,7 +280,9 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, friction_share: 
     return EvaluatedRun.of(done, html(done, fmus=subject.fmus))
 
 
-def _with_draws(result: EvaluatedRun, subject: Opened, cloud: Cloud | None, count: int, watch: Watch) -> EvaluatedRun:
+def _with_draws(
+    result: EvaluatedRun, subject: OpenedRun, cloud: Cloud | None, count: int, watch: Watch
+) -> EvaluatedRun:
     """The run with what identification leaves open, where that is asked for."""
     if cloud is None:
         return result

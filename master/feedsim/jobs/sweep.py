@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis import Figure, Named
+from feedsim.analysis import Figure, FigureTable
 from feedsim.design.sweep.design import design
 from feedsim.design.sweep.study import AllFailed, Progress
 from feedsim.design.sweep.study import run as run_study
@@ -29,9 +29,9 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.report.results import Content, discard
 from feedsim.report.sweep import report as page
 from feedsim.report.sweep.account import Account, details
@@ -99,7 +99,7 @@ def result_of(swept: Swept) -> Result[Swept]:
         KIND,
         swept,
         partial(page.drawn_report, swept.account),
-        figures=lambda: Named(
+        figures=lambda: FigureTable(
             (name, Figure(_median(table[name]), table.unit(name), f"median of {len(table)} runs"))
             for name in table.figures
         ),
@@ -118,7 +118,7 @@ def result_of(swept: Swept) -> Result[Swept]:
 @job("make the runs of a study; table, sensitivities, report", needs=("sweep",))
 def sweep(
     study: Annotated[File, Argument("STUDY.yaml", "study file (docs/sweeps.md)")],
-    out: Annotated[File | None, out("{study}")] = None,
+    out: Annotated[File | None, output_option("{study}")] = None,
     *,
     set: Settings = None,
     runs: Annotated[int | None, Option("N", "in place of the study's sampling.runs")] = None,
@@ -165,7 +165,7 @@ def sweep(
     planned = design(loaded)
     archives = None if fmus is None else Path(fmus)
     scenario = loaded.base.scenario
-    announce(watch, scenario.machine, archives, scenario.coupling)
+    announce_programs(watch, scenario.machine, archives, scenario.coupling)
     temporary = TemporaryFolder() if out is None else None
     folder = temporary.path if temporary is not None else Path(out or "")
 
@@ -176,7 +176,7 @@ def sweep(
         resumed = now.resumed
         watch.progress(loaded.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
 
-    with kept(folder, KIND, watch, inputs_of(loaded), texts, force=force):
+    with claim_result_folder(folder, KIND, watch, inputs_of(loaded), texts, force=force):
         try:
             table = run_study(
                 loaded,

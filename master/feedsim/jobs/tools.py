@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, overload
 
 from feedsim.files import trace
-from feedsim.foundation.arguments import listed, spelt
+from feedsim.foundation.arguments import spell_argument, split_names
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.outputs import check_file, unchanged
+from feedsim.foundation.outputs import check_file, content_check
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.jobs.examples import Example, copy, examples
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out_file
@@ -80,14 +80,14 @@ def convert(
     b'time [s],Z.x_a [mm]'
     """
     path = Path(file)
-    columns = [_column(text) for text in listed(column)]
+    columns = [_column(text) for text in split_names(column)]
     if out is not None:
         check_file(Path(out), [path], ours=lambda there: True)  # an input is refused before it is read
     with TemporaryFolder() as folder:
         recording = trace.read_recording(path)
         written = trace.convert(recording, columns, folder / "converted.csv")
         content = (folder / "converted.csv").read_bytes()
-    kind = MadeKind("convert", "table", unchanged(content))
+    kind = MadeKind("convert", "table", content_check(content))
     answer = f"{len(written.columns) + 1} columns from {path}"
     made = Made(kind, f"{path.stem}.csv", content, [answer], recording.notes, inputs=[path])
     if out is not None:
@@ -100,7 +100,7 @@ def _column(text: str) -> tuple[str, str, str]:
     variable, equals, rest = text.partition("=")
     name, colon, unit = rest.rpartition(":")
     if not (equals and colon and variable and name and unit):
-        raise InputError(f"{spelt('column')} {text}: VARIABLE=NAME:UNIT is needed, e.g. qg=Z.x_s:m")
+        raise InputError(f"{spell_argument('column')} {text}: VARIABLE=NAME:UNIT is needed, e.g. qg=Z.x_s:m")
     return variable, name, unit
 
 
@@ -122,7 +122,7 @@ def schema(
     'feedsim study file'
     """
     if kind not in get_args(FileKind):
-        raise InputError(f"{spelt('kind')} is {kind!r}; allowed: {', '.join(get_args(FileKind))}")
+        raise InputError(f"{spell_argument('kind')} is {kind!r}; allowed: {', '.join(get_args(FileKind))}")
     return json_schema(kind)
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Annotated
 
 from feedsim import scenario as scenarios
-from feedsim.analysis import Named
-from feedsim.design.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, Judged, tune
+from feedsim.analysis import FigureTable
+from feedsim.design.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, JudgedCompensation, tune
 from feedsim.design.tune.proposals import check_controlled
 from feedsim.design.uncertainty import check_count, cloud_of
 from feedsim.files.fields import no_axis
-from feedsim.foundation.arguments import listed, settings, spelt
+from feedsim.foundation.arguments import settings, spell_argument, split_names
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -27,9 +27,9 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.report import tune as page
 from feedsim.report.provenance import input_paths
 from feedsim.report.tune.drive import lines_of
@@ -38,13 +38,13 @@ from feedsim.report.tune.report import SETTINGS, SHEET
 KIND = Kind("tune", page.FILES)
 
 
-def result_of(judged: Judged) -> Result[Judged]:
+def result_of(judged: JudgedCompensation) -> Result[JudgedCompensation]:
     """A friction compensation: its values, and errors of circles without and with it."""
     return Result(
         KIND,
         judged,
         partial(page.report_of, judged),
-        figures=Named(page.figures_of(judged)),
+        figures=FigureTable(page.figures_of(judged)),
         details=partial(page.details, judged),
         files=lambda: {SETTINGS: page.settings(judged), SHEET: page.sheet(judged)},
         inputs=input_paths(judged.scenario),
@@ -66,11 +66,11 @@ def tune_compensation(
     uncertain: Draws = 0,
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("tune_{scenario}")] = None,
+    out: Annotated[File | None, output_option("tune_{scenario}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> Result[Judged]:
+) -> Result[JudgedCompensation]:
     """Find the values of a friction compensation on short circles, and judge them on other radii and feeds.
 
     A pulse on the speed setpoint, constant or with a characteristic over the acceleration (SINUMERIK), a torque over
@@ -95,28 +95,30 @@ def tune_compensation(
     """
     for name, value, known in (("kind", kind, COMPENSATOR_KINDS), ("objective", objective, OBJECTIVES)):
         if value not in known:
-            raise InputError(f"{spelt(name)} {value}: of {', '.join(known)}")
+            raise InputError(f"{spell_argument(name)} {value}: of {', '.join(known)}")
     changes = settings(set)
     plan = scenarios.load(scenario, changes)
     planes = [motion.plane for motion in plan.motions if motion.kind == "circle"]
     if not planes:
         raise InputError(f"{plan.file}: has no circle, whose plane would be that of the circles to tune on")
     plane = planes[0]
-    wanted = plane if axes is None else listed(axes)
+    wanted = plane if axes is None else split_names(axes)
     for axis in wanted:
         if axis not in plane:
-            raise InputError(f"{spelt('axes')} {','.join(wanted)}: {no_axis(axis, plane)}")
+            raise InputError(f"{spell_argument('axes')} {','.join(wanted)}: {no_axis(axis, plane)}")
         plan.machine.friction_of(axis, "tuning")
         check_controlled(plan.machine, axis)
     if not wanted or len(dict.fromkeys(wanted)) < len(wanted):
-        raise InputError(f"{spelt('axes')} {','.join(wanted)}: names of axes are needed, each once, such as X,Z")
+        raise InputError(
+            f"{spell_argument('axes')} {','.join(wanted)}: names of axes are needed, each once, such as X,Z"
+        )
     cloud = None
     if uncertain:
         check_count(uncertain)
         cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, KIND, watch, input_paths(plan), changes, force=force):
-        announce(watch, plan.machine, archives, plan.coupling)
+    with claim_result_folder(out, KIND, watch, input_paths(plan), changes, force=force):
+        announce_programs(watch, plan.machine, archives, plan.coupling)
         judged = tune(
             plan,
             kind,

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Annotated
 
 from feedsim import scenario as scenarios
-from feedsim.analysis import Named
+from feedsim.analysis import FigureTable
 from feedsim.design.tune import Proposal, of_run
-from feedsim.design.tune.drive import EVALUATIONS, Limits, Tuned
+from feedsim.design.tune.drive import EVALUATIONS, Limits, TunedDrive
 from feedsim.design.tune.drive import tune_drive as tune
 from feedsim.design.tune.drive_program import check_axis
 from feedsim.design.uncertainty import check_count, cloud_of
 from feedsim.estimation.replay.machine_files import drive_file
 from feedsim.files.source import is_ssp
-from feedsim.foundation.arguments import Value, amount, given, quantity, settings, spelt
+from feedsim.foundation.arguments import Value, amount, prefix_argument_errors, quantity, settings, spell_argument
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.diff import KIND as KIND_OF_OVERLAYS
 from feedsim.jobs.diff import Overlay, diff
@@ -35,9 +35,9 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, in_words_of, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder, in_words_of
 from feedsim.jobs.run import KIND as KIND_OF_RUNS
 from feedsim.jobs.run import EvaluatedRun, run
 from feedsim.jobs.run import result_of as result_of_run
@@ -47,7 +47,7 @@ from feedsim.report.tune import drive as page
 from feedsim.scenario import Machine, load
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation import cosim
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.structure import Modes
 from feedsim.structure.build import build
 
@@ -57,7 +57,7 @@ LEAST_EVALUATIONS = 10
 KIND = Kind("tune-drive", (page.SETTINGS, page.SHEET))
 
 
-def result_of(tuned: Tuned, control: str, asked: Mapping[str, str], folder: str) -> Result[Tuned]:
+def result_of(tuned: TunedDrive, control: str, asked: Mapping[str, str], folder: str) -> Result[TunedDrive]:
     """A tuned drive: values to load and to type, margins and motions before and after.
 
     control: in whose names values are shown, too. asked: name -> text of what was asked for. folder: that it is written
@@ -67,7 +67,7 @@ def result_of(tuned: Tuned, control: str, asked: Mapping[str, str], folder: str)
         KIND,
         tuned,
         lambda: page.report_of(tuned, control, folder),
-        figures=Named(page.figures_of(tuned)),
+        figures=FigureTable(page.figures_of(tuned)),
         details=lambda: page.details(tuned, asked),
         files=lambda: {
             page.SETTINGS: page.settings(tuned),
@@ -105,12 +105,12 @@ def tune_drive(
     uncertain: Draws = 0,
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("tune_drive_{scenario}_{axes}")] = None,
+    out: Annotated[File | None, output_option("tune_drive_{scenario}_{axes}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> Result[Tuned]:
+) -> Result[TunedDrive]:
     """Tune the drive of an axis within margins: K_p, T_n, K_v, T_sym, T_dyn, reference model, current filters.
 
     Margins hold at the pose of the machine file and at further ones, for elastic modes 10 % lower and higher. Moves and
@@ -139,27 +139,27 @@ def tune_drive(
         _positive("encoder_noise", encoder_noise, "rad", "10 urad", zero=True),
     )
     if evaluations < LEAST_EVALUATIONS:
-        raise InputError(f"{spelt('evaluations')} {evaluations}: at least {LEAST_EVALUATIONS} are needed")
+        raise InputError(f"{spell_argument('evaluations')} {evaluations}: at least {LEAST_EVALUATIONS} are needed")
     changes = settings(set)
     plan = scenarios.load(scenario, changes)
     try:
         check_axis(plan, axes)
     except InputError as error:
-        raise InputError(f"{spelt('axes')} {axes}: {error}") from None
+        raise InputError(f"{spell_argument('axes')} {axes}: {error}") from None
     cloud = None
     if uncertain:
         check_count(uncertain)
         cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
     places = _places(plan.machine, at)
-    asked = _asked(axes, limits, at, evaluations, uncertain)
+    asked = _settings_texts(axes, limits, at, evaluations, uncertain)
     kind = replace(KIND, may_write=(*KIND.may_write, *map(drive_file, plan.machine.axes)))
 
-    with in_words_of(control), kept(
+    with in_words_of(control), claim_result_folder(
         out, kind, watch, input_paths(plan), [*changes, *(f"{name}={text}" for name, text in asked.items())],
         force=force,
     ):  # fmt: skip
-        announce(watch, plan.machine, archives, plan.coupling)
+        announce_programs(watch, plan.machine, archives, plan.coupling)
         poses = _poses(plan.machine, places, watch)
         tuned = tune(
             plan, axes, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations, cloud=cloud,
@@ -174,7 +174,7 @@ def tune_drive(
 def _positive(name: str, value: Value, unit: str, example: str, *, zero: bool = False) -> float:
     result = _decibels(value, name) if unit == "dB" else quantity(name, value, unit, example)
     if result < 0 or (result == 0 and not zero):
-        raise InputError(f"{spelt(name)} {value}: more than zero is needed, e.g. {example}")
+        raise InputError(f"{spell_argument(name)} {value}: more than zero is needed, e.g. {example}")
     return result
 
 
@@ -185,10 +185,10 @@ def _decibels(value: Value, name: str) -> float:
     try:
         return float(number)
     except ValueError:
-        raise InputError(f"{spelt(name)} {value}: a number of dB is needed, e.g. 8 dB") from None
+        raise InputError(f"{spell_argument(name)} {value}: a number of dB is needed, e.g. 8 dB") from None
 
 
-def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int, uncertain: int) -> dict[str, str]:
+def _settings_texts(axis: str, limits: Limits, at: Sequence[str], evaluations: int, uncertain: int) -> dict[str, str]:
     """What was asked for besides changes of the scenario, the same text for the same value."""
     result = {
         "axes": axis,
@@ -206,7 +206,7 @@ def _places(machine: Machine, texts: Sequence[str]) -> dict[str, dict[str, float
     if texts and machine.structure is None:
         raise InputError(
             f"{machine.name}: has no structure to compute modes from at another pose; give it the key structure, or "
-            f"leave {spelt('at')} out"
+            f"leave {spell_argument('at')} out"
         )
     return {text: _place(machine, text) for text in texts}
 
@@ -217,16 +217,18 @@ def _place(machine: Machine, text: str) -> dict[str, float]:
         axis, equals, position = (name.strip() for name in part.partition("="))
         if not equals or axis not in machine.axes:
             raise InputError(
-                f"{spelt('at')} {text}: AXIS=POSITION is needed, e.g. Z=600mm; axes are {', '.join(machine.axes)}"
+                f"{spell_argument('at')} {text}: AXIS=POSITION is needed, e.g. Z=600mm; axes are "
+                f"{', '.join(machine.axes)}"
             )
         if axis in pose:
-            raise InputError(f"{spelt('at')} {text}: {axis} is given twice")
-        with given("at", text):
+            raise InputError(f"{spell_argument('at')} {text}: {axis} is given twice")
+        with prefix_argument_errors("at", text):
             pose[axis] = amount(position, "m", "600 mm")
         low, high = machine.axes[axis].travel
         if not low <= pose[axis] <= high:
             raise InputError(
-                f"{spelt('at')} {text}: {axis} is outside of its travel, {low * 1e3:.6g} to {high * 1e3:.6g} mm"
+                f"{spell_argument('at')} {text}: {axis} is outside of its travel, {low * 1e3:.6g} to "
+                f"{high * 1e3:.6g} mm"
             )
     return {axis: machine.pose[axis] for axis in machine.axes} | pose
 
@@ -251,7 +253,7 @@ TRIED_FIGURES = ("G", "overshoot", "settling_time")
 SHOWN_OF_AXES = ("peak_", "servo_mismatch")
 
 
-class Tried(Overlay):
+class TriedProposals(Overlay):
     """A run as it is, and with all proposals that have a value; one run alone where none has.
 
     Attributes:
@@ -265,7 +267,7 @@ class Tried(Overlay):
         self.settings = settings_of(proposals)
 
 
-def _lines_of(tried: Tried) -> list[str]:
+def _lines_of(tried: TriedProposals) -> list[str]:
     """What the run is, what was changed, and the leading figures before and after."""
     first, *second = tried.runs
     if not second:
@@ -273,7 +275,7 @@ def _lines_of(tried: Tried) -> list[str]:
     changed = [
         f"tried: {name} {first.figures[name]} -> {figure}"
         for name, figure in second[0].figures.items()
-        if name in first.figures and _leading(name)
+        if name in first.figures and _is_leading_figure(name)
     ]
     return [*first.lines, *change_lines(tried.proposals), *changed]
 
@@ -289,12 +291,12 @@ def tune_proposals(
     *,
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("{scenario}")] = None,
+    out: Annotated[File | None, output_option("{scenario}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     control: ControlName = "",
     watch: Watch = NO_WATCH,
-) -> Result[Tried]:
+) -> Result[TriedProposals]:
     """Run a scenario, and again with all values that the report of that run proposes.
 
     Writes the run as it is to the folder, the second one beside it to NAME_tried, and both over each other to
@@ -328,12 +330,12 @@ def tune_proposals(
         changed = load(plan.file, [*plan.overrides, *settings])
         progress = watch.of(f"{plan.name}, tried")
         archives = None if fmus is None else Path(fmus)
-        runs.append(result_of_run(EvaluatedRun.of(judged(cosim.run(changed, fmus=archives, progress=progress)))))
+        runs.append(result_of_run(EvaluatedRun.of(judge_run(cosim.run(changed, fmus=archives, progress=progress)))))
     place = folders["overlay"] if folders is not None and settings else None
     if folders is not None and settings:
         runs[1].save(folders["tried"], figures=figures, force=force, control=control)
         diff(str(out), folders["tried"]).save(folders["overlay"], figures=figures, force=force, control=control)
-    tried = Tried(runs, proposals)
+    tried = TriedProposals(runs, proposals)
     return result_of_overlay(tried, first.findings, partial(_lines_of, tried), place)
 
 
@@ -344,6 +346,6 @@ def _folders(out: File | None) -> Mapping[str, Path] | None:
     return {name: Path(out).with_name(f"{Path(out).name}_{name}") for name in ("tried", "overlay")}
 
 
-def _leading(name: str) -> bool:
+def _is_leading_figure(name: str) -> bool:
     prefix, _, key = name.partition(".")
     return key in TRIED_FIGURES or (key.startswith(SHOWN_OF_AXES) and "." not in key and bool(prefix))

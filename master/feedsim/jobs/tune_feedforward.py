@@ -14,7 +14,7 @@ from feedsim.analysis import compensation
 from feedsim.analysis.compensation import Compensation, check_moves, lags_of, moving_axes
 from feedsim.design.uncertainty import (
     Cloud,
-    Known,
+    KnownValues,
     Uncertainty,
     check_count,
     cloud_of,
@@ -23,7 +23,7 @@ from feedsim.design.uncertainty import (
     of_compensation,
 )
 from feedsim.files.trace import write_csv
-from feedsim.foundation.arguments import Pairs, Value, amount, by_name, pairs, settings, spelt
+from feedsim.foundation.arguments import Pairs, Value, amount, by_name, pairs, settings, spell_argument
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
     NO_WATCH,
@@ -37,9 +37,9 @@ from feedsim.jobs.parameters import (
     Settings,
     Watch,
     job,
-    out,
+    output_option,
 )
-from feedsim.jobs.result import Kind, Result, announce, kept
+from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
 from feedsim.report import compensate as page
 from feedsim.report import uncertainty as intervals
 from feedsim.report.content import Report
@@ -52,7 +52,7 @@ KIND = Kind("compensate", page.FILES)
 
 
 @dataclass(frozen=True, eq=False)
-class Compensated:
+class CompensatedCircle:
     """A circle without and with compensation.
 
     compensation: both runs, the feedforward, what errors cost. frictions: axis -> file that the friction of its
@@ -64,10 +64,10 @@ class Compensated:
     uncertainty: Uncertainty | None = None
 
 
-def result_of(value: Compensated) -> Result[Compensated]:
+def result_of(value: CompensatedCircle) -> Result[CompensatedCircle]:
     """A circle without and with compensation: G and glitches before and after, and what errors cost."""
     done, uncertainty = value.compensation, value.uncertainty
-    figures = analysis.Named(done.figures).with_intervals({} if uncertainty is None else uncertainty.figures)
+    figures = analysis.FigureTable(done.figures).with_intervals({} if uncertainty is None else uncertainty.figures)
     keys = ["G", *(f"glitch_{axis}" for axis in done.turn.axes)]
     leading = [f"{which}.{key}" for which in ("before", "after") for key in keys]
 
@@ -125,11 +125,11 @@ def tune_feedforward(
     uncertain: Draws = 0,
     set: Settings = None,
     fmus: Archives = None,
-    out: Annotated[File | None, out("feedforward_{scenario}")] = None,
+    out: Annotated[File | None, output_option("feedforward_{scenario}")] = None,
     figures: FigureKinds = (),
     force: Force = False,
     watch: Watch = NO_WATCH,
-) -> Result[Compensated]:
+) -> Result[CompensatedCircle]:
     """Run a circle without and with friction compensation of every axis that moves.
 
     A friction model, driven by the speed setpoint with the lag of the axis, gives a torque that is added to the torque
@@ -164,16 +164,16 @@ def tune_feedforward(
     _check_lags(plan, [axis for axis in moving_axes(program) if axis not in delays])
     known, cloud = _open_of(plan, sets, uncertain)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, KIND, watch, [*input_paths(plan), *files.values()], changes, force=force):
-        announce(watch, plan.machine, archives, plan.coupling)
+    with claim_result_folder(out, KIND, watch, [*input_paths(plan), *files.values()], changes, force=force):
+        announce_programs(watch, plan.machine, archives, plan.coupling)
         done = compensation.compensate(
             plan, program, frictions=sets, delays=delays, table=table,
-            machines=_changed(plan, program) if table else {}, fmus=archives, progress=watch.progress,
+            machines=_changed_machines(plan, program) if table else {}, fmus=archives, progress=watch.progress,
         )  # fmt: skip
         uncertainty = None
         if uncertain:
             uncertainty = of_compensation(done, known, cloud, uncertain, fmus=archives, progress=watch.progress)
-        result = result_of(Compensated(done, files, uncertainty))
+        result = result_of(CompensatedCircle(done, files, uncertainty))
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result
@@ -181,7 +181,7 @@ def tune_feedforward(
 
 def _open_of(
     plan: scenarios.Scenario, sets: Mapping[str, scenarios.FrictionParameters], count: int
-) -> tuple[dict[str, Known], Cloud | None]:
+) -> tuple[dict[str, KnownValues], Cloud | None]:
     """What is known of sets that compensate, by axis, and of the machine. InputError: of neither anything.
 
     Of an axis whose machine values vary, the set stays as the file has it: it is what the control has, and only what it
@@ -196,7 +196,7 @@ def _open_of(
     return known, None if known and not of_machine else cloud_of(plan.machine)
 
 
-def _changed(plan: scenarios.Scenario, program: nc.Program) -> dict[str, scenarios.Machine]:
+def _changed_machines(plan: scenarios.Scenario, program: nc.Program) -> dict[str, scenarios.Machine]:
     """Words -> machine with another effect, that the compensation is tried on, too."""
     from feedsim.design.tune.knobs import effects_of  # without the table nobody needs it
 
@@ -228,6 +228,6 @@ def _check_lags(plan: scenarios.Scenario, axes: Sequence[str]) -> None:
     try:
         lags_of(plan, axes)
     except InputError as error:
-        option = spelt("delay")
+        option = spell_argument("delay")
         helps = f"{option} AXIS=VALUE" if option.startswith("--") else f"{option}={{axis: value}}"
         raise InputError(f"{error} ({helps})", error.problems) from None

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError
 from feedsim.linear.loops import GROWTH, MAX_PHASE_STEP
-from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, LinearDrive, ModalPlant, modal_sums
+from feedsim.linear.plant import CHUNK, Complexes, Floats, InputHold, LinearDrive, ModalPlant, modal_sums
 from feedsim.scenario import Cycles, Drive, Friction, FrictionParameters, Machine
 from feedsim.structure import Modes
 
@@ -37,21 +37,21 @@ State = Literal["moving", "at rest"]
 STATES: tuple[State, State] = ("moving", "at rest")
 FREQUENCY_STEP = 0.05  # relative step of the frequencies between resonances; drives and delays are smooth
 # Points about a resonance, in its half widths: a circle is a polygon of these.
-ABOUT = np.array([-5.0, -2.4, -1.3, -0.7, -0.3, 0.0, 0.3, 0.7, 1.3, 2.4, 5.0])
-SHOWS = 0.03  # of an open-loop gain: a resonance that adds less at its peak is not looked at closely
+RESONANCE_POINTS = np.array([-5.0, -2.4, -1.3, -0.7, -0.3, 0.0, 0.3, 0.7, 1.3, 2.4, 5.0])
+NOTICEABLE_GAIN = 0.03  # of an open-loop gain: a resonance that adds less at its peak is not looked at closely
 # Factors on a gain within which a stable loop has its limits, and those that are tried for one that is not or hardly,
 # since a unit left out may be 1000. A step is 1.2 %.
-WITHIN = 1e-2, 1e2
+GAIN_FACTOR_RANGE = 1e-2, 1e2
 GAINS = np.geomspace(1e-6, 1e6, 2401)
 SMALLEST_GAIN = np.finfo(np.float64).tiny  # a loop without gain is no reason to take the logarithm of 0
 # Components either side of 0 Hz that a position loop is the sum of. Further ones are (f/(2/T_pos - f))^3 times smaller:
 # 1 % of the gain at 0.35/T_pos, where a position loop has none left.
-IMAGES = 1
+IMAGE_COUNT = 1
 # Where an open-loop gain, or one CRITICAL_RATIO times larger or smaller, passes -1 within CRITICAL_SECTOR [rad], it is
 # followed in steps of CRITICAL_STEP: limits and margins lie there.
 CRITICAL_SECTOR, CRITICAL_RATIO, CRITICAL_STEP = 1.0, 8.0, 0.2
 MAX_HALVINGS = 12  # of halving steps at most
-REAL = 1e-3  # [rad] from -180 degrees: as much of a phase is rounding, at half the sampling rate
+PHASE_ROUNDING = 1e-3  # [rad] from -180 degrees: as much of a phase is rounding, at half the sampling rate
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def locked_modes(machine: Machine, modes: Modes) -> tuple[Floats, Floats, Floats
     drives = tuple(LinearDrive(machine.shipped_drive(name, "a page"), machine.cycles, axis.I_P)
                    for name, axis in machine.axes.items())  # fmt: skip
     axes = tuple(machine.axes)
-    return Sampled(axes, drives, (None,) * len(axes), ModalPlant.of(modes, axes)).locked()
+    return SampledAxes(axes, drives, (None,) * len(axes), ModalPlant.of(modes, axes)).locked_modes()
 
 
 class Bristles(NamedTuple):
@@ -131,20 +131,20 @@ def _judged_axes(
     """`driven`: name, drive and I_P of the axes judged; `bristles`: what holds each at rest, where that is known."""
     axes = tuple(name for name, _, _ in driven)
     drives = tuple(LinearDrive(drive, cycles, I_P) for _, drive, I_P in driven)
-    return Sampled(axes, drives, bristles, ModalPlant.of(modes, axes)).judged()
+    return SampledAxes(axes, drives, bristles, ModalPlant.of(modes, axes)).judged()
 
 
-def _judged(
+def _judge_loop(
     axis: str, kind: Kind, state: State, gain: float, L: Complexes, growing: int, closed: int, inner: int
 ) -> Loop:
     """What the open-loop gain L (F,) along half the contour shows of a loop.
 
     growing: solutions that grow with it closed; closed: with all loops closed; inner: in the loops below it alone.
     """
-    limits = _limits(L, WITHIN)
+    limits = _limits(L, GAIN_FACTOR_RANGE)
     gain_margin, phase_margin = _gain_margin(limits, 1.0), _phase_margin(L, 1.0)
     if not growing and gain_margin >= GAIN_MARGIN and phase_margin >= PHASE_MARGIN:
-        limit = gain * float(min(limits, key=_far)) if limits.size else None
+        limit = gain * float(min(limits, key=_log_distance)) if limits.size else None
         return Loop(axis, kind, state, gain, closed, False, limit, gain_margin, phase_margin, gain)
     # between two limits, of all gains that are tried, the number of growing solutions is the same
     limits = _limits(L, (GAINS[0], GAINS[-1]))
@@ -156,8 +156,8 @@ def _judged(
     unstable = bool(growing > least) and not inner
     if growing and not unstable:  # another loop is the cause, and margins say nothing
         return Loop(axis, kind, state, gain, closed, False, None, math.inf, 180.0, None)
-    good = [k for k in sorted(GAINS, key=_far) if fewest[np.searchsorted(limits, k)]]
-    limit = min((limits if not unstable else _edges(ends, fewest)), key=_far, default=None)
+    good = [k for k in sorted(GAINS, key=_log_distance) if fewest[np.searchsorted(limits, k)]]
+    limit = min((limits if not unstable else _edges(ends, fewest)), key=_log_distance, default=None)
     advised = next(
         (k for k in good if _gain_margin(limits, k) >= GAIN_MARGIN and _phase_margin(L, k) >= PHASE_MARGIN), None
     )
@@ -165,7 +165,7 @@ def _judged(
     return Loop(axis, kind, state, gain, closed, unstable, limit, gain_margin, phase_margin, advised)
 
 
-def _far(factor: float) -> float:
+def _log_distance(factor: float) -> float:
     return abs(math.log(factor))
 
 
@@ -181,7 +181,7 @@ def _limits(L: Complexes, within: tuple[float, float]) -> Floats:
     through = np.flatnonzero((np.signbit(angle[1:]) != np.signbit(angle[:-1])) & (np.abs(turn) < np.pi))
     share = -angle[through] / turn[through]
     factors = np.exp(-(size[through] + share * np.diff(size)[through]))
-    if abs(angle[-1]) < REAL:  # half the sampling rate: the mirror image of the contour meets it there
+    if abs(angle[-1]) < PHASE_ROUNDING:  # half the sampling rate: the mirror image of the contour meets it there
         factors = np.append(factors, np.exp(-size[-1]))
     return np.sort(factors[(factors > within[0]) & (factors < within[1])])
 
@@ -206,7 +206,7 @@ def _windings(values: Complexes) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledAxes:
     """The axes that are judged, and what their loops consist of."""
 
     axes: tuple[str, ...]
@@ -222,10 +222,10 @@ class Sampled:
         """The same, with the frequencies (F,) [Hz] of the speed loops and their determinants (2, 1 + asked, F)."""
         asked = tuple(range(len(self.axes))) if axes is None else tuple(axes)
         cycles = self.drives[0].cycles
-        frequency, speed = self._along(
+        frequency, speed = self._sample_contour(
             partial(self._speed_level, asked), self._frequencies(0.5 / cycles.T_c, self.free_resonances())
         )
-        _, position = self._along(
+        _, position = self._sample_contour(
             partial(self._position_level, asked), self._frequencies(0.5 / cycles.T_pos, self.locked_resonances())
         )
         loops: list[Loop] = []
@@ -241,10 +241,10 @@ class Sampled:
                 ):
                     if gain > 0:
                         L = level[0] / level[1 + j] - 1
-                        loops.append(_judged(axis, kind, state, gain, L, growing, closed, inner))
+                        loops.append(_judge_loop(axis, kind, state, gain, L, growing, closed, inner))
         return tuple(loops), frequency, speed
 
-    def _along(self, level: Callable[[Complexes], Complexes], frequency: Floats) -> tuple[Floats, Complexes]:
+    def _sample_contour(self, level: Callable[[Complexes], Complexes], frequency: Floats) -> tuple[Floats, Complexes]:
         """Half of a level's contour [Hz] and its determinants there (2, 1 + asked, F), close enough together that none
         jumps."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -280,14 +280,14 @@ class Sampled:
         seen = np.maximum(np.abs(plant.rotor), np.abs(plant.scale) / self._leads)[elastic].max(axis=1)
         driven = (np.abs(plant.rotor[elastic]) * [drive.drive.K_p for drive in self.drives]).max(axis=1)
         omega, damping = plant.omega_0[elastic], plant.damping[elastic]
-        return _about(omega, damping, seen * driven / np.maximum(2 * damping * omega, GROWTH))
+        return _frequencies_about(omega, damping, seen * driven / np.maximum(2 * damping * omega, GROWTH))
 
     def locked_resonances(self) -> Floats:
         """The same of the position loops."""
-        omega, damping, peak = self.locked()
-        return _about(omega, damping, max(drive.drive.K_v for drive in self.drives) * peak)
+        omega, damping, peak = self.locked_modes()
+        return _frequencies_about(omega, damping, max(drive.drive.K_v for drive in self.drives) * peak)
 
-    def locked(self) -> tuple[Floats, Floats, Floats]:
+    def locked_modes(self) -> tuple[Floats, Floats, Floats]:
         """Modes with the motors held, which stiff speed loops come close to: frequency (N,) [rad/s], damping ratio
         (N,), and its peak in an open-loop gain (N,) per K_v [s].
 
@@ -317,7 +317,7 @@ class Sampled:
     def _position_level(self, asked: Sequence[int], s: Complexes) -> Complexes:
         """(2, 1 + asked, F) the same of the position loops, speed loops closed."""
         A, m, T_pos = len(self.axes), self.drives[0].ticks, self.drives[0].cycles.T_pos
-        components = range(-IMAGES, IMAGES + 1) if m > 2 * IMAGES else range(m)
+        components = range(-IMAGE_COUNT, IMAGE_COUNT + 1) if m > 2 * IMAGE_COUNT else range(m)
         every = (s[:, None] + 2j * np.pi * np.array(components) / T_pos).ravel()
         gains = np.array([drive.position_gain for drive in self.drives])
         answer = np.empty((len(every), A), dtype=np.complex128)
@@ -359,7 +359,7 @@ class Sampled:
                     seen[:, i] = V[:, None] * x[:, i]
             yield x, through * seen + past * n, past * n
 
-    def ports(self, s: Complexes, hold: Hold) -> tuple[Complexes, Complexes]:
+    def ports(self, s: Complexes, hold: InputHold) -> tuple[Complexes, Complexes]:
         """(C, A, A) speeds and positions of the axes per torque."""
         plant, A = self.plant, len(self.axes)
         speeds = (plant.rotor[:, :, None] * plant.rotor[:, None]).reshape(-1, A * A)
@@ -386,11 +386,11 @@ def _s(frequency: Floats) -> Complexes:
     return np.asarray(GROWTH + 2j * np.pi * frequency)
 
 
-def _about(omega: Floats, damping: Floats, peak: Floats) -> Floats:
+def _frequencies_about(omega: Floats, damping: Floats, peak: Floats) -> Floats:
     """Frequencies [Hz] about those of the resonances at omega [rad/s] whose `peak` in an open-loop gain shows."""
-    shows = peak > SHOWS
+    shows = peak > NOTICEABLE_GAIN
     width = np.maximum(damping[shows] * omega[shows], GROWTH)
-    return np.asarray((omega[shows, None] + width[:, None] * ABOUT).ravel() / (2 * np.pi))
+    return np.asarray((omega[shows, None] + width[:, None] * RESONANCE_POINTS).ravel() / (2 * np.pi))
 
 
 def _determinants(loop: Complexes, opened: Complexes, rows: Sequence[int]) -> Complexes:
@@ -421,7 +421,7 @@ MAX_GAIN_RATIO = 4.0
 MOTOR = ("current", "R", "L_d", "L_q", "p", "K_t", "ideal_current_loop")  # what the current loop consists of
 
 
-class Judged(NamedTuple):
+class JudgedAxis(NamedTuple):
     """Speed and position loop of the axis in both states, and the motor torque [N.m] per noise of the angle [rad]."""
 
     loops: tuple[Loop, ...]
@@ -451,13 +451,13 @@ class Ports:
     n: Complexes
     x: Complexes
 
-    def at(self, s: Complexes, plant: Sampled, hold: Hold) -> tuple[Complexes, Complexes]:
+    def at(self, s: Complexes, plant: SampledAxes, hold: InputHold) -> tuple[Complexes, Complexes]:
         """Those at s; what is not known yet is worked out and kept."""
         at, missing = self._places(s)
         if missing.any():
             new = np.unique(s[missing])
             new = new[np.argsort(new.imag)]
-            n, x = Sampled.ports(plant, new, hold)
+            n, x = SampledAxes.ports(plant, new, hold)
             order = np.argsort(np.concatenate([self.s, new]).imag, kind="stable")
             self.s = np.concatenate([self.s, new])[order]
             self.n, self.x = np.concatenate([self.n, n])[order], np.concatenate([self.x, x])[order]
@@ -474,11 +474,11 @@ class Ports:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure(Sampled):
+class Structure(SampledAxes):
     """Loops whose structure is kept: frequencies about resonances, and ports per hold."""
 
     near: tuple[Floats, Floats]
-    kept: dict[Hold, Ports] = field(default_factory=dict)
+    kept: dict[InputHold, Ports] = field(default_factory=dict)
 
     def free_resonances(self) -> Floats:
         return self.near[0]
@@ -486,7 +486,7 @@ class Structure(Sampled):
     def locked_resonances(self) -> Floats:
         return self.near[1]
 
-    def ports(self, s: Complexes, hold: Hold) -> tuple[Complexes, Complexes]:
+    def ports(self, s: Complexes, hold: InputHold) -> tuple[Complexes, Complexes]:
         A = len(self.axes)
         if hold not in self.kept:
             none = np.empty((0, A, A), dtype=np.complex128)
@@ -510,21 +510,21 @@ class Candidates:
         self._index = axes.index(axis)
         own = drives[self._index].drive
         stiff = own.model_copy(update={"K_p": MAX_GAIN_RATIO * own.K_p, "K_v": MAX_GAIN_RATIO * own.K_v})
-        wide = Sampled(axes, self._with(drives, stiff), bristles, plant)
+        wide = SampledAxes(axes, self._replace_drive(drives, stiff), bristles, plant)
         self._base = Structure(axes, drives, bristles, plant, (wide.free_resonances(), wide.locked_resonances()))
 
-    def _with(self, drives: tuple[LinearDrive, ...], drive: Drive) -> tuple[LinearDrive, ...]:
+    def _replace_drive(self, drives: tuple[LinearDrive, ...], drive: Drive) -> tuple[LinearDrive, ...]:
         before = drives[self._index]
         own = replace(before, drive=drive)
         if not drive.ideal_current_loop and all(getattr(drive, n) == getattr(before.drive, n) for n in MOTOR):
             own.__dict__["_motor"] = before._motor  # the same motor: a matrix exponential less
         return (*drives[: self._index], own, *drives[self._index + 1 :])
 
-    def judge(self, drive: Drive) -> Judged:
+    def judge(self, drive: Drive) -> JudgedAxis:
         """The loops of the axis with another drive. InputError: gains beyond all numbers."""
-        changed = replace(self._base, drives=self._with(self._base.drives, drive))
+        changed = replace(self._base, drives=self._replace_drive(self._base.drives, drive))
         loops, frequency, levels = changed.judged_with_levels((self._index,))
-        return Judged(loops, _noise(changed.drives[self._index], frequency, levels))
+        return JudgedAxis(loops, _noise(changed.drives[self._index], frequency, levels))
 
 
 def _noise(own: LinearDrive, frequency: Floats, levels: Complexes) -> float:

@@ -19,7 +19,9 @@ Curve = Callable[[Floats], Floats]
 
 STEP_PER_DAMPING = 1 / 3
 GRID_STEPS = (5e-4, 1e-2)  # finest, coarsest relative step of the grid
-INSIDE = 15  # points looked at within every bracket in one call of the curve, which costs little more than a single one
+BRACKET_POINTS = (
+    15  # points looked at within every bracket in one call of the curve, which costs little more than a single one
+)
 CROSSING_ROUNDS = 24  # at most: every other one narrows a bracket to 1/16, the others to what the chord is off
 CHORD_OFFSETS = np.r_[-(8.0 ** np.arange(-1, -8, -1)), 0.0, 8.0 ** np.arange(-7, 0)]  # shares of a bracket, INSIDE
 EXTREME_ROUNDS = 6  # each narrows a bracket to 1/8: two steps to 1e-7; an extreme's place shows to the rounding's root
@@ -62,7 +64,7 @@ def crossings(curve: Curve, frequency: Floats, values: Floats | None = None) -> 
         if (high - low <= 2 * np.spacing(high)).all():
             break
         places = _around_chord(ends, at_ends) if number % 3 else _places(low, high)
-        heights = np.vstack([at_ends[:1], curve(places[1:-1].ravel()).reshape(INSIDE, -1), at_ends[1:]])
+        heights = np.vstack([at_ends[:1], curve(places[1:-1].ravel()).reshape(BRACKET_POINTS, -1), at_ends[1:]])
         first = ((heights < 0) != (at_ends[0] < 0)).argmax(axis=0)
         ends, at_ends = (np.stack([one[first - 1, entry], one[first, entry]]) for one in (places, heights))
     return np.asarray(0.5 * (ends[0] + ends[1]))
@@ -79,7 +81,7 @@ def _around_chord(ends: Floats, values: Floats) -> Floats:
 
 def _places(low: Floats, high: Floats) -> Floats:
     """(INSIDE + 2, n) evenly from the lower to the upper ends of n brackets."""
-    return np.asarray(np.linspace(low, high, INSIDE + 2))
+    return np.asarray(np.linspace(low, high, BRACKET_POINTS + 2))
 
 
 def extremes(curve: Curve, frequency: Floats, values: Floats | None = None) -> tuple[list[Extreme], list[Extreme]]:
@@ -89,7 +91,7 @@ def extremes(curve: Curve, frequency: Floats, values: Floats | None = None) -> t
     result: list[list[Extreme]] = []
     for sign in (-1.0, 1.0):
         where = np.flatnonzero((sign * rise[:-1] > 0) & (sign * rise[1:] <= 0)) + 1
-        places = _highest(curve, sign, frequency[where - 1], frequency[where + 1])
+        places = _find_maximum(curve, sign, frequency[where - 1], frequency[where + 1])
         heights = curve(places) if places.size else places
         result.append([Extreme(float(f), float(v)) for f, v in zip(places, heights, strict=True)])
     return result[0], result[1]
@@ -103,16 +105,16 @@ def peak(curve: Curve, frequency: Floats) -> Extreme | None:
     if not maxima.size:
         return None
     where = maxima[[values[maxima].argmax()]]
-    place = _highest(curve, 1.0, frequency[where - 1], frequency[where + 1])
+    place = _find_maximum(curve, 1.0, frequency[where - 1], frequency[where + 1])
     return Extreme(float(place[0]), float(curve(place)[0]))
 
 
-def _highest(curve: Curve, sign: float, low: Floats, high: Floats) -> Floats:
+def _find_maximum(curve: Curve, sign: float, low: Floats, high: Floats) -> Floats:
     """The maximum of sign * curve in every bracket."""
     values = np.arange(len(low))
     for _ in range(EXTREME_ROUNDS if low.size else 0):
         places = _places(low, high)
-        best = (sign * curve(places[1:-1].ravel())).reshape(INSIDE, -1).argmax(axis=0) + 1
+        best = (sign * curve(places[1:-1].ravel())).reshape(BRACKET_POINTS, -1).argmax(axis=0) + 1
         low, high = places[best - 1, values], places[best + 1, values]
     return np.asarray(0.5 * (low + high))
 

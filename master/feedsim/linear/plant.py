@@ -34,7 +34,7 @@ Complexes = NDArray[np.complex128]
 Responses = Callable[[Complexes], tuple[Complexes, Complexes]]
 
 # How an input runs between its sample instants; "continuous": it is no sampled signal, but exp(s t).
-Hold = Literal["linear", "held", "continuous"]
+InputHold = Literal["linear", "held", "continuous"]
 
 TOOL_DIRECTIONS = ("X", "Y", "Z")
 CHUNK = 128  # values of s worked at a time: what is in between stays in the cache
@@ -76,7 +76,7 @@ class ModalPlant:
             tool=shapes([f"tcp_{direction}" for direction in TOOL_DIRECTIONS]),
         )
 
-    def ports(self, s: Complexes, T: float, hold: Hold) -> Complexes:
+    def ports(self, s: Complexes, T: float, hold: InputHold) -> Complexes:
         """Port matrix at s (F,) [rad/s]: (F, 2 A + 3, A + 3).
 
         Rows: speeds n of the axes [rad/s], positions x of the axes [m], displacements of the tool [m]. Columns: torques
@@ -102,7 +102,7 @@ class ModalPlant:
         places = (np.hstack([self.scale, self.tool])[:, :, None] * into[:, None, :]).reshape(len(into), -1)
         return speeds, places
 
-    def modal(self, s: Complexes, T: float, hold: Hold) -> tuple[Complexes, Complexes]:
+    def modal(self, s: Complexes, T: float, hold: InputHold) -> tuple[Complexes, Complexes]:
         """Responses q and q' of every mode to its own force: (F, N) each."""
         q = np.empty((len(s), len(self.omega_0)), dtype=np.complex128)
         v = np.empty_like(q)
@@ -110,7 +110,7 @@ class ModalPlant:
             q[:, which], v[:, which] = responses(s)
         return q, v
 
-    def _kinds(self, T: float, hold: Hold) -> list[tuple[slice | NDArray[np.int64], Responses]]:
+    def _kinds(self, T: float, hold: InputHold) -> list[tuple[slice | NDArray[np.int64], Responses]]:
         """The modes of each kind with their responses: what does not depend on s is worked out once."""
         if (T, hold) not in self._known:
             rigid = self.omega_0 == 0
@@ -123,7 +123,7 @@ class ModalPlant:
         return self._known[T, hold]
 
     @cached_property
-    def _known(self) -> dict[tuple[float, Hold], list[tuple[slice | NDArray[np.int64], Responses]]]:
+    def _known(self) -> dict[tuple[float, InputHold], list[tuple[slice | NDArray[np.int64], Responses]]]:
         return {}
 
 
@@ -141,7 +141,7 @@ def modal_sums(responses: Complexes, shapes: Floats) -> Complexes:
     return result
 
 
-def _rigid(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
+def _rigid(omega_0: Floats, damping: Floats, T: float, hold: InputHold) -> Responses:
     """The double integrator."""
 
     def responses(s: Complexes) -> tuple[Complexes, Complexes]:
@@ -163,7 +163,7 @@ def _rigid(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
     return responses
 
 
-def _elastic(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
+def _elastic(omega_0: Floats, damping: Floats, T: float, hold: InputHold) -> Responses:
     def continuous(s: Complexes) -> tuple[Complexes, Complexes]:
         s = s[:, None]
         q = 1 / (s * s + 2 * damping * omega_0 * s + omega_0**2)
@@ -191,7 +191,7 @@ def _elastic(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Response
     return sampled
 
 
-def _double_pole(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
+def _double_pole(omega_0: Floats, damping: Floats, T: float, hold: InputHold) -> Responses:
     near, far = (
         [_elastic(omega_0, damping + away, T, hold) for away in (distance, -distance)]
         for distance in (EPSILON, 2 * EPSILON)
@@ -206,7 +206,7 @@ def _double_pole(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Resp
     return responses
 
 
-def _first_order(pole: Complexes, T: float, hold: Hold) -> Callable[[Complexes], Complexes]:
+def _first_order(pole: Complexes, T: float, hold: InputHold) -> Callable[[Complexes], Complexes]:
     """h(p) for poles (N,), a function of z (F, 1): (F, N)."""
     x = pole * T
     exp_x, phi_1 = np.exp(x), np.expm1(x) / x
@@ -320,14 +320,14 @@ class LinearDrive:
         d, T_c = self.drive, self.cycles.T_c
         if not d.speed_integrator:
             return np.zeros_like(s)
-        return np.asarray(d.K_p * T_c / _given(d.T_n) / -np.expm1(-s * T_c))
+        return np.asarray(d.K_p * T_c / _require_value(d.T_n) / -np.expm1(-s * T_c))
 
     def reference_model(self, s: Complexes) -> Complexes:
         """n_ref/n_s [1]: PT2 by Tustin without prewarping, dead time linear between samples."""
         d, T_c = self.drive, self.cycles.T_c
         if not d.reference_model:
             return np.ones_like(s)
-        omega_0, D = _given(d.omega_0), _given(d.D)
+        omega_0, D = _require_value(d.omega_0), _require_value(d.D)
         denominator = (1.0, 2 * D * omega_0, omega_0**2)
         return _bilinear(s, (0.0, 0.0, omega_0**2), denominator, 2 / T_c, T_c) * _linear_delay(s, d.T_ref / T_c, T_c)
 
@@ -413,7 +413,7 @@ class _CurrentLoop:
 
     @classmethod
     def of(cls, drive: Drive, T_c: float, at: OperatingPoint) -> _CurrentLoop:
-        R, L_d, L_q, p = (_given(value) for value in (drive.R, drive.L_d, drive.L_q, drive.p))
+        R, L_d, L_q, p = (_require_value(value) for value in (drive.R, drive.L_d, drive.L_q, drive.p))
         current = drive.current
         assert current is not None  # the machine file's check: needed without the ideal current loop
         psi = drive.K_t / (1.5 * p)
@@ -451,7 +451,7 @@ class _CurrentLoop:
         return per_setpoint / determinant, per_speed / determinant
 
 
-def _given(value: float | None) -> float:
+def _require_value(value: float | None) -> float:
     assert value is not None  # the machine file's checks demand what is switched on
     return float(value)
 
@@ -469,12 +469,12 @@ def _bilinear(
 
 def _filter(s: Complexes, described: Filter, T_c: float) -> Complexes:
     """A current setpoint filter that is on, Tustin prewarped at its frequency."""
-    omega = 2 * math.pi * _given(described.f)
-    denominator = (1.0, 2 * _given(described.D_den) * omega, omega**2)
+    omega = 2 * math.pi * _require_value(described.f)
+    denominator = (1.0, 2 * _require_value(described.D_den) * omega, omega**2)
     if described.type == "low_pass":
         numerator = (0.0, 0.0, omega**2)
     else:
-        numerator = (1.0, 2 * _given(described.D_num) * omega, omega**2)
+        numerator = (1.0, 2 * _require_value(described.D_num) * omega, omega**2)
     return _bilinear(s, numerator, denominator, omega / math.tan(omega * T_c / 2), T_c)
 
 

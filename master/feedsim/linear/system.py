@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace.response import FrequencyResponse, quotient_unit
 from feedsim.foundation.errors import InputError
-from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, LinearDrive, ModalPlant, OperatingPoint
+from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, InputHold, LinearDrive, ModalPlant, OperatingPoint
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
 
 # Which loops of an axis are closed: position and speed; speed alone (K_v = k_ffw = 0); none (the torque is an input).
-Closed = Literal["position", "speed", "none"]
+ClosedLoop = Literal["position", "speed", "none"]
 
 PORT_UNITS = {"M_add": "N.m", "M_a": "N.m", "n_add": "rad/s", "n_a": "rad/s", "n_s": "rad/s", "n_ffw": "rad/s"}
 PORT_UNITS |= (
@@ -38,30 +38,30 @@ FAST_INPUTS = ("n_add", "M_add", "M_a")  # per axis, sampled every T_c
 SLOW_INPUTS = ("x_s", "n_ffw")  # per axis, sampled every T_pos
 OUTPUTS = ("n_a", "x_a", "M_a", "n_s")  # per axis
 # Integrators and rigid modes are infinite where a component lies at 0 Hz: such frequencies are moved by this share.
-ASIDE = 1e-9
+SINGULAR_SHIFT = 1e-9
 # Points of a grid; the fewer at which crossings are searched are asked for once.
 KEPT_FROM = 500
 
 
-class Kept:
+class ResultCache:
     """The last results at grids of `least` values or more, by what they are of."""
 
     def __init__(self, most: int, least: int) -> None:
-        self._most, self._least = most, least
-        self._found: dict[tuple[Hashable, bytes], Complexes] = {}
+        self._most, self._min_size = most, least
+        self._results: dict[tuple[Hashable, bytes], Complexes] = {}
 
     def __call__(self, of: Hashable, s: Complexes, compute: Callable[[Complexes], Complexes]) -> Complexes:
         """What ``compute`` gives at s (F,), read-only where it is kept."""
-        if len(s) < self._least:
+        if len(s) < self._min_size:
             return compute(s)
         key = (of, s.tobytes())
-        values = self._found.pop(key, None)
+        values = self._results.pop(key, None)
         if values is None:
             values = compute(s)
             values.flags.writeable = False
-        self._found[key] = values  # the last one used stands last
-        if len(self._found) > self._most:
-            del self._found[next(iter(self._found))]
+        self._results[key] = values  # the last one used stands last
+        if len(self._results) > self._most:
+            del self._results[next(iter(self._results))]
         return values
 
 
@@ -86,12 +86,12 @@ class LinearSystem:
 
     machine: Machine
     modes: Modes
-    closed: Closed | Mapping[str, Closed] = "position"
-    tool_force: Hold = "linear"
+    closed: ClosedLoop | Mapping[str, ClosedLoop] = "position"
+    tool_force: InputHold = "linear"
     operating: Mapping[str, OperatingPoint] | None = None
     kept_from: int = KEPT_FROM
 
-    def closing(self, closed: Closed | Mapping[str, Closed]) -> Self:
+    def closing(self, closed: ClosedLoop | Mapping[str, ClosedLoop]) -> Self:
         """The same system with other loops closed; axes that a mapping does not name stay as they are."""
         if isinstance(closed, str):
             loops = dict.fromkeys(self.axes, closed)
@@ -107,29 +107,29 @@ class LinearSystem:
         return self._closings[key]
 
     @cached_property
-    def _closings(self) -> dict[tuple[Closed, ...], Self]:
+    def _closings(self) -> dict[tuple[ClosedLoop, ...], Self]:
         return {}
 
     # Many responses are asked for at the same few grids, axis after axis. Those of the structure and of the position
     # level are the dear ones, and small.
     @cached_property
-    def _responses(self) -> Kept:
-        return Kept(8, self.kept_from)
+    def _responses(self) -> ResultCache:
+        return ResultCache(8, self.kept_from)
 
     @cached_property
-    def _structure(self) -> Kept:
-        return Kept(12, self.kept_from)
+    def _structure(self) -> ResultCache:
+        return ResultCache(12, self.kept_from)
 
     @cached_property
-    def _levels(self) -> Kept:
-        return Kept(12, self.kept_from)
+    def _levels(self) -> ResultCache:
+        return ResultCache(12, self.kept_from)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
         return tuple(self.machine.axes)
 
     @cached_property
-    def loops(self) -> dict[str, Closed]:
+    def loops(self) -> dict[str, ClosedLoop]:
         """What is closed, per axis."""
         if isinstance(self.closed, str):
             return dict.fromkeys(self.axes, self.closed)
@@ -228,12 +228,12 @@ class LinearSystem:
 
     # --- the two eliminations ----------------------------------------------------------------------------------------
 
-    def speed_level(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
+    def speed_level(self, s: Complexes, tool_force: InputHold = "linear") -> Complexes:
         """(F, outputs, 3 A + 3): responses with every position loop open, to n_add, M_add, M_a and tool forces."""
-        key = ("speed level", tool_force, *self._controlled)
+        key = ("speed level", tool_force, *self._controlled_axes)
         return self._responses(key, s, partial(self._speed_level, tool_force))
 
-    def _speed_level(self, tool_force: Hold, s: Complexes) -> Complexes:
+    def _speed_level(self, tool_force: InputHold, s: Complexes) -> Complexes:
         axes = len(self.axes)
         ports = self.ports(s, tool_force)
         torques = self._torques(s, ports)
@@ -254,7 +254,7 @@ class LinearSystem:
         given = np.zeros((len(s), axes, 3 * axes + len(TOOL_DIRECTIONS)), dtype=np.complex128)
         given[:, values, values] = E * S
         given[:, values, axes + values] = E
-        given[:, values, 2 * axes + values] = ~self._controlled
+        given[:, values, 2 * axes + values] = ~self._controlled_axes
         given[:, :, 3 * axes :] = -loop[:, :, axes:]
         return np.asarray(np.linalg.solve(np.eye(axes) + loop[:, :, :axes], given))
 
@@ -268,7 +268,7 @@ class LinearSystem:
         axes = len(self.axes)
         E = np.zeros((len(s), axes), dtype=np.complex128)
         loop = np.zeros((len(s), axes, ports.shape[2]), dtype=np.complex128)
-        for i in np.flatnonzero(self._controlled):
+        for i in np.flatnonzero(self._controlled_axes):
             drive = self.drives[i]
             E[:, i], G_n = drive.torque(s)
             V, n_a = drive.speed_of_position(s), ports[:, i]
@@ -281,7 +281,7 @@ class LinearSystem:
 
         The sum over all components that one answer of a controller has within the ticks of its cycle.
         """
-        return self._levels(tuple(self._controlled), s, self._position_level)
+        return self._levels(tuple(self._controlled_axes), s, self._position_level)
 
     def _position_level(self, s: Complexes) -> Complexes:
         axes, ticks = len(self.axes), self.drives[0].ticks
@@ -304,11 +304,11 @@ class LinearSystem:
         ramps = {kind: drive.ramp(s) for kind, drive in kinds.items()}
         return np.stack([ramps[drive.drive.ramp_speed_setpoint] for drive in self.drives], axis=1)
 
-    def ports(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
+    def ports(self, s: Complexes, tool_force: InputHold = "linear") -> Complexes:
         """(F, 2 A + 3, A + 3): port matrix of the structure with every input running as it does."""
         return self._structure(tool_force, s, partial(self._ports, tool_force=tool_force))
 
-    def _ports(self, s: Complexes, tool_force: Hold) -> Complexes:
+    def _ports(self, s: Complexes, tool_force: InputHold) -> Complexes:
         axes, T_c = len(self.axes), self.machine.cycles.T_c
         ports = self.plant.ports(s, T_c, "linear")
         if self._ideal.any():
@@ -324,7 +324,7 @@ class LinearSystem:
         return np.array([drive.drive.ideal_current_loop for drive in self.drives])
 
     @cached_property
-    def _controlled(self) -> NDArray[np.bool_]:
+    def _controlled_axes(self) -> NDArray[np.bool_]:
         return np.array([loop != "none" for loop in self.loops.values()])
 
     @cached_property
@@ -354,13 +354,13 @@ class LinearSystem:
         f = np.asarray(frequency, dtype=np.float64)
         cycles = self.machine.cycles
         highest = 0.5 / cycles.T_c
-        wrong = f[~((f > 0) & (f <= highest * (1 + ASIDE)))]
+        wrong = f[~((f > 0) & (f <= highest * (1 + SINGULAR_SHIFT)))]
         if f.ndim != 1 or wrong.size:
             text = f"{wrong[0]:.6g} Hz" if f.ndim == 1 else f"an array of shape {f.shape}"
             raise InputError(f"linear system: frequency {text}; allowed are values above 0 up to {highest:.6g} Hz")
         turns = f * cycles.T_pos
-        meets = np.abs(turns - np.round(turns)) < ASIDE * np.round(turns)
-        return np.asarray(2j * np.pi * np.where(meets, f * (1 - ASIDE), f))
+        meets = np.abs(turns - np.round(turns)) < SINGULAR_SHIFT * np.round(turns)
+        return np.asarray(2j * np.pi * np.where(meets, f * (1 - SINGULAR_SHIFT), f))
 
 
 def unit_of(output: str, name: str) -> str:

@@ -14,8 +14,8 @@ from pydantic import Field, StrictInt, field_validator, model_validator
 
 from feedsim.files.fields import AxisName, Quantity, fault
 from feedsim.foundation.errors import InputError
-from feedsim.motions.kind import Array, Course, Geometry, Held, Joined, Peaks, Start, whole_cycles
-from feedsim.motions.move import Path, PathMotion, Position, steady
+from feedsim.motions.kind import Array, Course, Geometry, HeldPoints, JoinedPoints, Peaks, Start, whole_cycles
+from feedsim.motions.move import Path, PathMotion, Position, steady_phase
 from feedsim.motions.profile import Profile
 
 Direction = Literal["counterclockwise", "clockwise"]
@@ -29,7 +29,7 @@ POINTS_PER_PHASE = 33
 # Instants that are looked at together: a long circle has millions.
 INSTANTS = 1 << 15
 # Rest [s] between a circle and the same one in the other direction: what the stop leaves dies away in it.
-BETWEEN = 0.3
+REST_BETWEEN_CIRCLES = 0.3
 
 
 class PlaneMotion(PathMotion):
@@ -69,7 +69,7 @@ class Arc(PlaneMotion):
     )
 
     @model_validator(mode="after")
-    def _determined(self) -> Self:
+    def _check_centre_and_end(self) -> Self:
         if bool(self.centre) == bool(self.centre_by):
             raise fault("an arc needs its centre once: 'centre' (positions) or 'centre_by' (from its start)")
         if [bool(self.to), bool(self.by), self.angle is not None].count(True) != 1:
@@ -165,7 +165,7 @@ class Circle(PlaneMotion):
         there = super().plan(start)
         if self.direction != "both":
             return there
-        pause = whole_cycles(BETWEEN, start.T_ipo)
+        pause = whole_cycles(REST_BETWEEN_CIRCLES, start.T_ipo)
         begin = there.cycles + pause
         clockwise = self.model_copy(update={"direction": "clockwise"})
         again = clockwise.plan(
@@ -179,7 +179,7 @@ class Circle(PlaneMotion):
             duration=begin * start.T_ipo + again.duration,
             cycles=begin + again.cycles,
             points={
-                axis: Joined([points, Held(start.position[axis], pause), again.points[axis]])
+                axis: JoinedPoints([points, HeldPoints(start.position[axis], pause), again.points[axis]])
                 for axis, points in there.points.items()
             },
             peaks={axis: there.peaks[axis].with_(again.peaks[axis]) for axis in again.peaks},
@@ -267,7 +267,7 @@ class CircularPath:
             start_angle=self.start_angle,
             sweep=self.sweep,
             turns=tuple(pairwise(instants.tolist())),
-            steady=steady(profile, start),
+            steady=steady_phase(profile, start),
             turn_time=_turn_time(profile, 2 * math.pi * self.radius),
         )
 

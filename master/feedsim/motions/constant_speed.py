@@ -109,7 +109,7 @@ class ConstantSpeed(MotionKind):
             points = reached + sense * covered
             points[-1] = target  # the way back meets the start without a rounding error
             parts += [points, np.full(pause, target)]
-            begun, ended = _steady(profile)
+            begun, ended = _steady_phase(profile)
             done.append(
                 Stroke(
                     speed=sense * profile.peak_speed,
@@ -173,7 +173,7 @@ def ramp_time(speed: float, acceleration: float, jerk: float) -> float:
     return speed / acceleration + acceleration / jerk
 
 
-def _steady(profile: Profile) -> tuple[float, float]:
+def _steady_phase(profile: Profile) -> tuple[float, float]:
     if profile.steady is None:  # the stroke is made for one
         raise InputError(f"no phase of constant speed in a stroke of {profile.length:g} m")
     return profile.steady

@@ -195,7 +195,7 @@ def in_turn(durations: Sequence[float], rest: float, start: Start) -> list[tuple
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldPoints:
     """An axis that stays at ``value`` for ``count`` points."""
 
     value: float
@@ -208,7 +208,7 @@ class Held:
         return np.full(len(range(self.count)[rows]), self.value)
 
 
-class Joined:
+class JoinedPoints:
     """Points one after the other."""
 
     def __init__(self, pieces: Sequence[Points]) -> None:

@@ -78,7 +78,7 @@ class PathMotion(MotionKind):
         return Course(
             duration=profile.duration,
             cycles=cycles,
-            points={axis: Along(path, profile, axis, start.T_ipo, cycles) for axis in path.axes},
+            points={axis: PathAxis(path, profile, axis, start.T_ipo, cycles) for axis in path.axes},
             # Looking at all of a path that is too long for the program would take long.
             peaks=path.peaks(profile, start.T_ipo) if cycles <= start.most else {},
             target=self.target(path),
@@ -88,7 +88,7 @@ class PathMotion(MotionKind):
 
 
 @dataclass(frozen=True)
-class Along:
+class PathAxis:
     """An axis of a path: point i is where the path is (i + 1) ``cycle`` [s] after the start of its profile."""
 
     path: Path
@@ -106,7 +106,7 @@ class Along:
         return self.path.position(self.profile.at(at)[0])[self.axis]
 
 
-def steady(profile: Profile, start: float) -> tuple[float, float] | None:
+def steady_phase(profile: Profile, start: float) -> tuple[float, float] | None:
     """Begin and end of the constant-speed phase [s] of a profile that begins at ``start``; None where there is none."""
     return None if profile.steady is None else (start + profile.steady[0], start + profile.steady[1])
 
@@ -185,7 +185,7 @@ class Line:
         return result
 
     def geometry(self, profile: Profile, start: float) -> Straight:
-        return Straight(self.length, steady(profile, start))
+        return Straight(self.length, steady_phase(profile, start))
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class PositioningCycle(MotionKind):
     )
 
     @model_validator(mode="after")
-    def _apart(self) -> Self:
+    def _check_targets_differ(self) -> Self:
         for before, after in pairwise(self.positions):
             if before == after:
                 raise fault(f"the target {1e3 * before:.9g} mm is given twice")

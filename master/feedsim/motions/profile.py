@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.installation import need
+from feedsim.foundation.installation import require_module
 from feedsim.motions.kind import Array
 
 if TYPE_CHECKING:  # files are read, and schemas printed, without it
     from ruckig import Trajectory
 
-_REASON = {
+_FAILURE_REASONS = {
     "Error": "an unclassified error",
     "ErrorInvalidInput": "invalid limits",
     "ErrorPositionalLimits": "positional limits cannot be kept",
@@ -28,7 +28,7 @@ _REASON = {
 }
 
 # What is smaller than this share of its peak value is rounding of the profile calculation.
-_ROUNDING = 1e-9
+_ROUNDING_SHARE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +80,8 @@ class Profile:
     def steady(self) -> tuple[float, float] | None:
         """Begin and end of the constant-speed phase [s]; None where the path is too short to have one."""
         span = np.diff(self.times)
-        coasting = np.abs(self.acceleration[:-1]) <= _ROUNDING * self.peak_acceleration
-        at_speed = (self.jerk == 0) & coasting & (self.velocity[:-1] > 0) & (span > _ROUNDING * self.duration)
+        coasting = np.abs(self.acceleration[:-1]) <= _ROUNDING_SHARE * self.peak_acceleration
+        at_speed = (self.jerk == 0) & coasting & (self.velocity[:-1] > 0) & (span > _ROUNDING_SHARE * self.duration)
         if not at_speed.any():
             return None
         phase = int(np.flatnonzero(at_speed)[np.argmax(span[at_speed])])
@@ -132,7 +132,7 @@ def rest_to_rest(length: float, speed: float, acceleration: float, jerk: float) 
         return _AT_REST
 
     unit_time = float(np.cbrt(length / jerk))
-    trajectory = _calculated(
+    trajectory = _calculate_trajectory(
         f"path profile over {length:g} m with {speed:g} m/s, {acceleration:g} m/s2, {jerk:g} m/s3",
         "Position",
         current_position=0.0,
@@ -184,7 +184,7 @@ def speed_change(speed: float, acceleration: float, jerk: float) -> SpeedChange:
     """
     if speed == 0:
         return SpeedChange(0.0, _AT_REST)
-    trajectory = _calculated(
+    trajectory = _calculate_trajectory(
         f"from rest to {speed:g} m/s with {acceleration:g} m/s2, {jerk:g} m/s3",
         "Velocity",
         target_velocity=speed,
@@ -203,12 +203,12 @@ def _phases(trajectory: Trajectory) -> Profile:
     )  # fmt: skip
 
 
-def _calculated(where: str, controlled: str, **task: float) -> Trajectory:
+def _calculate_trajectory(where: str, controlled: str, **task: float) -> Trajectory:
     """ruckig's way in one degree of freedom to a position or a velocity; `task`: its input by ruckig's names.
 
     Raises InputError, with `where` ahead, where ruckig finds none.
     """
-    ruckig = need("ruckig", "planning a motion")
+    ruckig = require_module("ruckig", "planning a motion")
     asked = ruckig.InputParameter(1)
     asked.control_interface = getattr(ruckig.ControlInterface, controlled)
     for name, value in task.items():
@@ -219,5 +219,5 @@ def _calculated(where: str, controlled: str, **task: float) -> Trajectory:
     except ruckig.RuckigError as error:
         raise InputError(f"{where}: ruckig refuses it: {str(error).strip().splitlines()[0]}") from error
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise InputError(f"{where}: {_REASON.get(result.name, f'ruckig result {result}')}")
+        raise InputError(f"{where}: {_FAILURE_REASONS.get(result.name, f'ruckig result {result}')}")
     return trajectory

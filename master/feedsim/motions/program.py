@@ -85,7 +85,7 @@ class PartProgram(MotionKind):
         changes |= {"blending": blending, "compressed": compressed}
         return replace(moves, **changes)  # type: ignore[arg-type]
 
-    def _slowed(self, moves: Moves, limits: Limits) -> Moves:
+    def _limit_rapids(self, moves: Moves, limits: Limits) -> Moves:
         """The moves with rapids at their override as lines at a feed: of what the slowest of their axes allows."""
         from feedsim.motions.part_program import Motion
 
@@ -113,13 +113,13 @@ class PartProgram(MotionKind):
         programmed = ProgrammedPath.of(moves)
         if not len(programmed.row):
             raise InputError(f"{self.file}: the program moves no axis")
-        if problems := list(_outside(moves, programmed, start)):
+        if problems := list(_report_overtravel(moves, programmed, start)):
             more = len(problems) - MAX_BLOCKS_NAMED
             rest = [f"{self.file}: and {more} blocks more"] if more > 0 else []
             raise InputError.of(f"{self.file}", [*problems[:MAX_BLOCKS_NAMED], *rest])
         axes, limits = moves.axes, start.limits
         assert limits is not None
-        path = plan_moves(self._slowed(moves, limits), limits)
+        path = plan_moves(self._limit_rapids(moves, limits), limits)
         cycles = whole_cycles(path.duration, start.T_ipo)
         if cycles > start.most:
             raise InputError(
@@ -137,14 +137,14 @@ class PartProgram(MotionKind):
             points={axis: np.ascontiguousarray(position[1:, i]) for i, axis in enumerate(axes) if moved[i]},
             target={axis: float(end[i]) for i, axis in enumerate(axes) if moved[i]},
             moving=tuple(axis for i, axis in enumerate(axes) if moved[i]),
-            geometry=Programmed(
+            geometry=ProgrammedGeometry(
                 moves, programmed, path, start.time, np.asarray(instants + start.time, dtype=np.float64), s,
                 tuple(axis for i, axis in enumerate(axes) if moved[i]),
             ),
         )  # fmt: skip
 
 
-def _outside(moves: Moves, path: ProgrammedPath, start: Start) -> Iterator[str]:
+def _report_overtravel(moves: Moves, path: ProgrammedPath, start: Start) -> Iterator[str]:
     """A sentence for every block that leaves the travel of an axis, with what it reaches [mm]."""
     low, high = np.array([start.travel[axis] for axis in moves.axes]).T
     least, most = path.extent()
@@ -165,7 +165,7 @@ def _outside(moves: Moves, path: ProgrammedPath, start: Start) -> Iterator[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Programmed(Geometry):
+class ProgrammedGeometry(Geometry):
     """The path of an NC program.
 
     moves: what the program commands. path: its lines and arcs. plan: the planned path, with what limits each block.

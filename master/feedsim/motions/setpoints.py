@@ -125,7 +125,7 @@ class MeasuredSetpoints(MotionKind):
             target={axis: float(x[-1]) for axis, (x, _) in setpoints.items()},
             absolute=not self.relative,
             moving=tuple(axis for axis, (x, _) in setpoints.items() if np.any(x != start.position[axis])),
-            geometry=Recorded(begin, begin + length, float(rows.time[0]), self.file, self.axes),
+            geometry=RecordedGeometry(begin, begin + length, float(rows.time[0]), self.file, self.axes),
         )
 
 
@@ -136,7 +136,7 @@ def _change(speed: float, start: Start) -> SpeedChange:
 
 
 @dataclass(frozen=True)
-class Recorded(Geometry):
+class RecordedGeometry(Geometry):
     """Recorded setpoints.
 
     begin, end: instants [s] of the recording's first and last row; a run-in lies ahead, a run-out behind.

@@ -12,7 +12,7 @@ from typing import Any
 from feedsim.design.tune import Proposal
 from feedsim.design.tune.proposals import COMPENSATION
 from feedsim.files.control import Name, names_of
-from feedsim.report.content import Bullets, Section, Table, Text, code, typed
+from feedsim.report.content import Bullets, Section, Table, Text, code, command_path
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.provenance import finite
 from feedsim.scenario import Machine
@@ -31,17 +31,17 @@ NAMES_NOTE = (
 )
 
 
-_ASKED = ContextVar("control", default="")
+_REQUESTED_CONTROL = ContextVar("control", default="")
 
 
 @contextmanager
 def control_names(control: str) -> Iterator[None]:
     """A block in which reports show parameters in the names of a control, too: what --control asks for."""
-    before = _ASKED.set(control)
+    before = _REQUESTED_CONTROL.set(control)
     try:
         yield
     finally:
-        _ASKED.reset(before)
+        _REQUESTED_CONTROL.reset(before)
 
 
 def control_section(
@@ -51,27 +51,29 @@ def control_section(
 
     changes: parameter of a machine file -> value of every source, where the report is about those.
     """
-    control = asked(machine)
+    control = requested_control(machine)
     return section(control, machine, changes) if control else None
 
 
-def asked(machine: Machine | None = None) -> str:
+def requested_control(machine: Machine | None = None) -> str:
     """The control whose names are asked for, or that the machine file names; "" without one."""
-    return _ASKED.get() or (machine.control or "" if machine is not None else "")
+    return _REQUESTED_CONTROL.get() or (machine.control or "" if machine is not None else "")
 
 
 def section(control: str, machine: Machine | None, changes: Mapping[str, Sequence[str]] | None = None) -> Section:
     """The control's names: with the values of a machine's axes, with values that differ, or by themselves."""
     names = names_of(control)
     if changes is not None:
-        return _section(control, _changed(names, changes), ("Axis", "Values"), "ll")
+        return _section(control, _change_rows(names, changes), ("Axis", "Values"), "ll")
     if machine is None:
-        rows = [(*_head(names[key]), names[key].unit, _doubt(names[key])) for key in OF_CIRCLES if key in names]
+        rows = [
+            (*_head(names[key]), names[key].unit, _confirmation_text(names[key])) for key in OF_CIRCLES if key in names
+        ]
         return _section(control, rows, (), "")
     values = {axis: axis_values(control, machine, axis) for axis in machine.axes}
     rows = [
         (*_head(name), *(minus(f"{own[key]:.6g}") if key in own else "–" for own in values.values()), name.unit,
-         _doubt(name))
+         _confirmation_text(name))
         for key, name in names.items()
         if any(key in own for own in values.values())
     ]  # fmt: skip
@@ -92,7 +94,7 @@ def _start(machine: Machine, axis: str) -> Any:
     return machine.axes[axis]
 
 
-def _changed(names: Mapping[str, Name], changes: Mapping[str, Sequence[str]]) -> list[tuple[Text, ...]]:
+def _change_rows(names: Mapping[str, Name], changes: Mapping[str, Sequence[str]]) -> list[tuple[Text, ...]]:
     rows: list[tuple[Text, ...]] = []
     for key, values in changes.items():
         axis, _, parameter = key.removeprefix("machine.").removeprefix("axes.").partition(".")
@@ -102,7 +104,7 @@ def _changed(names: Mapping[str, Name], changes: Mapping[str, Sequence[str]]) ->
         for value in values:
             with suppress(ValueError):
                 shown.append(f"{name.shown(float(value.partition(' ')[0])):.6g}")
-        rows.append((*_head(name), axis, minus(" | ".join(shown)), name.unit, _doubt(name)))
+        rows.append((*_head(name), axis, minus(" | ".join(shown)), name.unit, _confirmation_text(name)))
     return rows
 
 
@@ -110,7 +112,7 @@ def _head(name: Name) -> tuple[Text, ...]:
     return code(name.number), name.name, code(name.parameter.removeprefix("drive."))
 
 
-def _doubt(name: Name) -> str:
+def _confirmation_text(name: Name) -> str:
     return "confirmed" if name.confirmed else "not confirmed"
 
 
@@ -133,7 +135,7 @@ NOTE = (
     "and lays it over this one. A proposal is as good as the machine file."
 )
 
-TUNED = ("K_p", "T_n", "K_v", "T_sym", "T_dyn", "omega_0", "D")  # what feedsim tune drive finds
+TUNED_PARAMETERS = ("K_p", "T_n", "K_v", "T_sym", "T_dyn", "omega_0", "D")  # what feedsim tune drive finds
 REVERSALS = "reversal peaks"
 
 
@@ -149,20 +151,26 @@ def changes_section(
             proposal.axis,
             code(proposal.parameter.removeprefix("drive.")),
             *_values(proposal),
-            _named(proposal, machine),
+            _control_value(proposal, machine),
             typeset(proposal.reason),
             _margins(proposal),
         )
         for proposal in proposals
     ]
     heads = ("Cause", "Axis", "Parameter", "Present", "Proposed", "In the control", "Why", "Margins")
-    further = _further(proposals, typed(scenario)) if scenario is not None and scenario.suffix != ".ssp" else None
+    further = (
+        _suggest_commands(proposals, command_path(scenario))
+        if scenario is not None and scenario.suffix != ".ssp"
+        else None
+    )
     return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes", unfolded=True)
 
 
-def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
+def _suggest_commands(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
     """The commands that find all values of a drive, or of a compensation, on many motions."""
-    axes = dict.fromkeys(proposal.axis for proposal in proposals if proposal.parameter.removeprefix("drive.") in TUNED)
+    axes = dict.fromkeys(
+        proposal.axis for proposal in proposals if proposal.parameter.removeprefix("drive.") in TUNED_PARAMETERS
+    )
     result: list[Text] = [
         (f"All values of the drive of {axis} together, within margins: ",
          code(f"feedsim tune drive {scenario} --axes {axis}"))
@@ -188,7 +196,7 @@ def action(proposals: Sequence[Proposal], machine: Machine | None = None) -> str
     if not proposals:
         return ""
     proposal = proposals[0]
-    control = asked(machine)
+    control = requested_control(machine)
     name = names_of(control).get(proposal.parameter) if control else None
     text = change_words(proposal)
     if proposal.parameter == COMPENSATION:
@@ -245,8 +253,8 @@ def _values(proposal: Proposal) -> tuple[str, str]:
     return minus(present), proposal.direction
 
 
-def _named(proposal: Proposal, machine: Machine | None) -> str:
-    control = asked(machine)
+def _control_value(proposal: Proposal, machine: Machine | None) -> str:
+    control = requested_control(machine)
     name = names_of(control).get(proposal.parameter) if control else None
     if name is None:
         return "–"

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.analysis import Diagnosis, Figure, answer
-from feedsim.analysis.circle import CircleUnderTest, TurnedPath, name, worth_telling
+from feedsim.analysis import Diagnosis, Figure, explain_circle
+from feedsim.analysis.circle import CircleUnderTest, TurnedPath, term_name, worth_telling
 from feedsim.analysis.circle.records import RecordedCircle
-from feedsim.analysis.circle.words import Change, changed, named
+from feedsim.analysis.circle.words import Change, compare_terms, sure_changes
 from feedsim.analysis.circularity import axis_letters
-from feedsim.analysis.evaluate import FIGURE_UNITS, about, both_directions, cause_figures
+from feedsim.analysis.evaluate import FIGURE_UNITS, both_directions, cause_figures, shift_centre
 from feedsim.design.tune import of_circle
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report import content
@@ -23,14 +23,25 @@ from feedsim.report.changes import action, changes_section, control_section
 from feedsim.report.chart import Curve, Dash
 from feedsim.report.content import TILES as TILES_SHOWN
 from feedsim.report.content import Bullets, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
-from feedsim.report.formatting import AFTER, BEFORE, CLOCKWISE, RECORDED, SIMULATED, Array, counted, minus, two, typeset
-from feedsim.report.provenance import finite, hashed, inputs_part, quantity
+from feedsim.report.formatting import (
+    AFTER_COLOUR,
+    BEFORE_COLOUR,
+    CLOCKWISE,
+    RECORDED_COLOUR,
+    SIMULATED_COLOUR,
+    Array,
+    count_things,
+    minus,
+    two_digits,
+    typeset,
+)
+from feedsim.report.provenance import finite, hash_files, inputs_part, quantity
 from feedsim.report.run import axis_plots, sheet
 from feedsim.report.run.pose import cause_tile, diagnosis_part, diagnosis_section
 
 FORMAT = 1
 DASHES: dict[int, Dash] = {1: "", -1: "dashed"}  # by the sense of the turn
-COLOURS = {1: RECORDED, -1: CLOCKWISE}
+COLOURS = {1: RECORDED_COLOUR, -1: CLOCKWISE}
 NOTHING_CHANGED = "no cause has changed beyond doubt (95 %)"
 TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
 FULL_TURN_FIGURES = {
@@ -42,7 +53,7 @@ FULL_TURN_FIGURES = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Centred:
+class _CentredTurn:
     """A turn about the centre that is fitted to all."""
 
     angle: Array
@@ -52,7 +63,7 @@ class _Centred:
 
 def answers(diagnosis: Diagnosis) -> list[str]:
     """Why the circle is not round, in a sentence."""
-    return [f"{axis_letters(diagnosis.circle.axes)}: {answer(diagnosis)}"]
+    return [f"{axis_letters(diagnosis.circle.axes)}: {explain_circle(diagnosis)}"]
 
 
 def first_action(diagnosis: Diagnosis) -> str:
@@ -75,18 +86,20 @@ def figures_of(recorded: RecordedCircle, diagnosis: Diagnosis) -> dict[str, Figu
             name: Figure(math.nan, "um", f"{meaning}: needs a full turn") for name, meaning in FULL_TURN_FIGURES.items()
         }
         figures["arc_range"] = Figure(diagnosis.G * 1e6, "um", about_arc)
-        return _prefixed(prefix, figures | cause_figures(diagnosis))
+        return _prefix_figures(prefix, figures | cause_figures(diagnosis))
     figures = {"G": Figure(diagnosis.G * 1e6, "um", f"range of the radial deviation of all turns, about {centre}")}
     for sense in (1, -1):
         if sense not in diagnosis.senses:
-            return _prefixed(prefix, figures | cause_figures(diagnosis))
+            return _prefix_figures(prefix, figures | cause_figures(diagnosis))
     one = next(turn.path for turn in recorded.turns if turn.path.sense > 0)
     other = next(turn.path for turn in recorded.turns if turn.path.sense < 0)
     curves = [(one.angle, one.deviation), (other.angle, other.deviation)]
-    return _prefixed(prefix, figures | both_directions(curves, circle.radius, circle.axes) | cause_figures(diagnosis))
+    return _prefix_figures(
+        prefix, figures | both_directions(curves, circle.radius, circle.axes) | cause_figures(diagnosis)
+    )
 
 
-def _prefixed(prefix: str, figures: Mapping[str, Figure]) -> dict[str, Figure]:
+def _prefix_figures(prefix: str, figures: Mapping[str, Figure]) -> dict[str, Figure]:
     # Nobody knows here where a position was read: by scales, or at the tool.
     return {
         f"{prefix}.{name}": Figure(figure.value, figure.unit, figure.meaning.removesuffix(", by the linear scales"))
@@ -107,12 +120,12 @@ def report_of(
     tiles += [Tile(tile_value(figure), labels[key], typeset(figure.meaning)) for key, figure in own.items() if figure]
     return Report(
         f"Recorded circle {prefix}",
-        f"{', '.join(file.name for file in files)} · {counted(len(recorded.turns), 'turn')}",
+        f"{', '.join(file.name for file in files)} · {count_things(len(recorded.turns), 'turn')}",
         answer=answers(diagnosis),
         warnings=list(recorded.doubts),
         tiles=tiles,
         action=first_action(diagnosis),
-        next_step=_again(files),
+        next_step=_suggest_record(files),
         main=[
             picture(circle, recorded, diagnosis),
             changes_section(of_circle(diagnosis, None, None)),
@@ -121,45 +134,47 @@ def report_of(
             control_section(),
             Section("How the files were read", [Bullets(recorded.notes)]),
         ],
-        provenance=content.provenance_section(_facts(recorded), hashed([("record", file) for file in files])),
+        provenance=content.provenance_section(_facts(recorded), hash_files([("record", file) for file in files])),
         footer=content.figures_footer("Values in full precision: summary.json."),
     )
 
 
 def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagnosis) -> Picture:
     """All turns over each other, magnified, and what the model says of them."""
-    turns = _centred([turn.path for turn in recorded.turns], circle, diagnosis, recorded.centred)
-    fitted = _centred(
+    turns = _centre_turns([turn.path for turn in recorded.turns], circle, diagnosis, recorded.centred)
+    fitted = _centre_turns(
         [TurnedPath(a, e, s) for (a, e), s in zip(diagnosis.rest, diagnosis.senses, strict=True)],
         circle, diagnosis, recorded.centred,
     )  # fmt: skip
     curves = [
-        axis_plots.turned(SENSE_WORDS[turn.sense], COLOURS[turn.sense], turn.angle, turn.deviation, DASHES[turn.sense])
+        axis_plots.turn_curve(
+            SENSE_WORDS[turn.sense], COLOURS[turn.sense], turn.angle, turn.deviation, DASHES[turn.sense]
+        )
         for turn in turns
     ]
     curves += [
-        axis_plots.turned("model without peaks", SIMULATED, centred.angle, centred.deviation, "dotted", 1.1)
+        axis_plots.turn_curve("model without peaks", SIMULATED_COLOUR, centred.angle, centred.deviation, "dotted", 1.1)
         for centred in fitted[:1]
     ]
-    return _drawn(circle, recorded, turns, curves, "Dotted: the fitted model without peaks.")
+    return _draw_turns(circle, recorded, turns, curves, "Dotted: the fitted model without peaks.")
 
 
-def picture_of_both(before: Taken, after: Taken) -> Picture:
+def picture_of_both(before: DiagnosedRecords, after: DiagnosedRecords) -> Picture:
     """The turns before and after a change over each other, at one scale."""
     curves, every = [], []
-    for words, colour, taken in (("before", BEFORE, before), ("after", AFTER, after)):
+    for words, colour, taken in (("before", BEFORE_COLOUR, before), ("after", AFTER_COLOUR, after)):
         circle, recorded = taken.recorded.circle, taken.recorded
-        turns = _centred([turn.path for turn in recorded.turns], circle, taken.diagnosis, recorded.centred)
+        turns = _centre_turns([turn.path for turn in recorded.turns], circle, taken.diagnosis, recorded.centred)
         curves += [
-            axis_plots.turned(f"{words}, {SENSE_WORDS[t.sense]}", colour, t.angle, t.deviation, DASHES[t.sense])
+            axis_plots.turn_curve(f"{words}, {SENSE_WORDS[t.sense]}", colour, t.angle, t.deviation, DASHES[t.sense])
             for t in turns
         ]
         every += turns
-    return _drawn(before.recorded.circle, before.recorded, every, curves, "Both records have the same scale.")
+    return _draw_turns(before.recorded.circle, before.recorded, every, curves, "Both records have the same scale.")
 
 
-def _drawn(
-    circle: CircleUnderTest, recorded: RecordedCircle, turns: Sequence[_Centred], curves: Sequence[Curve], note: str
+def _draw_turns(
+    circle: CircleUnderTest, recorded: RecordedCircle, turns: Sequence[_CentredTurn], curves: Sequence[Curve], note: str
 ) -> Picture:
     on = axis_plots.circle(circle, max(float(np.abs(turn.deviation).max()) for turn in turns))
     plane = f"{circle.axes[0]}-{circle.axes[1]}"
@@ -172,18 +187,20 @@ def _drawn(
     return Picture(f"circle-{plane}", title, caption, axis_plots.circle_chart(on, curves))
 
 
-def _centred(
+def _centre_turns(
     paths: Sequence[TurnedPath], circle: CircleUnderTest, diagnosis: Diagnosis, centred: bool
-) -> list[_Centred]:
+) -> list[_CentredTurn]:
     centre = np.array(diagnosis.centre if centred else (0.0, 0.0))
-    return [_Centred(*about(path.angle, path.deviation, circle.radius, centre), path.sense) for path in paths]
+    return [
+        _CentredTurn(*shift_centre(path.angle, path.deviation, circle.radius, centre), path.sense) for path in paths
+    ]
 
 
 # --- Before and after a change ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class DiagnosedRecords:
     """Records of a circle, taken apart. files: that they were read from."""
 
     recorded: RecordedCircle
@@ -192,36 +209,40 @@ class Taken:
     files: Sequence[Path]
 
 
-def changes_of(before: Taken, after: Taken) -> list[Change]:
+def changes_of(before: DiagnosedRecords, after: DiagnosedRecords) -> list[Change]:
     """Every cause before and after, those first that have changed beyond doubt."""
     turns, later = ([turn.path for turn in taken.recorded.turns] for taken in (before, after))
-    return changed(before.diagnosis, after.diagnosis, turns, later)
+    return compare_terms(before.diagnosis, after.diagnosis, turns, later)
 
 
-def answers_of_both(before: Taken, after: Taken) -> list[str]:
+def answers_of_both(before: DiagnosedRecords, after: DiagnosedRecords) -> list[str]:
     """What has changed beyond doubt, and why the circle is not round now."""
     one, other = before.diagnosis, after.diagnosis
     prefix = axis_letters(one.circle.axes)
-    sure = named(changes_of(before, after))
+    sure = sure_changes(changes_of(before, after))
     said = f"changed beyond doubt: {'; '.join(map(_change_words, sure))}" if sure else NOTHING_CHANGED
-    G = f"G = {two(1e6 * one.G)} um before, {two(1e6 * other.G)} um after"
-    return [f"{prefix}: {G}; {said}.", f"After: {answer(other)}"]
+    G = f"G = {two_digits(1e6 * one.G)} um before, {two_digits(1e6 * other.G)} um after"
+    return [f"{prefix}: {G}; {said}.", f"After: {explain_circle(other)}"]
 
 
-def report_of_both(before: Taken, after: Taken) -> Report:
+def report_of_both(before: DiagnosedRecords, after: DiagnosedRecords) -> Report:
     """Content of the report of records before and after a change."""
     prefix = axis_letters(before.recorded.circle.axes)
     changes = changes_of(before, after)
     files = [*before.files, *after.files]
     tiles = [
-        Tile(f"{two(1e6 * before.diagnosis.G)} → {two(1e6 * after.diagnosis.G)} µm", TILES["G"], "of all turns"),
-        *(Tile(_values(change), name(change.after), "before → after") for change in named(changes)),
+        Tile(
+            f"{two_digits(1e6 * before.diagnosis.G)} → {two_digits(1e6 * after.diagnosis.G)} µm",
+            TILES["G"],
+            "of all turns",
+        ),
+        *(Tile(_values(change), term_name(change.after), "before → after") for change in sure_changes(changes)),
     ]
     rows = [
         (
-            name(change.before)[:1].upper() + name(change.before)[1:],
+            term_name(change.before)[:1].upper() + term_name(change.before)[1:],
             *_values(change, "|").split("|"),
-            minus(_rounded(change.difference, change)) + f" ± {_rounded(change.half, change)}",
+            minus(_round_value(change.difference, change)) + f" ± {_round_value(change.half, change)}",
             FIGURE_UNITS[change.before.unit][1].replace("um", "µm"),
             "changed" if change.sure else "not beyond doubt",
         )
@@ -239,7 +260,7 @@ def report_of_both(before: Taken, after: Taken) -> Report:
         action=first_action(after.diagnosis),
         warnings=[*before.recorded.doubts, *after.recorded.doubts],
         tiles=tiles,
-        next_step=_again(after.files, before=after.files),
+        next_step=_suggest_record(after.files, before=after.files),
         main=[
             Paragraph((Span("Acceptance sheet for print, before and after", "file", sheet.HTML), ".")),
             picture_of_both(before, after),
@@ -251,21 +272,21 @@ def report_of_both(before: Taken, after: Taken) -> Report:
             Section("How the files were read", [Bullets([*before.recorded.notes, *after.recorded.notes])]),
         ],
         provenance=content.provenance_section(
-            _facts(before.recorded), hashed([("record", file) for file in files])
+            _facts(before.recorded), hash_files([("record", file) for file in files])
         ),
         footer=content.figures_footer("Values in full precision: summary.json."),
     )  # fmt: skip
 
 
-def sheets_of_both(before: Taken, after: Taken) -> list[sheet.Filled]:
+def sheets_of_both(before: DiagnosedRecords, after: DiagnosedRecords) -> list[sheet.FilledSheet]:
     """Acceptance sheets of the records before and after."""
     return [_sheet("before", before), _sheet("after", after)]
 
 
-def _sheet(when: str, taken: Taken) -> sheet.Filled:
+def _sheet(when: str, taken: DiagnosedRecords) -> sheet.FilledSheet:
     circle, turns = taken.recorded.circle, [turn.path for turn in taken.recorded.turns]
     prefix = axis_letters(circle.axes)
-    seen = _centred(turns, circle, taken.diagnosis, taken.recorded.centred)
+    seen = _centre_turns(turns, circle, taken.diagnosis, taken.recorded.centred)
     grid = np.arange(0.0, 360.0, sheet.EVERY)
     curves = []
     for turn in seen:
@@ -288,13 +309,13 @@ def _sheet(when: str, taken: Taken) -> sheet.Filled:
     readings = [("radial deviation", "", f"{angle:g}", one, "", f"{curve[k]:.6f}", "um")
                 for one, curve in zip(names, curves, strict=True) for k, angle in enumerate(grid)]  # fmt: skip
     shown = picture(circle, taken.recorded, taken.diagnosis)
-    return sheet.Filled(
+    return sheet.FilledSheet(
         f"Circle {prefix}, {when}", "ISO 230-4", conditions, math.nan, ("Angle [°]", *(f"{n} [µm]" for n in names)),
         numbers, results, shown, readings, every=round(sheet.PRINTED / sheet.EVERY),
     )  # fmt: skip
 
 
-def _rounded(value: float, change: Change) -> str:
+def _round_value(value: float, change: Change) -> str:
     """To the second digit of the interval."""
     factor, _ = FIGURE_UNITS[change.before.unit]
     half = factor * change.half
@@ -304,16 +325,18 @@ def _rounded(value: float, change: Change) -> str:
 
 def _values(change: Change, between: str = " → ") -> str:
     unit = "" if between == "|" else f" {FIGURE_UNITS[change.before.unit][1]}".replace("um", "µm")
-    return minus(f"{_rounded(change.before.value, change)}{between}{_rounded(change.after.value, change)}{unit}")
+    return minus(
+        f"{_round_value(change.before.value, change)}{between}{_round_value(change.after.value, change)}{unit}"
+    )
 
 
 def _change_words(change: Change) -> str:
     unit = FIGURE_UNITS[change.before.unit][1]
-    old, new = (_rounded(term.value, change) for term in (change.before, change.after))
-    return f"{name(change.after)} {old} -> {new} {unit}"
+    old, new = (_round_value(term.value, change) for term in (change.before, change.after))
+    return f"{term_name(change.after)} {old} -> {new} {unit}"
 
 
-def _again(files: Sequence[Path], before: Sequence[Path] = ()) -> Step:
+def _suggest_record(files: Sequence[Path], before: Sequence[Path] = ()) -> Step:
     """Records after the next change beside these."""
     later: dict[str, Any] = {"after": [str(file.with_stem(f"{file.stem}_after")) for file in files]}
     if before:
@@ -330,11 +353,11 @@ def _facts(recorded: RecordedCircle) -> list[tuple[str, str]]:
     ]
 
 
-def changes_part(before: Taken, after: Taken) -> list[dict[str, Any]]:
+def changes_part(before: DiagnosedRecords, after: DiagnosedRecords) -> list[dict[str, Any]]:
     """What has changed, as summary.json has it, in SI."""
     return [
         {
-            "name": name(change.after),
+            "name": term_name(change.after),
             "before": quantity(change.before.value, change.before.unit),
             "after": quantity(change.after.value, change.after.unit),
             "half_interval": finite(change.half),
@@ -364,5 +387,5 @@ def details(
             "arc": None if diagnosis.arc is None else quantity(diagnosis.arc, "rad"),
             "turns": [turn.name for turn in recorded.turns],
         },
-        "inputs": inputs_part(hashed([("record", file) for file in files])),
+        "inputs": inputs_part(hash_files([("record", file) for file in files])),
     }

@@ -17,21 +17,21 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from feedsim.comparison import Comparison, Curves, Variable, along, percent, seconds
+from feedsim.comparison import Comparison, Curves, Variable, interpolate_at, percent, seconds
 from feedsim.files.trace.files import is_stream, written_whole
 from feedsim.foundation.errors import Finding, OutputError
 from feedsim.foundation.outputs import begins_with, check_file
-from feedsim.foundation.owned import claimed
+from feedsim.foundation.owned import claim_folder
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import Paragraph, Part, Picture, Report, Section, Span, Table, Text, Tile, code
 from feedsim.report.formatting import (
-    ALLOWED,
+    ALLOWED_COLOUR,
     MUTED,
-    RECORDED,
+    RECORDED_COLOUR,
     RESIDUAL_COLOUR,
-    SIMULATED,
+    SIMULATED_COLOUR,
     Array,
-    counted,
+    count_things,
     display_unit,
     minus,
     powers,
@@ -46,7 +46,7 @@ ROWS_AROUND_WORST = 60  # rows of the result to either side of the worst one
 OFF_PANEL = 1e30  # beyond every panel
 
 
-def drawn(comparison: Comparison) -> list[Variable]:
+def drawn_variables(comparison: Comparison) -> list[Variable]:
     """Variables that are drawn: the worst ones outside, else the one nearest to its limit."""
     kept = [variable for variable in comparison.variables if variable.curves is not None]
     outside = [variable for variable in kept if variable.verdict == "different"]
@@ -56,7 +56,7 @@ def drawn(comparison: Comparison) -> list[Variable]:
 
 def picture_of(comparison: Comparison, number: int) -> Picture | None:
     """The worst variables over the whole time and around the worst instant; None where nothing was compared."""
-    variables = drawn(comparison)
+    variables = drawn_variables(comparison)
     if not variables:
         return None
     outside = len(comparison.those("different"))
@@ -77,26 +77,38 @@ def _panels(variable: Variable) -> list[Panel]:
     assert curves is not None
     unit = display_unit(variable.unit)
     time = Axis("time", "s")
-    reference = Curve("reference", *_as_steps(curves), RECORDED, width=1.2)
+    reference = Curve("reference", *_as_steps(curves), RECORDED_COLOUR, width=1.2)
     colour = RESIDUAL_COLOUR if variable.outside else MUTED
     whole = Panel(
-        variable.name, time, Axis(variable.name, unit),
-        [reference, Curve("result", curves.time, curves.values, SIMULATED)],
+        variable.name,
+        time,
+        Axis(variable.name, unit),
+        [reference, Curve("result", curves.time, curves.values, SIMULATED_COLOUR)],
         [Level(variable.time, "worst", upright=True, colour=colour, dash="dotted")],
-        [Band("tolerance", curves.lower, curves.upper, curves.time, ALLOWED), *_shaded(curves, slice(None))],
+        [
+            Band("tolerance", curves.lower, curves.upper, curves.time, ALLOWED_COLOUR),
+            *_residual_bands(curves, slice(None)),
+        ],
         linked=variable.name,
-    )  # fmt: skip
-    part = _around(variable, curves)
+    )
+    part = _rows_around_worst(variable, curves)
     near = curves.time[part]
-    expected = along(curves.reference_time, curves.reference, near)
-    difference = [Curve("result", near, curves.values[part] - expected, SIMULATED)]
-    band = Band("tolerance", curves.lower[part] - expected, curves.upper[part] - expected, near, ALLOWED)
+    expected = interpolate_at(curves.reference_time, curves.reference, near)
+    difference = [Curve("result", near, curves.values[part] - expected, SIMULATED_COLOUR)]
+    band = Band("tolerance", curves.lower[part] - expected, curves.upper[part] - expected, near, ALLOWED_COLOUR)
     marks = []
     if np.isfinite(variable.value):
-        there = variable.value - along(curves.reference_time, curves.reference, np.array([variable.time]))
+        there = variable.value - interpolate_at(curves.reference_time, curves.reference, np.array([variable.time]))
         marks = [Mark(variable.time, float(there[0]), "", colour)]
-    detail = Panel(_worst(variable), time, Axis("less the reference", unit), difference, [Level(0.0, dash="")],
-                   [band, *_shaded(curves, part)], marks)  # fmt: skip
+    detail = Panel(
+        _worst_deviation_text(variable),
+        time,
+        Axis("less the reference", unit),
+        difference,
+        [Level(0.0, dash="")],
+        [band, *_residual_bands(curves, part)],
+        marks,
+    )
     return [whole, detail]
 
 
@@ -107,11 +119,11 @@ def _as_steps(curves: Curves) -> tuple[Array, Array]:
     return np.repeat(curves.reference_time, 2)[1:], np.repeat(curves.reference, 2)[:-1]
 
 
-def _shaded(curves: Curves, part: slice) -> list[Band]:
+def _residual_bands(curves: Curves, part: slice) -> list[Band]:
     return [Band("outside", -OFF_PANEL, OFF_PANEL, np.array(ends), RESIDUAL_COLOUR) for ends in _spans(curves, part)]
 
 
-def _around(variable: Variable, curves: Curves) -> slice:
+def _rows_around_worst(variable: Variable, curves: Curves) -> slice:
     """Rows about the worst instant: some tolerances in time wide, so that the tube can be read."""
     worst = int(np.argmin(np.abs(curves.time - variable.time)))
     step = float(np.ptp(curves.time)) / max(1, len(curves.time) - 1)
@@ -119,7 +131,7 @@ def _around(variable: Variable, curves: Curves) -> slice:
     return slice(max(0, worst - rows), worst + rows + 1)
 
 
-def _worst(variable: Variable) -> str:
+def _worst_deviation_text(variable: Variable) -> str:
     off = f"off by {variable.deviation:.3g}, allowed {variable.allowed:.3g} {display_unit(variable.unit)}".strip()
     return minus(powers(off)) if np.isfinite(variable.deviation) else "no number"
 
@@ -205,7 +217,7 @@ def write(
             except OSError as error:
                 raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
         for folder in sorted(folders) if len(made) > 1 else ():
-            stack.enter_context(claimed(folder, LOCK, WAIT))
+            stack.enter_context(claim_folder(folder, LOCK, WAIT))
         for path, data in made:
             with written_whole(path) as file:
                 file.write(data)
@@ -221,14 +233,14 @@ def report_of(comparisons: Sequence[Comparison]) -> Report:
     verdict = next((kind for kind in ("unusable", "different") if counts[kind]), "same")
     one = comparisons[0] if len(comparisons) == 1 else None
     return Report(
-        f"Comparison: {one.heading}" if one else f"{counted(len(comparisons), 'comparison')}: {verdict}",
+        f"Comparison: {one.heading}" if one else f"{count_things(len(comparisons), 'comparison')}: {verdict}",
         f"{one.result} against {one.reference}"
         if one
         else ", ".join(f"{number} {kind}" for kind, number in counts.items() if number),
         answer=_answer(comparisons),
         warnings=[*(_problem(one) if one else []), *not_seen(comparisons)],
         tiles=_tiles(comparisons, counts),
-        main=list(_alone(one)) if one else [_pairs(comparisons), *_sections(comparisons)],
+        main=list(_single_pair_parts(one)) if one else [_pairs(comparisons), *_sections(comparisons)],
         footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
         "How results are compared: docs/comparing.md.",
     )
@@ -243,9 +255,10 @@ def _answer(comparisons: Sequence[Comparison]) -> list[str]:
     if not compared or one.worst is None:
         return []
     if not outside:
-        return [f"All {counted(len(compared), 'variable')} that were compared stay within their tolerance."]
+        return [f"All {count_things(len(compared), 'variable')} that were compared stay within their tolerance."]
     return [
-        f"{len(outside)} of {counted(len(compared), 'variable')} leave their tolerance, {one.worst.name} the furthest: "
+        f"{len(outside)} of {count_things(len(compared), 'variable')} leave their tolerance, {one.worst.name} "
+        f"the furthest: "
         f"{one.worst.line}.",
         *(f"It looks like: {proposal.text}." for proposal in one.looks_like),
         "The picture shows whether it is a matter of value or of time; which differences are allowed is yours to say "
@@ -278,7 +291,7 @@ def not_seen(comparisons: Sequence[Comparison]) -> list[Finding]:
         return [Finding("rows-not-compared", "doubt", text, comparisons[0].result) for text in texts]
     named = ", ".join(f"{comparison.result} ({comparison.heading})" for comparison in partly[:3])
     more = f" and {len(partly) - 3} more" if len(partly) > 3 else ""
-    text = f"Of {counted(len(partly), 'result')} not all rows are compared: {named}{more}."
+    text = f"Of {count_things(len(partly), 'result')} not all rows are compared: {named}{more}."
     return [Finding("rows-not-compared", "doubt", text)] if partly else []
 
 
@@ -292,7 +305,7 @@ def _sections(comparisons: Sequence[Comparison]) -> Iterator[Section]:
         yield Section(comparison.result, parts, _anchor(number))
 
 
-def _alone(comparison: Comparison) -> Iterator[Part]:
+def _single_pair_parts(comparison: Comparison) -> Iterator[Part]:
     """The only pair: its picture, and all else under a title."""
     parts = list(_single(comparison, 1, draw=True, alone=True))
     yield from (part for part in parts if isinstance(part, Picture))

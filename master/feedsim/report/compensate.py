@@ -28,19 +28,19 @@ from feedsim.report.content import (
     files_table,
 )
 from feedsim.report.formatting import (
-    AFTER,
-    BEFORE,
-    FRICTION,
-    OTHERWISE,
+    AFTER_COLOUR,
+    ALTERNATIVE_COLOUR,
+    BEFORE_COLOUR,
+    FRICTION_COLOUR,
     Array,
     display_unit,
     minus,
     powers,
-    remarked,
+    remark_charts,
     typeset,
 )
-from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hashed, inputs_part, quantity
-from feedsim.report.run.axis_plots import TIME, circle, circle_chart, reversed_note, torque_axis, turned
+from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hash_files, inputs_part, quantity
+from feedsim.report.run.axis_plots import TIME, circle, circle_chart, reversed_note, torque_axis, turn_curve
 from feedsim.report.run.files import details as details_of_run
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.uncertainty import BANDS
@@ -76,12 +76,14 @@ def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) ->
         f"Radius deviation magnified {on.magnification:,.0f} times; rings "
         f"at ±{on.ring:g} µm about the programmed circle."
     )
-    curves = [turned(name, colour, value.angle, value.deviation) for name, colour, value in _both(before, after)]
+    curves = [
+        turn_curve(name, colour, value.angle, value.deviation) for name, colour, value in _label_contours(before, after)
+    ]
     return Picture("compensation-contour", title, caption, circle_chart(on, curves, sense=turn.sense))
 
 
-def _both(before: Contour, after: Contour) -> list[tuple[str, str, Contour]]:
-    return [("without", BEFORE, before), ("with compensation", AFTER, after)]
+def _label_contours(before: Contour, after: Contour) -> list[tuple[str, str, Contour]]:
+    return [("without", BEFORE_COLOUR, before), ("with compensation", AFTER_COLOUR, after)]
 
 
 def _reversals_picture(before: Contour, after: Contour, plane: str) -> Picture:
@@ -92,9 +94,9 @@ def _reversals_picture(before: Contour, after: Contour, plane: str) -> Picture:
     )
     panels = []
     across = Axis("angle from the crossing", "°", span=(-45.0, 45.0))
-    for both in (_both(before, after), _both(before, after)[1:]):
+    for both in (_label_contours(before, after), _label_contours(before, after)[1:]):
         row = [
-            [Curve(name, *_about(value, glitch.crossing), colour) for name, colour, value in both]
+            [Curve(name, *_quadrant_curve(value, glitch.crossing), colour) for name, colour, value in both]
             for glitch in before.glitches
         ]
         low, high = spans([curve.y for curves in row for curve in curves]) or (0.0, 1.0)
@@ -106,7 +108,7 @@ def _reversals_picture(before: Contour, after: Contour, plane: str) -> Picture:
     return Picture("compensation-reversals", title, caption, Chart(panels, (1.0,) * 4))
 
 
-def _about(measured: Contour, crossing: float) -> tuple[Array, Array]:
+def _quadrant_curve(measured: Contour, crossing: float) -> tuple[Array, Array]:
     """Angle [deg] and deviation [um] within a quadrant about a crossing."""
     near = quadrant(measured.angle, crossing)
     angle = np.rad2deg((measured.angle[near] - crossing + math.pi) % (2 * math.pi) - math.pi)
@@ -130,8 +132,8 @@ def _torque_picture(compensation: Compensation) -> Picture | None:
     panels = []
     for axis in axes_of:
         curves = [
-            Curve("feedforward M_ff", torque.time, signs[axis] * torque[f"{axis}.M_ff"], OTHERWISE),
-            Curve("friction M_fr", real.time, signs[axis] * real[f"{axis}.M_fr"], FRICTION, "dashed"),
+            Curve("feedforward M_ff", torque.time, signs[axis] * torque[f"{axis}.M_ff"], ALTERNATIVE_COLOUR),
+            Curve("friction M_fr", real.time, signs[axis] * real[f"{axis}.M_fr"], FRICTION_COLOUR, "dashed"),
         ]
         reversal = _reversal(real.time, real[f"{axis}.n_a"])
         near = Axis("time", "s", span=(reversal - TIME_AROUND_REVERSAL, reversal + TIME_AROUND_REVERSAL))
@@ -166,14 +168,16 @@ def _errors_picture(compensation: Compensation) -> Picture:
     without = Level(compensation.figures["after.G"].value, upright=True, dash="dotted")
     rows = {name: float(i) for i, name in enumerate(reversed(names))}
     curves = []
-    for offset, low, colour in ((0.19, True, OTHERWISE), (-0.19, False, AFTER)):
+    for offset, low, colour in ((0.19, True, ALTERNATIVE_COLOUR), (-0.19, False, AFTER_COLOUR)):
         chosen = [other for other in others if (other.change < 0) == low]
         x = np.array([value for variation in chosen for value in (0.0, variation.quality.G * 1e6, math.nan)])
         y = np.array([value for variation in chosen for value in (*(2 * [rows[variation.what] + offset]), math.nan)])
         share = next((variation.change for variation in chosen), 0.0)
         curves.append(Curve(minus(f"{share:+.3g} %"), x, y, colour, width=8.0))
     axis = Axis("", names=list(rows), span=(-0.6, len(rows) - 0.4))
-    points = [Curve("", np.array(error), np.array(G), AFTER, width=width, dots=width > 2) for width in (1.4, 2.4)]
+    points = [
+        Curve("", np.array(error), np.array(G), AFTER_COLOUR, width=width, dots=width > 2) for width in (1.4, 2.4)
+    ]
     G_axis = Axis("circular deviation G", "µm")
     panels = [Panel("Delay", Axis("error of the delay", "ms"), G_axis, points)]
     if others:
@@ -197,7 +201,7 @@ Row = tuple[str, float, str, Quality]
 def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
     """Content of the report. files: axis -> file of its compensation's friction."""
     scenario = compensation.scenario
-    with remarked(f"{scenario.machine.name}. {scenario.machine.note}"):
+    with remark_charts(f"{scenario.machine.name}. {scenario.machine.note}"):
         pictures = pictures_of(compensation)
     return Report(
         f"Friction compensation: {scenario.name}",
@@ -348,7 +352,7 @@ def table_csv(compensation: Compensation) -> str:
 
 def friction_files(files: Mapping[str, Path]) -> list[InputFile]:
     """Files of the frictions that the compensation uses, with their hashes."""
-    return hashed([(f"friction of the compensation of {axis}", path) for axis, path in files.items()])
+    return hash_files([(f"friction of the compensation of {axis}", path) for axis, path in files.items()])
 
 
 def details(

@@ -17,10 +17,10 @@ import numpy as np
 
 from feedsim.analysis import Figure
 from feedsim.foundation.arguments import call
-from feedsim.foundation.errors import Finding, InputError, OutputError, ranked
+from feedsim.foundation.errors import Finding, InputError, OutputError, rank_findings
 from feedsim.report.chart import Chart, Panel
 from feedsim.report.chart.svg import png, standalone, svg
-from feedsim.report.formatting import REMARK, display_unit, minus, shown, typeset
+from feedsim.report.formatting import REMARK, display_unit, figure_text, minus, typeset
 from feedsim.report.provenance import InputFile, archives, axis_parameters, software
 from feedsim.scenario import Machine
 
@@ -210,7 +210,7 @@ def code(text: str) -> Span:
     return Span(text, "code")
 
 
-def typed(file: Path) -> str:
+def command_path(file: Path) -> str:
     """A file as a command takes it: from the folder where the command is typed where it is below that."""
     if file.is_absolute() and file.is_relative_to(Path.cwd()):
         file = file.relative_to(Path.cwd())
@@ -296,7 +296,7 @@ class Tile:
 
 def tile_value(figure: Figure) -> str:
     """Value with unit, to TILE_DIGITS digits that count, no place before the point left out."""
-    value, unit = shown(figure)
+    value, unit = figure_text(figure)
     if unit and figure.value and sum(c.isdigit() for c in value.lstrip("−0.")) > TILE_DIGITS:
         size = math.floor(math.log10(abs(float(f"{figure.value:.{TILE_DIGITS}g}"))))
         value = minus(f"{figure.value:.{max(0, TILE_DIGITS - 1 - size)}f}")
@@ -366,7 +366,7 @@ class Report:
     @property
     def findings(self) -> list[Finding]:
         """The warnings, the gravest first."""
-        return ranked(self.warnings)
+        return rank_findings(self.warnings)
 
     @property
     def pictures(self) -> list[Picture]:
@@ -374,7 +374,7 @@ class Report:
         return list(_pictures(self.main))
 
 
-def parted(text: str, most: int = FINDING_WORDS) -> tuple[str, str]:
+def split_finding(text: str, most: int = FINDING_WORDS) -> tuple[str, str]:
     """A text's beginning of `most` words or so, and the rest: parted behind a sentence or a clause where it has one."""
     words = text.split(" ")
     if len(words) <= most + most // 4:
@@ -402,7 +402,7 @@ def figures_section(figures: Mapping[str, Figure]) -> Section | None:
     """Every derived figure with unit and meaning."""
     if not figures:
         return None
-    rows = [(code(name), *shown(figure), typeset(figure.meaning)) for name, figure in figures.items()]
+    rows = [(code(name), *figure_text(figure), typeset(figure.meaning)) for name, figure in figures.items()]
     table = Table("lrlp", ("Figure", "Value", "Unit", "Meaning"), rows)
     return Section("Derived figures", [table], FIGURES_ANCHOR)
 

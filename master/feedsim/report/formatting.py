@@ -30,14 +30,14 @@ INK, MUTED, GRID, PAPER = "#1b1f24", "#59636e", "#d4dae1", "#fefefe"
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0528a", "#b87a00", "#3d9bd0"
 WINE = "#a8325a"  # none of theirs
 # What a colour means, in every picture. Panel or label names the axis.
-SIMULATED = AFTER = BLUE
-RECORDED = BEFORE = INK
-SETPOINT = MUTED
+SIMULATED_COLOUR = AFTER_COLOUR = BLUE
+RECORDED_COLOUR = BEFORE_COLOUR = INK
+SETPOINT_COLOUR = MUTED
 AT_TOOL = ORANGE
 RESIDUAL_COLOUR = VERMILLION  # what is left, stands out or lies outside
-ALLOWED = GREEN  # bands that are allowed or targets
-FRICTION = PURPLE
-OTHERWISE = SKY  # simulated in another way: another set, another side
+ALLOWED_COLOUR = GREEN  # bands that are allowed or targets
+FRICTION_COLOUR = PURPLE
+ALTERNATIVE_COLOUR = SKY  # simulated in another way: another set, another side
 CLOCKWISE = WINE  # second direction of a circle, simulated or recorded; dashed besides
 
 # CSS variable, colour on light ground (= in the drawing), colour on dark ground
@@ -56,7 +56,7 @@ PALETTE = (
 )
 
 
-def named(colour: str) -> str:
+def colour_name(colour: str) -> str:
     """The name of a colour of the palette."""
     return _NAMES[colour]
 
@@ -65,13 +65,13 @@ _NAMES = {on_light: name for name, on_light, _ in PALETTE}
 # Colours by their variables, as on white paper.
 PAGE_COLOURS = {name: colour for name, colour, _ in PALETTE} | {"ground": "#ffffff"}
 
-# What stands in small print in every picture that is made inside remarked().
+# What stands in small print in every picture that is made inside remark_charts().
 REMARK: ContextVar[str] = ContextVar("remark", default="")
 NARROW = 95, 2  # characters of a line and lines of it that fit the narrowest figure
 
 
 @contextmanager
-def remarked(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
+def remark_charts(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
     """Charts made inside have `text` in their upper right corner as files: a picture travels without its page.
 
     width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
@@ -90,7 +90,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 EXPONENT_BELOW = Decimal("1e-4")  # below which a number is written with a power of ten
 DISPLAY_UNITS = {"um": "µm", "1": "", "deg": "°"}
 NOT_DETERMINED = "not determined"
-SHORT = 10.0  # [ms] a delay, of which microseconds are shown
+SHORT_DELAY = 10.0  # [ms] a delay, of which microseconds are shown
 # SI unit -> (largest magnitude up to which the unit is taken, factor, unit), from small to large.
 _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "m": ((0.999e-3, 1e6, "um"), (10.0, 1e3, "mm")),
@@ -102,12 +102,12 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
 }
 
 
-def shown(figure: Figure) -> tuple[str, str]:
+def figure_text(figure: Figure) -> tuple[str, str]:
     """Value and unit for display; "not determined" and no unit where there is no value."""
     if not math.isfinite(figure.value):
         return NOT_DETERMINED, ""
     digits = {"um": 2, "um/m": 2, "ms": 1, "Hz": 2, "N.m": 3, "s": 4}.get(figure.unit)
-    if figure.unit == "ms" and abs(figure.value) < SHORT:
+    if figure.unit == "ms" and abs(figure.value) < SHORT_DELAY:
         digits = 3
     text = f"{figure.value:.{digits}f}" if digits is not None else powers(f"{figure.value:.5g}")
     return minus(text), display_unit(figure.unit)
@@ -144,7 +144,7 @@ def powers(text: str) -> str:
     return re.sub(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", written, text)
 
 
-def counted(number: int, one: str, many: str = "") -> str:
+def count_things(number: int, one: str, many: str = "") -> str:
     """ "1 stretch", "2 stretches"; many: plural where an s alone does not make it."""
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
@@ -206,7 +206,7 @@ def number(value: float, digits: int = 4) -> str:
     return minus(powers(f"{value:.{digits}g}")) if np.isfinite(value) else "–"
 
 
-def three(value: float) -> str:
+def three_digits(value: float) -> str:
     """Three digits that count, zeros at the end among them; a dash where there is no number."""
     if not np.isfinite(value):
         return "–"
@@ -214,7 +214,7 @@ def three(value: float) -> str:
     return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
 
 
-def two(value: float) -> str:
+def two_digits(value: float) -> str:
     """Two digits that count, and all places before the point; a dash where there is no number."""
     if not np.isfinite(value):
         return "–"
@@ -228,10 +228,10 @@ def with_interval(value: float, ends: tuple[float, float]) -> str:
     if not (math.isfinite(low) and math.isfinite(high)):
         return number(value, 3)
     width = max(value - low, high - value)
-    return " ".join([rounded(value, width), f"({rounded(low, width)} to {rounded(high, width)})"])
+    return " ".join([round_to_doubt(value, width), f"({round_to_doubt(low, width)} to {round_to_doubt(high, width)})"])
 
 
-def rounded(value: float, doubt: float) -> str:
+def round_to_doubt(value: float, doubt: float) -> str:
     """A number to the second digit of its doubt."""
     if not (math.isfinite(value) and math.isfinite(doubt) and doubt > 0):
         return number(value)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
-from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, Crossing, Fitted, Scatter, testable
+from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, FittedChange, LimitCrossing, Scatter, testable
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation import outputs
 from feedsim.foundation.errors import Finding
@@ -20,28 +20,28 @@ from feedsim.report import formatting
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.content import FOLDER, Picture, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import (
-    ALLOWED,
+    ALLOWED_COLOUR,
+    ALTERNATIVE_COLOUR,
     INK,
     MUTED,
-    OTHERWISE,
-    RECORDED,
+    RECORDED_COLOUR,
     RESIDUAL_COLOUR,
-    SIMULATED,
-    counted,
+    SIMULATED_COLOUR,
+    count_things,
     display_unit,
     minus,
     plain_unit,
     typeset,
 )
-from feedsim.report.provenance import finite, hashed, inputs_part
+from feedsim.report.provenance import finite, hash_files, inputs_part
 
 VALUES, CHANGES, FLEET = "history.csv", "changes.csv", "fleet.yaml"
 FILES = (VALUES, CHANGES, FLEET)  # besides report.html and summary.json
 FORMAT = 1
 MONTH = 365.25 / 12  # [d]
-BEGIN = datetime(1970, 1, 1)
-FIRST_DAY, LAST_DAY = (float((edge - BEGIN).days) for edge in (datetime.min, datetime.max))
-COMPENSATED = "against no compensation"  # behind a figure: how much larger it is than without compensation
+EPOCH = datetime(1970, 1, 1)
+FIRST_DAY, LAST_DAY = (float((edge - EPOCH).days) for edge in (datetime.min, datetime.max))
+COMPENSATION_SUFFIX = "against no compensation"  # behind a figure: how much larger it is than without compensation
 SCATTERS = 0.01  # chance of the scatter about a model, below which the intervals do not hold it
 MOST_ANSWERS = 6
 CURVE_POINTS = 60  # of a regime
@@ -62,7 +62,7 @@ FLEET_METHOD = (
 
 
 @dataclass(frozen=True)
-class Followed:
+class FollowedValue:
     """A value of a result in `unit`; sigma: standard deviation, nan where there is none."""
 
     value: float
@@ -88,13 +88,13 @@ class Entry:
     machine: str
     owner: str
     law: str
-    values: Mapping[str, Followed]
+    values: Mapping[str, FollowedValue]
     conditions: Mapping[str, float]
 
     @property
     def days(self) -> float:
         """Since 1970 [d]."""
-        return ((self.moment or BEGIN) - BEGIN).total_seconds() / 86400
+        return ((self.moment or EPOCH) - EPOCH).total_seconds() / 86400
 
     @property
     def day(self) -> str:
@@ -120,7 +120,7 @@ class History:
     files: Sequence[Path] = ()
     changes: Sequence[Change] = ()
     limits: Mapping[str, float] = field(default_factory=dict)
-    crossings: Mapping[str, Crossing] = field(default_factory=dict)
+    crossings: Mapping[str, LimitCrossing] = field(default_factory=dict)
     findings: Sequence[Finding] = ()
     simulated: Sequence[str] = ()
     scenario: str = ""
@@ -139,9 +139,9 @@ class History:
         return sum(testable(one.series) for one in self.changes)
 
 
-def rounded(value: float, doubt: float) -> str:
+def typed_number(value: float, doubt: float) -> str:
     """A number to the second digit of its doubt, as it is typed."""
-    return formatting.rounded(value, doubt).replace("−", "-")
+    return formatting.round_to_doubt(value, doubt).replace("−", "-")
 
 
 def number(value: float) -> str:
@@ -152,7 +152,7 @@ def number(value: float) -> str:
 def date_text(day: float) -> str:
     """Day since 1970 as a date; beyond the calendar its first or last one."""
     day = min(max(day, FIRST_DAY), LAST_DAY)
-    return (BEGIN + timedelta(days=day)).date().isoformat()
+    return (EPOCH + timedelta(days=day)).date().isoformat()
 
 
 # --- Sentences --------------------------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ def answers(history: History) -> list[str]:
         for one in history.ranked
         if one.series.name in history.limits
     ]
-    lines += [_change_sentence(one) for one in changed] or [_nothing(history)]
+    lines += [_change_sentence(one) for one in changed] or [_no_change_sentence(history)]
     if changed:
         same = len(history.changes) - len(changed)
         lines.append(
@@ -179,9 +179,9 @@ def answers(history: History) -> list[str]:
     return lines
 
 
-def _nothing(history: History) -> str:
+def _no_change_sentence(history: History) -> str:
     first, last = (date_text(edge) for edge in _span(history))
-    many = counted(len(history.changes), "quantity", "quantities")
+    many = count_things(len(history.changes), "quantity", "quantities")
     if not history.tested:
         return (
             f"No change can be named: of {many} between {first} and {last} there are fewer than {MIN_RECORDS} dates, "
@@ -222,16 +222,17 @@ def _change_sentence(change: Change) -> str:
         before, behind = (date_text(float(series.days[n])) for n in change.step_window(k))
         parts.append(f"steps by {_with_half(size, half)} {unit} between {before} and {behind}".replace("  ", " "))
     text = (
-        f"{series.name} {' and '.join(parts)}: from {rounded(*begin)} to {rounded(*end)} {unit} on {date_text(last)}"
+        f"{series.name} {' and '.join(parts)}: from {typed_number(*begin)} to {typed_number(*end)} {unit} on "
+        f"{date_text(last)}"
     ).replace("  ", " ")
-    relative = begin[0] * end[0] > 0 and not series.name.endswith(COMPENSATED)
+    relative = begin[0] * end[0] > 0 and not series.name.endswith(COMPENSATION_SUFFIX)
     text += f" ({_percent(begin[0], end[0])})." if relative else "."
     if change.rival is not None:
-        text += f" {_rival(change)}"
+        text += f" {_describe_rival(change)}"
     return text
 
 
-def _rival(change: Change) -> str:
+def _describe_rival(change: Change) -> str:
     """What fits about as well."""
     assert change.rival is not None
     what = {
@@ -247,7 +248,7 @@ def _limit_sentence(history: History, change: Change) -> str:
     name = change.series.name
     at, unit = history.crossings[name], plain_unit(change.series.unit)
     where = f"{number(history.limits[name])} {unit}".strip()
-    helps = name.endswith(COMPENSATED)
+    helps = name.endswith(COMPENSATION_SUFFIX)
     subject = "the compensation helps no more" if helps else f"{where} is reached"
     if at.state == "beyond":
         if helps:
@@ -285,7 +286,9 @@ def _percent(before: float, after: float) -> str:
 
 
 def _with_half(value: float, half: float) -> str:
-    return f"{rounded(value, half)} (95 %: {rounded(value - half, half)} to {rounded(value + half, half)})"
+    return (
+        f"{typed_number(value, half)} (95 %: {typed_number(value - half, half)} to {typed_number(value + half, half)})"
+    )
 
 
 def _scatter_sentence(one: Scatter) -> str:
@@ -294,9 +297,10 @@ def _scatter_sentence(one: Scatter) -> str:
     low, high = one.between_interval
     text = (
         f"{one.name}: {_with_half(one.mean, one.half)} {unit} over {one.machines} machines; between machines "
-        f"{rounded(one.between, one.between or 1)} {unit}{share}, 95 %: {rounded(low, high)} to {rounded(high, high)}"
+        f"{typed_number(one.between, one.between or 1)} {unit}{share}, 95 %: {typed_number(low, high)} to "
+        f"{typed_number(high, high)}"
     )
-    within = f"; within {rounded(one.within, one.within)} {unit}" if one.within > 0 else ""
+    within = f"; within {typed_number(one.within, one.within)} {unit}" if one.within > 0 else ""
     return f"{text}{within}.".replace("  ", " ")
 
 
@@ -321,11 +325,11 @@ def _change_rows(history: History) -> Rows:
         first, last = model.level(float(series.days[0]), 0), model.level(float(series.days[-1]))
         rate = _rate_text(model)
         steps = "; ".join(
-            f"{rounded(size, half)} at {date_text(float(series.days[k]))}"
+            f"{typed_number(size, half)} at {date_text(float(series.days[k]))}"
             for k, (size, half) in zip(model.steps, model.step_sizes(), strict=True)
         )
         chance = f"{one.probability:.1g}" if testable(series) else "not tested"
-        shown = [rounded(*first), rounded(*last)]
+        shown = [typed_number(*first), typed_number(*last)]
         if not testable(series):
             shown = [number(float(series.value[0])), number(float(series.value[-1]))]
         rows.append(
@@ -353,7 +357,7 @@ def _change_rows(history: History) -> Rows:
     ), rows
 
 
-def _rate_text(model: Fitted) -> str:
+def _rate_text(model: FittedChange) -> str:
     return _with_half(*(MONTH * part for part in model.rate_per_day())).replace("95 %: ", "") if model.rate else ""
 
 
@@ -387,16 +391,16 @@ def _scatter_rows(history: History) -> Rows:
     rows: list[Sequence[str]] = []
     for one in history.scatters:
         low, high = one.between_interval
-        within = rounded(one.within, one.within) if math.isfinite(one.within) else "one result each"
+        within = typed_number(one.within, one.within) if math.isfinite(one.within) else "one result each"
         rows.append(
             (
                 one.name,
                 f"{one.records} of {one.machines}",
                 _with_half(one.mean, one.half),
                 plain_unit(one.unit),
-                f"{rounded(one.between, one.between)} ({rounded(low, high)} to {rounded(high, high)})",
+                f"{typed_number(one.between, one.between)} ({typed_number(low, high)} to {typed_number(high, high)})",
                 within,
-                rounded(one.predicted, one.predicted),
+                typed_number(one.predicted, one.predicted),
             )
         )
     heads = (
@@ -562,13 +566,14 @@ def report_of(history: History, figures: Mapping[str, Figure]) -> Report:
     table = Table(letters, [_capital(head) for head in heads], [[code(row[0]), *map(typeset, row[1:])] for row in rows])
     if history.scatters:
         method = FLEET_METHOD
-        subtitle = f"{counted(len(history.entries), 'result')} of {len(history.machines)} machines"
+        subtitle = f"{count_things(len(history.entries), 'result')} of {len(history.machines)} machines"
         prior = {"traces": ["log.csv"], "prior": f"{FOLDER}/{FLEET}"}
         next_step = Step("Use it for a further machine, here with its log in log.csv", "identify friction", prior)
     else:
         method = METHOD.format(rate=100 * ERROR_RATE, tested=history.tested)
         subtitle = (
-            " to ".join(date_text(edge) for edge in _span(history)) + f", {counted(len(history.entries), 'result')}"
+            " to ".join(date_text(edge) for edge in _span(history))
+            + f", {count_things(len(history.entries), 'result')}"
         )
         values = {"results": [f"{FOLDER}/{VALUES}"], "out": f"{FOLDER}_next"}
         next_step = Step(
@@ -589,7 +594,8 @@ def report_of(history: History, figures: Mapping[str, Figure]) -> Report:
             Section("Results", [_entries_table(history)]),
         ],
         provenance=provenance_section(
-            [("Scenario", history.scenario)] if history.scenario else [], hashed([("result", f) for f in history.files])
+            [("Scenario", history.scenario)] if history.scenario else [],
+            hash_files([("result", f) for f in history.files]),
         ),
         footer=f"{method}. All values: {VALUES}.",
     )
@@ -632,23 +638,25 @@ def _picture(change: Change, history: History) -> Picture:
     start = float(series.days[0])
     months = (series.days - start) / MONTH
     half = NORMAL_95 * np.nan_to_num(series.sigma)
-    value = model.adjusted()
+    value = model.adjusted_values()
     curves = [
         Curve("95 %", np.array([x, x]), np.array([y - h, y + h]), MUTED, width=1.0)
         for x, y, h in zip(months, value, half, strict=True)
         if h > 0
     ]
     if series.columns:
-        curves.append(Curve("as it was", months, series.value, OTHERWISE, dots=True))
-    curves.append(Curve("value", months, value, RECORDED, dots=True))
+        curves.append(Curve("as it was", months, series.value, ALTERNATIVE_COLOUR, dots=True))
+    curves.append(Curve("value", months, value, RECORDED_COLOUR, dots=True))
     bands = []
     edges = [start, *(float(series.days[k]) for k in model.steps), _end(change, history)]
     for k in range(len(edges) - 1):
         days = np.linspace(edges[k], edges[k + 1], CURVE_POINTS)
         level = np.array([model.level(float(day), k) for day in days])
         x = (days - start) / MONTH
-        curves.append(Curve("model", x, level[:, 0], SIMULATED))
-        bands.append(Band("95 % of the model", level[:, 0] - level[:, 1], level[:, 0] + level[:, 1], x, SIMULATED))
+        curves.append(Curve("model", x, level[:, 0], SIMULATED_COLOUR))
+        bands.append(
+            Band("95 % of the model", level[:, 0] - level[:, 1], level[:, 0] + level[:, 1], x, SIMULATED_COLOUR)
+        )
     levels = []
     if series.name in history.limits:
         levels.append(Level(history.limits[series.name], "limit", colour=RESIDUAL_COLOUR))
@@ -703,14 +711,14 @@ def _machines_picture(history: History) -> Picture:
                 if entry.owner == owner and one.name in entry.values and entry.values[one.name].status == "estimated":
                     x.append(float(k))
                     y.append(entry.values[one.name].value)
-        curves = [Curve("value", np.array(x), np.array(y), RECORDED, dots=True)]
+        curves = [Curve("value", np.array(x), np.array(y), RECORDED_COLOUR, dots=True)]
         band = [
             Band(
                 "mean ± between",
                 one.mean - one.between,
                 one.mean + one.between,
                 np.array([-0.5, len(names) - 0.5]),
-                ALLOWED,
+                ALLOWED_COLOUR,
             )
         ]
         panels.append(
@@ -752,7 +760,7 @@ def details(history: History) -> dict[str, Any]:
         ],
         "scenario": history.scenario or None,
         "settings": dict(history.settings),
-        "inputs": inputs_part(hashed([("result", file) for file in history.files])),
+        "inputs": inputs_part(hash_files([("result", file) for file in history.files])),
     }
 
 

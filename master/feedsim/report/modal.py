@@ -32,8 +32,16 @@ from feedsim.report.content import (
     provenance_section,
     tile_value,
 )
-from feedsim.report.formatting import OTHERWISE, RECORDED, SIMULATED, Array, minus, remarked, typeset
-from feedsim.report.provenance import finite, hashed, inputs_part
+from feedsim.report.formatting import (
+    ALTERNATIVE_COLOUR,
+    RECORDED_COLOUR,
+    SIMULATED_COLOUR,
+    Array,
+    minus,
+    remark_charts,
+    typeset,
+)
+from feedsim.report.provenance import finite, hash_files, inputs_part
 from feedsim.report.results import Content
 from feedsim.scenario import Subject
 from feedsim.structure.modes import write_modes
@@ -124,7 +132,7 @@ def files_of(report: ModesReport) -> dict[str, Content]:
 def report_of(report: ModesReport) -> Report:
     """Content of the report."""
     axis_modes = report.found
-    with remarked(f"{report.file.name}, axis {axis_modes.axis} of {report.subject.machine.name}"):
+    with remark_charts(f"{report.file.name}, axis {axis_modes.axis} of {report.subject.machine.name}"):
         pictures = [_bode(axis_modes)]
     rows: list[tuple[Text, ...]] = [
         (f"{mode.frequency:.4g}", f"{NORMAL_95 * mode.frequency_sigma:.2g}", f"{100 * mode.damping:.3g}",
@@ -161,7 +169,7 @@ def report_of(report: ModesReport) -> Report:
         ],
         main=[*pictures, *tables, figures_section(report.figures)],
         provenance=provenance_section([("Response", report.file.name), ("Estimate", axis_modes.measured.method)],
-                                      hashed(_files(report))),
+                                      hash_files(_files(report))),
         footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES_FILE}.",
                               "docs/replay.md"),
         next_step=Step("See the drive on this structure", "frf",
@@ -183,9 +191,9 @@ def _bode(axis_modes: AxisModes) -> Picture:
         factor = scale / np.abs(axis_modes.own[MOTOR][0]) if scale else 1.0
         sign = np.sign(axis_modes.fit.rigid[name]) or 1.0
         return [
-            Curve("measured", frequency, of(axis_modes.measured.values[name]), RECORDED, dots=True, width=2.0),
-            Curve("fit", frequency, of(axis_modes.fit.response(name, frequency)), SIMULATED),
-            Curve("machine", frequency, of(own * factor * sign), OTHERWISE, "dashed"),
+            Curve("measured", frequency, of(axis_modes.measured.values[name]), RECORDED_COLOUR, dots=True, width=2.0),
+            Curve("fit", frequency, of(axis_modes.fit.response(name, frequency)), SIMULATED_COLOUR),
+            Curve("machine", frequency, of(own * factor * sign), ALTERNATIVE_COLOUR, "dashed"),
         ]
 
     def decibel(values: Any) -> Array:
@@ -223,7 +231,7 @@ def details(report: ModesReport) -> dict[str, Any]:
             for mode in axis_modes.fit.modes
         ],
         "predicted": {str(count): value for count, value in axis_modes.fit.predicted.items()},
-        "inputs": inputs_part(hashed(_files(report))),
+        "inputs": inputs_part(hash_files(_files(report))),
     }
 
 

@@ -32,8 +32,16 @@ from feedsim.report.content import (
     provenance_section,
     tile_value,
 )
-from feedsim.report.formatting import OTHERWISE, RECORDED, SIMULATED, minus, remarked, scale, typeset
-from feedsim.report.provenance import finite, hashed, inputs_part, quantity
+from feedsim.report.formatting import (
+    ALTERNATIVE_COLOUR,
+    RECORDED_COLOUR,
+    SIMULATED_COLOUR,
+    minus,
+    remark_charts,
+    scale,
+    typeset,
+)
+from feedsim.report.provenance import finite, hash_files, inputs_part, quantity
 from feedsim.report.results import Content
 from feedsim.scenario import Subject
 from feedsim.structure.modes import checked_modes
@@ -203,7 +211,7 @@ def group_text(report: MountsReport) -> str:
 def report_of(report: MountsReport) -> Report:
     """Content of the report."""
     mounts = report.mounts
-    with remarked(f"{', '.join(file.name for file in report.files)}; {report.subject.machine.name}"):
+    with remark_charts(f"{', '.join(file.name for file in report.files)}; {report.subject.machine.name}"):
         pictures = [picture for picture in (_over_amplitude(mounts), _over_time(mounts)) if picture is not None]
     rows: list[tuple[Text, ...]] = [(code(name), *map(minus, rest)) for name, *rest in _rows(report)]
     heads = ("Parameter", "Mounts", "Machine file", "Identified", "95 % interval", "Unit")
@@ -232,14 +240,14 @@ def report_of(report: MountsReport) -> Report:
             if one.status == "estimated"
         ],
         main=[*pictures, values, downs, figures_section(report.figures)],
-        provenance=provenance_section([("Logs", ", ".join(f.name for f in report.files))], hashed(_files(report))),
+        provenance=provenance_section([("Logs", ", ".join(f.name for f in report.files))], hash_files(_files(report))),
         footer=figures_footer(f"What machines take: {GROUP}; what the figures show: {SWINGS}, {RING_DOWNS}.",
                               "docs/effects.md"),
-        next_step=_next(report),
+        next_step=_next_step(report),
     )  # fmt: skip
 
 
-def _next(report: MountsReport) -> Step:
+def _next_step(report: MountsReport) -> Step:
     subject = report.subject
     chosen = [*subject.overrides, f"machine.mounts={FOLDER}/{GROUP}"]
     if subject.scenario is not None:
@@ -277,15 +285,17 @@ def _over_amplitude(mounts: FoundMounts) -> Picture | None:
     ):
         curves = []
         for stop in stops:
-            recorded, simulated = _ordered(stop.recorded_swings), _ordered(stop.simulated_swings)
+            recorded, simulated = _order_swings(stop.recorded_swings), _order_swings(stop.simulated_swings)
             at = np.array([unit.factor * swing.amplitude for swing in recorded])
             y, half = (factor * np.array([getattr(swing, name) for swing in recorded]) for name in (value, sigma))
             for a, middle, part in zip(at, y, NORMAL_95 * half, strict=True):
                 ends = np.array([middle - part, middle + part])
-                curves.append(Curve("recorded, 95 %", np.array([a, a]), ends, RECORDED, width=1.0))
-            curves.append(Curve("recorded", at, y, RECORDED, dots=True, width=3.0))
+                curves.append(Curve("recorded, 95 %", np.array([a, a]), ends, RECORDED_COLOUR, width=1.0))
+            curves.append(Curve("recorded", at, y, RECORDED_COLOUR, dots=True, width=3.0))
             own = np.array([unit.factor * swing.amplitude for swing in simulated])
-            curves.append(Curve("simulated", own, factor * np.array([getattr(s, value) for s in simulated]), SIMULATED))
+            curves.append(
+                Curve("simulated", own, factor * np.array([getattr(s, value) for s in simulated]), SIMULATED_COLOUR)
+            )
         panels.append(Panel(f"{label} of the ring-downs", x, Axis(label, shown_unit), curves, levels, linked="a"))
     caption = (
         "Every stretch of two swings, recorded with its interval and simulated with the mounts that were mounts. "
@@ -294,7 +304,7 @@ def _over_amplitude(mounts: FoundMounts) -> Picture | None:
     return Picture("mounts-amplitude", "Frequency and damping over the amplitude", caption, Chart(panels))
 
 
-def _ordered(swings: Sequence[Swing]) -> list[Swing]:
+def _order_swings(swings: Sequence[Swing]) -> list[Swing]:
     return sorted(swings, key=lambda swing: swing.amplitude)
 
 
@@ -304,9 +314,9 @@ def _over_time(mounts: FoundMounts) -> Picture:
         unit = scale(stop.unit, np.abs(stop.recorded))
         time, factor = 1e3 * stop.time, unit.factor
         curves = [
-            Curve("recorded", time, factor * stop.recorded, RECORDED),
-            Curve("simulated", time, factor * stop.simulated, SIMULATED),
-            Curve("machine file", time, factor * stop.before, OTHERWISE, "dashed"),
+            Curve("recorded", time, factor * stop.recorded, RECORDED_COLOUR),
+            Curve("simulated", time, factor * stop.simulated, SIMULATED_COLOUR),
+            Curve("machine file", time, factor * stop.before, ALTERNATIVE_COLOUR, "dashed"),
         ]
         axis = Axis("off its mean", unit.shown_unit)
         panels.append(Panel(stop.name, Axis("time since the setpoint stands still", "ms"), axis, curves, height=0.8))
@@ -335,7 +345,7 @@ def details(report: MountsReport) -> dict[str, Any]:
              "left": stop.remaining, "noise": stop.noise}
             for stop in mounts.ring_downs
         ],
-        "inputs": inputs_part(hashed(_files(report))),
+        "inputs": inputs_part(hash_files(_files(report))),
     }  # fmt: skip
 
 

@@ -17,18 +17,18 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Self
 
 from feedsim.files.trace import Trace
-from feedsim.files.trace.files import heading, lines_of
+from feedsim.files.trace.files import header_line, lines_of
 from feedsim.files.trace.trace import first_not_finite
 from feedsim.foundation.errors import OutputError
 from feedsim.foundation.owned import own_folder
-from feedsim.report.chart.model import LAYOUT, embedded
-from feedsim.report.content import TILES, Report, parted
+from feedsim.report.chart.model import LAYOUT, embed_charts
+from feedsim.report.content import TILES, Report, split_finding
 from feedsim.report.formatting import PALETTE, typeset
 
 if TYPE_CHECKING:
     from jinja2 import BytecodeCache, Environment
 
-    from feedsim.report.run.sheet import Filled
+    from feedsim.report.run.sheet import FilledSheet
 
 
 # What computes and draws the charts and what a reader does with them, in their order.
@@ -46,17 +46,17 @@ def html(report: Report, kind: str = "", folder: Path | None = None) -> str:
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
     environment.filters["typeset"] = typeset
     environment.filters["kind"] = lambda part: type(part).__name__
-    environment.filters["parted"] = parted
+    environment.filters["parted"] = split_finding
     environment.filters["named"] = lambda text: PATH.sub("", text)
     charts = report.charts
     step = report.next_step.line(folder) if report.next_step is not None else ""
     return environment.get_template("report.html.j2").render(
-        report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",
+        report=report, palette=PALETTE, data=embed_charts(charts) if charts else "", script=script() if charts else "",
         policy=policy(script() if charts else ""), kind=kind, most_tiles=TILES, next=step,
     )  # fmt: skip
 
 
-def sheet_html(title: str, sheets: Sequence[Filled], rule: str) -> str:
+def sheet_html(title: str, sheets: Sequence[FilledSheet], rule: str) -> str:
     """HTML text of acceptance sheets, for print; all text is escaped. rule: how is decided."""
     environment = _environment()
     environment.filters["typeset"] = typeset
@@ -75,7 +75,7 @@ def _environment() -> Environment:
 
     return Environment(
         loader=PackageLoader("feedsim.report", "template"),
-        bytecode_cache=_compiled(),
+        bytecode_cache=_template_cache(),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -84,7 +84,7 @@ def _environment() -> Environment:
     )
 
 
-def _compiled() -> BytecodeCache | None:
+def _template_cache() -> BytecodeCache | None:
     """Templates that an earlier process has compiled, a tenth of a short run's time; None: none are kept."""
     from jinja2 import FileSystemBytecodeCache
     from jinja2.bccache import Bucket
@@ -98,7 +98,7 @@ def _compiled() -> BytecodeCache | None:
     return Kept(str(place)) if place is not None else None
 
 
-def drawing() -> str:
+def drawing_script() -> str:
     """What draws the charts of a page and what a reader does with them; it is handed the sizes of layout.py."""
     folder = resources.files("feedsim.report") / "template"
     sizes = json.dumps(LAYOUT, ensure_ascii=False, separators=(",", ":"))
@@ -108,7 +108,7 @@ def drawing() -> str:
 @cache
 def script() -> str:
     """The only script of a page."""
-    return '"use strict";\n(() => {\n' + drawing() + "})();\n"
+    return '"use strict";\n(() => {\n' + drawing_script() + "})();\n"
 
 
 def policy(text: str) -> str:
@@ -153,7 +153,7 @@ class Partial:
                 self._directory.mkdir(parents=True, exist_ok=True)
                 self.path.unlink(missing_ok=True)  # of another run
                 self._file = self.path.open("xb")
-                self._file.write(heading(part))
+                self._file.write(header_line(part))
             self._file.write(lines_of([part.time, *part.columns.values()]))
             self._file.flush()
         except OSError as error:

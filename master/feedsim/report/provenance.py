@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from feedsim.files.fields import Quantity
-from feedsim.files.source import digest
+from feedsim.files.source import content_digest
 from feedsim.foundation.errors import InputError
 from feedsim.foundation.installation import version
 from feedsim.scenario import Axis, Drive, ForeignUnit, FrictionParameters, Machine, Scenario
@@ -50,7 +50,7 @@ class ArchiveUse:
 
 def input_files(scenario: Scenario) -> list[InputFile]:
     """Scenario, machine and further YAML files, table of modes, recordings, loads; each once."""
-    return hashed(_inputs(scenario))
+    return hash_files(_inputs(scenario))
 
 
 def input_paths(scenario: Scenario) -> list[Path]:
@@ -73,7 +73,7 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
     return named
 
 
-def hashed(files: Sequence[tuple[str, Path]]) -> list[InputFile]:
+def hash_files(files: Sequence[tuple[str, Path]]) -> list[InputFile]:
     """Files with what they are, each once, under what it is first."""
     once = {path.absolute(): (role, path) for role, path in reversed(files)}
     return [InputFile(role, path.name, sha256(path)) for role, path in reversed(once.values())]
@@ -144,7 +144,7 @@ def _units(model: Any) -> Iterator[tuple[str, str]]:
 def sha256(path: Path) -> str | None:
     """Of a file's bytes; None where it cannot be read."""
     try:
-        return digest(path)
+        return content_digest(path)
     except InputError:
         return None
 

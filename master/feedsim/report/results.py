@@ -13,15 +13,15 @@ from typing import Any
 
 from feedsim.files.source import json_file
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.outputs import forced, same
-from feedsim.foundation.owned import TemporaryFolder, claimed, held
+from feedsim.foundation.outputs import is_replacement_allowed, is_same_file
+from feedsim.foundation.owned import TemporaryFolder, claim_folder, defer_signals
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from feedsim.report.provenance import sha256, software, to_json
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 SCRATCH = ".feedsim-"  # how the folder begins in which files are made
-MOVES = "moves.json"  # in it: name -> from where it is moved into the directory, null: it is removed
+MOVES_FILE = "moves.json"  # in it: name -> from where it is moved into the directory, null: it is removed
 ENVELOPE = 1  # version of what every summary.json has, whatever its kind: write_report()
 # What results of feedsim 0.1 have left besides figures: their summaries do not say which files stay.
 _OF_0_1 = {
@@ -42,7 +42,7 @@ def check_place(
     a simulation, whose result would else be lost.
     """
     directory = Path(directory)
-    with claimed(directory), _as_output_error(directory):
+    with claim_folder(directory), _as_output_error(directory):
         _settle(directory)
         for name in (*files, FIGURES):
             if (directory / name).exists() and (directory / name).is_dir() != (name == FIGURES):
@@ -51,21 +51,21 @@ def check_place(
                 )
         for fate, names in (("replaced", files), ("removed", _stale(directory, files))):
             for name in names:
-                if (directory / name).exists() and any(same(directory / name, path) for path in inputs):
+                if (directory / name).exists() and any(is_same_file(directory / name, path) for path in inputs):
                     raise OutputError(f"{directory / name}: is an input and would be {fate}; take another directory")
-        if not forced():
+        if not is_replacement_allowed():
             _check_owner(directory, files, kind, own)
 
 
 def _check_owner(directory: Path, files: Sequence[str], kind: str, own: Sequence[str]) -> None:
     """OutputError where a result of another kind would be replaced, or a file that no result of feedsim lists."""
     before = _summary(directory).get("kind", kind)  # results of feedsim 0.1 do not say
-    if before != kind and _listed(directory):
+    if before != kind and _listed_files(directory):
         raise OutputError(
             f"{directory}: holds a result of kind {before}, and a result of kind {kind} would replace it; take another "
             "directory, or replace it with --force"
         )
-    listed = {*(_listed(directory) or ()), *own, *([SUMMARY] if _listed(directory) is not None else ())}
+    listed = {*(_listed_files(directory) or ()), *own, *([SUMMARY] if _listed_files(directory) is not None else ())}
     for name in files:
         if name not in listed and os.path.lexists(directory / name) and not (directory / name).is_dir():
             raise OutputError(
@@ -74,7 +74,7 @@ def _check_owner(directory: Path, files: Sequence[str], kind: str, own: Sequence
             )
 
 
-def replaced(directory: Path, inputs: Sequence[Path], asked: Sequence[str]) -> str:
+def describe_replaced_result(directory: Path, inputs: Sequence[Path], asked: Sequence[str]) -> str:
     """What is lost where a result of other parameters is replaced, in a sentence; "" where it is none.
 
     inputs: files that are read. asked: what was asked for besides, such as the texts of --set.
@@ -115,7 +115,7 @@ def write_results(
     process writes to the directory.
     """
     directory = Path(directory)
-    with claimed(directory), _as_output_error(directory):
+    with claim_folder(directory), _as_output_error(directory):
         check_place(directory, files, kind=kind, own=own)
         with TemporaryFolder(directory, prefix=SCRATCH) as scratch:
             fresh = scratch / "fresh"
@@ -126,7 +126,7 @@ def write_results(
             names = [*figures, *files]
             fill(fresh, names)
             sources = {name: fresh / name for name in names} | dict(grown or {})
-            with held():
+            with defer_signals():
                 _move(sources, directory, _stale(directory, names), scratch)
     return tuple(directory / name for name in names)
 
@@ -193,7 +193,7 @@ def discard(directory: Path | str) -> None:
     """
     directory = Path(directory)
     with _as_output_error(directory):
-        if (listed := _listed(directory)) is None:
+        if (listed := _listed_files(directory)) is None:
             return
         for name in (*_stale(directory, ()), *(name for name in (REPORT, SUMMARY) if name in listed)):
             (directory / name).unlink(missing_ok=True)
@@ -213,11 +213,11 @@ def _settle(directory: Path) -> None:
     """
     for scratch in directory.glob(f"{SCRATCH}*"):
         try:
-            moves = json_file(scratch / MOVES)
+            moves = json_file(scratch / MOVES_FILE)
         except InputError:
             moves = {}  # it was still being filled
         for name, source in moves.items():
-            if not _inside(name) or not _inside(source or name):
+            if not _is_inside(name) or not _is_inside(source or name):
                 continue  # nothing that we have noted
             if source is None:
                 (directory / name).unlink(missing_ok=True)
@@ -227,7 +227,7 @@ def _settle(directory: Path) -> None:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _inside(name: str) -> bool:
+def _is_inside(name: str) -> bool:
     return not Path(name).is_absolute() and ".." not in Path(name).parts
 
 
@@ -239,15 +239,15 @@ def _stale(directory: Path, names: Sequence[str]) -> list[str]:
     enveloped = "version" in before
     return [
         name
-        for name in _listed(directory) or ()
+        for name in _listed_files(directory) or ()
         if name not in stay
         and (enveloped or name in _OF_0_1 or name.startswith(f"{FIGURES}/"))
-        and _inside(name)
+        and _is_inside(name)
         and (directory / name).is_file()
     ]
 
 
-def _listed(directory: Path) -> list[str] | None:
+def _listed_files(directory: Path) -> list[str] | None:
     """What the summary of an earlier run in ``directory`` lists."""
     try:
         return [name for name in _summary(directory)["files"] if isinstance(name, str)]
@@ -277,7 +277,7 @@ def _move(sources: Mapping[str, Path], directory: Path, stale: Sequence[str], sc
     order = sorted(sources, key=SUMMARY.__eq__)
     noted = {name: os.path.relpath(sources[name], directory) for name in order} | dict.fromkeys(stale)
     write_text(scratch / "noted", json.dumps(noted))
-    (scratch / "noted").replace(scratch / MOVES)
+    (scratch / "noted").replace(scratch / MOVES_FILE)
     moves: list[tuple[Path, Path]] = []
 
     def move(path: Path, to: Path) -> None:

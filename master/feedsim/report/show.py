@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.analysis import Approach, Figure, deviation, positioning
+from feedsim.analysis import Approach, Figure, deviation, positioning_figures
 from feedsim.analysis.circularity import Turn, amplitude_spectrum, contour
-from feedsim.analysis.side_by_side import COMPARED_SIGNALS, Source, differing, stops
+from feedsim.analysis.side_by_side import COMPARED_SIGNALS, Source, differing_parameters, stops
 from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
@@ -22,37 +22,37 @@ from feedsim.report.changes import control_section
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
 from feedsim.report.content import Bullets, Picture, Report, Section, Step, Table, Text, Tile, code
 from feedsim.report.formatting import (
-    BEFORE,
+    BEFORE_COLOUR,
     GREEN,
     NARROW,
     ORANGE,
     PURPLE,
-    RECORDED,
-    SIMULATED,
+    RECORDED_COLOUR,
+    SIMULATED_COLOUR,
     SKY,
     VERMILLION,
     Array,
-    counted,
+    count_things,
     display_unit,
+    figure_text,
     minus,
     plain_unit,
-    remarked,
+    remark_charts,
     scale,
-    shown,
-    three,
+    three_digits,
 )
-from feedsim.report.provenance import hashed, inputs_part, quantity
-from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE, circle, circle_chart, turned
+from feedsim.report.provenance import hash_files, inputs_part, quantity
+from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE, circle, circle_chart, turn_curve
 
 # --- Pictures of several results over each other: contours of circles, stops, signals over time and by frequency ------
 
 
 FURTHER_COLOURS = (SKY, GREEN, PURPLE, ORANGE, VERMILLION)  # of further results
 ABSCISSA = Axis("time from the first row", "s")
-AFTER = Axis("time after the end of the motion", "ms", span=(-1e3 * ZOOM_BEFORE, 1e3 * ZOOM_AFTER))
+TIME_AFTER_MOTION = Axis("time after the end of the motion", "ms", span=(-1e3 * ZOOM_BEFORE, 1e3 * ZOOM_AFTER))
 FREQUENCY = Axis("frequency", "Hz", log=True)
-SHAKEN = 0.02
-LEFT_OUT = f"Axes with less than {100 * SHAKEN:g} % of the largest range are left out."
+SHAKEN_AXIS_SHARE = 0.02
+LEFT_OUT = f"Axes with less than {100 * SHAKEN_AXIS_SHARE:g} % of the largest range are left out."
 # What a picture answers: stem, title, signal, factor from SI, ordinate.
 QUESTIONS = (
     ("following-error", "How far do the axes lag?", "x_e", 1e6, Axis("following error", "µm")),
@@ -77,11 +77,13 @@ def looks_of(sources: Sequence[Source]) -> list[tuple[str, Dash]]:
     """Colour and dash of every source: records as records; of results alone the first is what was before."""
     kinds: tuple[Dash, ...] = ("", "dashed", "dotted")
     records = [not source.figures and not source.parameters for source in sources]
-    names = [SIMULATED, *FURTHER_COLOURS] if any(records) else [BEFORE, SIMULATED, *FURTHER_COLOURS]
+    names = (
+        [SIMULATED_COLOUR, *FURTHER_COLOURS] if any(records) else [BEFORE_COLOUR, SIMULATED_COLOUR, *FURTHER_COLOURS]
+    )
     result: list[tuple[str, Dash]] = []
     for k, recorded in enumerate(records):
         number = sum(record == recorded for record in records[:k])
-        own = [RECORDED] if recorded else names
+        own = [RECORDED_COLOUR] if recorded else names
         result.append((own[number % len(own)], kinds[number // len(own) % len(kinds)]))
     return result
 
@@ -127,7 +129,7 @@ def contour_picture(sources: Sequence[Source], prefix: str) -> Picture | None:
     )
     looks = looks_of(sources)
     shown = [
-        turned(source.name, looks[k][0], curve.angle, curve.deviation, looks[k][1],
+        turn_curve(source.name, looks[k][0], curve.angle, curve.deviation, looks[k][1],
                1.4 if turn.sense > 0 else 0.8)
         for k, source, turns, drawn in curves
         for turn, curve in zip(turns, drawn, strict=True)
@@ -145,10 +147,10 @@ class Stop:
 
 
 # A curve of a source, by its number: abscissae and ordinates.
-_Own = tuple[int, Array, Array]
+_SourceCurve = tuple[int, Array, Array]
 
 
-def _curves(sources: Sequence[Source], own: Sequence[_Own]) -> list[Curve]:
+def _curves(sources: Sequence[Source], own: Sequence[_SourceCurve]) -> list[Curve]:
     looks = looks_of(sources)
     return [Curve(sources[k].name, x, y, *looks[k], 1.2) for k, x, y in own]
 
@@ -156,7 +158,7 @@ def _curves(sources: Sequence[Source], own: Sequence[_Own]) -> list[Curve]:
 def _over_time(
     sources: Sequence[Source], stem: str, title: str, signal: str, factor: float, ordinate: Axis
 ) -> Picture | None:
-    result: dict[str, list[_Own]] = {}
+    result: dict[str, list[_SourceCurve]] = {}
     for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
         curves = (
             (k, source, source.curve(f"{axis}.{signal}", COMPARED_SIGNALS[signal])) for k, source in enumerate(sources)
@@ -165,7 +167,7 @@ def _over_time(
     sizes = {axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0) for axis, curves in result.items()}
     panels = [
         Panel(f"Axis {axis}", ABSCISSA, ordinate, _curves(sources, result[axis]), [Level(0.0, dash="")], linked="t")
-        for axis in _moved(sizes)
+        for axis in _moved_axes(sizes)
     ]
     caption = f"Over the time of the first source, from its first row on. {LEFT_OUT}"
     return Picture(stem, title, caption, Chart(panels)) if panels else None
@@ -175,7 +177,7 @@ def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]])
     """Distance beyond the target about the ends of motions, a panel for every stop of an axis."""
     panels = []
     for axis, number in stops_of(stops):
-        own: list[_Own] = []
+        own: list[_SourceCurve] = []
         most, said = LEAST_REACH, []
         for k, (source, approaches) in enumerate(zip(sources, stops, strict=True)):
             if (seen := stop_seen(source, approaches, axis, number)) is None:
@@ -191,7 +193,7 @@ def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]])
         ordinate = Axis("beyond the target", "µm", span=(-1.45 * most, 1.45 * most))
         levels = [Level(0.0, dash=""), Level(0.0, upright=True, dash="dotted")]
         if own and number < MOST_STOPS:
-            panels.append(Panel(title, AFTER, ordinate, _curves(sources, own), levels, linked="stop"))
+            panels.append(Panel(title, TIME_AFTER_MOTION, ordinate, _curves(sources, own), levels, linked="stop"))
     caption = (
         "Actual position less end position in the sense of the motion, positive past it, over the time after the "
         "setpoint has come to rest."
@@ -221,12 +223,12 @@ def spectrum_picture(sources: Sequence[Source]) -> Picture | None:
     """Amplitude spectra of following error and torque of every axis, over the whole of each source."""
     panels = []
     for signal, words, factor, unit in SPECTRA:
-        result: dict[str, list[_Own]] = {}
+        result: dict[str, list[_SourceCurve]] = {}
         for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
             curves = [(k, _spectrum(source, f"{axis}.{signal}", factor)) for k, source in enumerate(sources)]
             result[axis] = [(k, *curve) for k, curve in curves if curve is not None]
         tops = {axis: max((float(a.max()) for *_, a in curves), default=0.0) for axis, curves in result.items()}
-        for axis in _moved(tops):
+        for axis in _moved_axes(tops):
             y = Axis("amplitude", unit, log=True, span=(DOWN * tops[axis], 2 * tops[axis]))
             panels.append(Panel(f"Axis {axis}: {words}", FREQUENCY, y, _curves(sources, result[axis]), linked="f"))
     caption = (
@@ -249,9 +251,9 @@ def _spectrum(source: Source, name: str, factor: float) -> tuple[Array, Array] |
     return f[2:], a[2:]  # what is below holds the mean
 
 
-def _moved(sizes: Mapping[str, float]) -> list[str]:
+def _moved_axes(sizes: Mapping[str, float]) -> list[str]:
     """Axes that are worth a panel, by how large what they do is."""
-    return [axis for axis, size in sizes.items() if size > SHAKEN * max(sizes.values())]
+    return [axis for axis, size in sizes.items() if size > SHAKEN_AXIS_SHARE * max(sizes.values())]
 
 
 FORMAT = 1
@@ -289,7 +291,7 @@ def files_of(sources: Sequence[Source]) -> list[Path]:
 
 def lines(sources: Sequence[Source]) -> list[str]:
     """What the command says: what has changed, parameters that differ, how all was aligned."""
-    rows = differing(sources)
+    rows = differing_parameters(sources)
     said = _changes(sources)
     said += [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:MOST_LISTED]]
     if len(rows) > MOST_LISTED:
@@ -303,30 +305,30 @@ def lines(sources: Sequence[Source]) -> list[str]:
 def answers(sources: Sequence[Source]) -> list[str]:
     """The same in the words of the page: what has changed, and in what the sources differ."""
     names = [source.name for source in sources]
-    rows = differing(sources)
+    rows = differing_parameters(sources)
     said = _changes(sources)
     if len(sources) == 2:
         said += [f"{name}: {' -> '.join(map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
     else:
         said += [f"{name}: {_values_by_name(names, map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
     if len(rows) > MOST_DIFFERING:
-        said.append(f"{counted(len(rows) - MOST_DIFFERING, 'parameter')} more that differ are listed below.")
+        said.append(f"{count_things(len(rows) - MOST_DIFFERING, 'parameter')} more that differ are listed below.")
     return said or lines(sources)
 
 
 def _changes(sources: Sequence[Source]) -> list[str]:
     """The leading figures from source to source, a sentence for each prefix; those that are alike are named last."""
-    leading = _leading(sources)
+    leading = _leading_figures(sources)
     said = []
     for prefix in dict.fromkeys(name.partition(".")[0] for name in leading):
         own = {name: values for name, values in leading.items() if name.partition(".")[0] == prefix}
-        same = [_words(name) for name, values in own.items() if _alike(values)]
-        changed = [f"{_words(name)} {_beside(values)}" for name, values in own.items() if not _alike(values)]
+        same = [_words(name) for name, values in own.items() if _is_alike(values)]
+        changed = [f"{_words(name)} {_values_text(values)}" for name, values in own.items() if not _is_alike(values)]
         text = ", ".join(changed)
         if same and len(sources) > 1:
             text += f"{'; ' * bool(text)}unchanged: {', '.join(same)}"
         elif same:
-            text = ", ".join(f"{_words(name)} {_beside(values)}" for name, values in own.items())
+            text = ", ".join(f"{_words(name)} {_values_text(values)}" for name, values in own.items())
         said.append(f"{prefix.replace('#', ' no. ')}: {text}.")
     return said
 
@@ -334,20 +336,20 @@ def _changes(sources: Sequence[Source]) -> list[str]:
 Values = Sequence[tuple[float, str] | None]
 
 
-def _alike(values: Values) -> bool:
+def _is_alike(values: Values) -> bool:
     """Whether a figure is the same in all sources, to what is shown of it or to LEAST_CHANGE."""
     if any(value is None for value in values):
         return False
-    texts = {shown(Figure(*value, "")) for value in values if value is not None}
+    texts = {figure_text(Figure(*value, "")) for value in values if value is not None}
     numbers = [value[0] for value in values if value is not None]
     if len(texts) == 1:
         return True
     return len({unit for _, unit in texts}) == 1 and np.ptp(numbers) < LEAST_CHANGE / 100 * max(map(abs, numbers))
 
 
-def _beside(values: Values) -> str:
+def _values_text(values: Values) -> str:
     """A figure of all sources: 8.19 -> 7.40 um (-9.7 %)."""
-    texts = [("–", "") if value is None else _three(value) for value in values]
+    texts = [("–", "") if value is None else _three_digits(value) for value in values]
     units = {unit for _, unit in texts if unit}
     last = f" {next(iter(units))}" if len(units) == 1 else ""
     text = " -> ".join(number if last else f"{number} {unit}".strip() for number, unit in texts) + last
@@ -358,13 +360,13 @@ def _beside(values: Values) -> str:
     return text
 
 
-def _three(value: tuple[float, str]) -> tuple[str, str]:
+def _three_digits(value: tuple[float, str]) -> tuple[str, str]:
     """Number, three digits of it at most, and unit."""
     number, unit = value
     if not math.isfinite(number):
         return "not determined", ""
-    short, _ = shown(Figure(number, unit, ""))
-    return min(three(number).replace("−", "-"), short.replace("−", "-"), key=len), plain_unit(unit)
+    short, _ = figure_text(Figure(number, unit, ""))
+    return min(three_digits(number).replace("−", "-"), short.replace("−", "-"), key=len), plain_unit(unit)
 
 
 def _words(name: str) -> str:
@@ -388,7 +390,7 @@ def _readable(value: str) -> str:
     return value or "–"
 
 
-def _leading(sources: Sequence[Source]) -> dict[str, Values]:
+def _leading_figures(sources: Sequence[Source]) -> dict[str, Values]:
     """Leading figure -> its value and unit in every source, in the order of LEADING_FIGURES within each prefix.
 
     Where results have leading figures in common, those that one of them lacks are left to the table.
@@ -408,13 +410,13 @@ def _leading(sources: Sequence[Source]) -> dict[str, Values]:
 
 def _tiles(sources: Sequence[Source]) -> list[Tile]:
     """The leading figures before and after, those that have changed most first; none but of two sources."""
-    leading = _leading(sources)
+    leading = _leading_figures(sources)
     if len(sources) != 2:
         return []
-    order = sorted(leading, key=lambda name: _alike(leading[name]))
+    order = sorted(leading, key=lambda name: _is_alike(leading[name]))
     return [
         Tile(
-            minus(_beside(leading[name]).partition(" (")[0].replace("->", "→").replace("um", "µm")),
+            minus(_values_text(leading[name]).partition(" (")[0].replace("->", "→").replace("um", "µm")),
             f"{name.partition('.')[0]}: {_words(name)}",
             f"{name}, {sources[0].name} → {sources[1].name}",
         )
@@ -427,14 +429,14 @@ def report_of(sources: Sequence[Source]) -> Report:
     names = [source.name for source in sources]
     rows = [(f"Source {k}", f"{source.name}: {len(source.time)} rows") for k, source in enumerate(sources, 1)]
     notes = tuple(dict.fromkeys(note for source in sources for note in source.notes))
-    with remarked(" ".join(filter(None, notes)), *NARROW):
+    with remark_charts(" ".join(filter(None, notes)), *NARROW):
         pictures = pictures_of(sources)
     return Report(
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
-        counted(len(sources), "source"),
+        count_things(len(sources), "source"),
         answer=answers(sources),
         tiles=_tiles(sources),
-        next_step=_next(sources),
+        next_step=_next_step(sources),
         notes=notes,
         main=[
             *pictures,
@@ -442,18 +444,18 @@ def report_of(sources: Sequence[Source]) -> Report:
             _figures(sources),
             _blocks(sources),
             _parameters(sources),
-            control_section(changes=dict(differing(sources))),
+            control_section(changes=dict(differing_parameters(sources))),
             _alignment(sources),
             Section("What each says of itself", [Bullets([f"{s.name}: {line}" for s in sources for line in s.answer])])
             if any(source.answer for source in sources)
             else None,
         ],
-        provenance=content.provenance_section(rows, hashed([("source", file) for file in files_of(sources)])),
+        provenance=content.provenance_section(rows, hash_files([("source", file) for file in files_of(sources)])),
         footer="Differences are to the first source that has the figure. Values in full precision: summary.json.",
     )
 
 
-def _next(sources: Sequence[Source]) -> Step | None:
+def _next_step(sources: Sequence[Source]) -> Step | None:
     """The comparison of the first two; None where there is one source."""
     if len(sources) < 2:
         return None
@@ -487,8 +489,8 @@ def _stops(sources: Sequence[Source]) -> Section | None:
 def _stop(stop: Stop | None) -> tuple[str, str]:
     if stop is None:
         return "–", "–"
-    figures = positioning(stop.trace, stop.approach, band=BAND)
-    return shown(figures["overshoot"])[0], shown(figures["settling_time"])[0]
+    figures = positioning_figures(stop.trace, stop.approach, band=BAND)
+    return figure_text(figures["overshoot"])[0], figure_text(figures["settling_time"])[0]
 
 
 def _figures(sources: Sequence[Source]) -> Section | None:
@@ -503,7 +505,7 @@ def _figures(sources: Sequence[Source]) -> Section | None:
         cells: list[str] = []
         for k, source in enumerate(sources):
             value, own = source.figures.get(name, (math.nan, unit))
-            cells.append(shown(Figure(value, unit, ""))[0] if name in source.figures and own == unit else "–")
+            cells.append(figure_text(Figure(value, unit, ""))[0] if name in source.figures and own == unit else "–")
             if k:
                 difference = value - first if own == unit else math.nan
                 cells.append(_difference(difference, unit))
@@ -549,14 +551,16 @@ def _difference(value: float, unit: str) -> str:
     """As many places as the values have, with a sign; 0 where rounding leaves nothing."""
     if not math.isfinite(value):
         return "–"
-    text, _ = shown(Figure(abs(value) if abs(value) > 1e-9 else 0.0, unit, ""))
+    text, _ = figure_text(Figure(abs(value) if abs(value) > 1e-9 else 0.0, unit, ""))
     return text if not any(digit in text for digit in "123456789") else f"{'+' if value > 0 else '−'}{text}"
 
 
 def _parameters(sources: Sequence[Source]) -> Section | None:
     if sum(bool(source.parameters) for source in sources) < 2:
         return None
-    rows: list[tuple[Text, ...]] = [(code(name), *map(_readable, values)) for name, values in differing(sources)]
+    rows: list[tuple[Text, ...]] = [
+        (code(name), *map(_readable, values)) for name, values in differing_parameters(sources)
+    ]
     if not rows:
         return Section(
             "Parameters that differ", [Bullets(["None: machine, motion, coupling and recording are the same."])]
@@ -581,7 +585,7 @@ def details(sources: Sequence[Source]) -> dict[str, Any]:
         ],
         "differing": {
             name: dict(zip([source.name for source in sources], values, strict=True))
-            for name, values in differing(sources)
+            for name, values in differing_parameters(sources)
         },
-        "inputs": inputs_part(hashed([("source", file) for file in files_of(sources)])),
+        "inputs": inputs_part(hash_files([("source", file) for file in files_of(sources)])),
     }

@@ -14,12 +14,12 @@ from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.foundation import outputs
 from feedsim.report.chart import Axis, Band, Chart, Curve, Panel
 from feedsim.report.content import Part, Picture, Report, Section, Table, Text, code
-from feedsim.report.formatting import SIMULATED, display_unit, minus, typeset
+from feedsim.report.formatting import SIMULATED_COLOUR, display_unit, minus, typeset
 from feedsim.report.provenance import quantity
 
 if TYPE_CHECKING:
     from feedsim.design.uncertainty import Band as Spread
-    from feedsim.design.uncertainty import Cloud, Known, Uncertainty
+    from feedsim.design.uncertainty import Cloud, KnownValues, Uncertainty
 
 BANDS = "bands.csv"
 
@@ -45,7 +45,7 @@ def intervals_section(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -
     )
 
 
-def drawn_values(cloud: Cloud, sets: Mapping[str, Known] | None = None) -> Table:
+def drawn_values(cloud: Cloud, sets: Mapping[str, KnownValues] | None = None) -> Table:
     """What was drawn. sets: axis -> what is known of the set that compensates, where that is drawn too."""
     from feedsim.design.uncertainty import unit_of  # a run without draws does not load them
 
@@ -79,8 +79,8 @@ def _picture(band: Spread, uncertainty: Uncertainty, name: str) -> Picture:
         across, up, what = Axis("time since the end of the motion", "ms"), "position beyond the target", "Stop"
     low, high, nominal = (1e6 * values[order] for values in (band.low, band.high, band.nominal))
     panel = Panel(
-        "", across, Axis(up, "µm"), [Curve("machine as it is", x, nominal, SIMULATED)],
-        bands=[Band(f"{100 * uncertainty.share:.0f} % of draws", low, high, x, SIMULATED)],
+        "", across, Axis(up, "µm"), [Curve("machine as it is", x, nominal, SIMULATED_COLOUR)],
+        bands=[Band(f"{100 * uncertainty.share:.0f} % of draws", low, high, x, SIMULATED_COLOUR)],
     )  # fmt: skip
     stem = f"band-{band.prefix.replace('#', '-').replace(' ', '-')}-{band.kind}"
     return Picture(

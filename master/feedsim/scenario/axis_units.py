@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from feedsim.files.fields import Model, Quantity, Reading, brief, fault, parameter
+from feedsim.files.fields import Model, Quantity, ReadingContext, brief, fault, parameter
 from feedsim.foundation import units
 from feedsim.scenario.roles import (
     ANOTHER_LAW,
@@ -28,8 +28,8 @@ from feedsim.scenario.roles import (
     GMS,
     LUGRE,
     ForeignUnit,
-    filled,
-    mapping,
+    role_unit_tag,
+    signal_mapping,
 )
 
 # --- Parameters of a unit in groups, as machine files have them; groups that follow from the unit's table alone -------
@@ -102,7 +102,7 @@ _AT_GUIDE_ALONE = [
     name.removeprefix("guide.") for name in units.parameters("plant/axis")
     if name.startswith(("guide.place_", "guide.warm_"))
 ]  # fmt: skip
-_IDENTIFIED = (
+_IDENTIFIED_DESCRIPTION = (
     "Where the parameters come from, as feedsim identify friction writes it: kept and shown, never calculated with. "
     "Its keys are free, but names of parameters are refused: they would have no effect here"
 )
@@ -192,7 +192,7 @@ def _friction_fields(unit: str) -> dict[str, Any]:
         name: (float, parameter(variable, defaults.get(name, float(variable.start))))
         for name, variable in known.items()
     }
-    return {**fields, "identified": (dict[str, Any], Field(default={}, description=_IDENTIFIED))}
+    return {**fields, "identified": (dict[str, Any], Field(default={}, description=_IDENTIFIED_DESCRIPTION))}
 
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ else:
 def friction_filled(data: Any) -> str:
     """Which friction stands there, as the tag of a pydantic union: the shipped LuGre, another law or another unit."""
     law = data.get("law", LUGRE) if isinstance(data, Mapping) else getattr(data, "law", LUGRE)
-    return filled(data) if law == LUGRE else ANOTHER_LAW
+    return role_unit_tag(data) if law == LUGRE else ANOTHER_LAW
 
 
 CONTROLLER_TABLE = units.parameters("controller")
@@ -244,11 +244,11 @@ class Filter(ParameterGroup):
 
     @field_validator("f", "D_num", "D_den")
     @classmethod
-    def _sampled(cls, value: float | None, info: ValidationInfo) -> float | None:
+    def _check_sampling(cls, value: float | None, info: ValidationInfo) -> float | None:
         kind = info.data.get("type", "off")
         if value is None and kind != "off" and not (kind == "low_pass" and info.field_name == "D_num"):
             raise fault(f"a filter of type {kind} needs {info.field_name}")
-        cycle = info.context.control_cycle if isinstance(info.context, Reading) else None
+        cycle = info.context.control_cycle if isinstance(info.context, ReadingContext) else None
         if info.field_name == "f" and value is not None and kind != "off" and cycle and value >= 0.5 / cycle:
             raise fault(
                 f"{value:.9g} Hz is not below half the sampling rate of the control cycle, {0.5 / cycle:.9g} Hz"
@@ -280,7 +280,7 @@ EFFECTS = {
     "friction_pulse": "Friction compensation by a pulse on the speed setpoint",
     "friction_table": "Friction compensation by a torque over the commanded speed",
 }
-_MEASURED = ("measuring", *(f"periodic_error_{i}" for i in (1, 2, 3)), "measuring_table", "encoder")
+_MEASURING_KEYS = ("measuring", *(f"periodic_error_{i}" for i in (1, 2, 3)), "measuring_table", "encoder")
 
 if TYPE_CHECKING:
     _Effects = ParameterGroup
@@ -294,7 +294,7 @@ class Drive(_Effects):
     @property
     def not_shown(self) -> tuple[str, ...]:
         """Outputs that say nothing that another one does not say: the measured position, where that is x_a."""
-        return () if any(getattr(self, name) is not None for name in _MEASURED) else ("x_m",)
+        return () if any(getattr(self, name) is not None for name in _MEASURING_KEYS) else ("x_m",)
 
     @property
     def indirect(self) -> bool:
@@ -396,7 +396,7 @@ class Guide(_GuideParameters):
 
     @field_validator("share")
     @classmethod
-    def _alone(cls, share: float | None, info: ValidationInfo) -> float | None:
+    def _check_share_alone(cls, share: float | None, info: ValidationInfo) -> float | None:
         if share is not None and info.data:
             given = [
                 name for name in info.data if name in LEAD_POWERS and info.data[name] != cls.model_fields[name].default
@@ -430,8 +430,8 @@ class ForeignDrive(ForeignUnit):
 
     role = DRIVE
     shipped = Drive
-    inputs: mapping("DriveInputs", DRIVE.inputs)  # type: ignore[valid-type]
-    outputs: mapping("DriveOutputs", DRIVE.outputs)  # type: ignore[valid-type]
+    inputs: signal_mapping("DriveInputs", DRIVE.inputs)  # type: ignore[valid-type]
+    outputs: signal_mapping("DriveOutputs", DRIVE.outputs)  # type: ignore[valid-type]
 
 
 class ForeignFriction(ForeignUnit):
@@ -439,5 +439,5 @@ class ForeignFriction(ForeignUnit):
 
     role = FRICTION_ROLE
     shipped = Friction
-    inputs: mapping("FrictionInputs", FRICTION_ROLE.inputs)  # type: ignore[valid-type]
-    outputs: mapping("FrictionOutputs", FRICTION_ROLE.outputs)  # type: ignore[valid-type]
+    inputs: signal_mapping("FrictionInputs", FRICTION_ROLE.inputs)  # type: ignore[valid-type]
+    outputs: signal_mapping("FrictionOutputs", FRICTION_ROLE.outputs)  # type: ignore[valid-type]

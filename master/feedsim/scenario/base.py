@@ -14,9 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from feedsim.files.checked import expected, fetch, names_file
-from feedsim.files.source import Mark, Place, Source, at, places
-from feedsim.scenario.load import Draft, Setting, drafted
+from feedsim.files.checked import expected_annotation, fetch, names_file
+from feedsim.files.source import Mark, Place, Source, places, value_at
+from feedsim.scenario.load import Draft, Setting, draft_scenario
 from feedsim.scenario.model import Scenario
 
 
@@ -53,7 +53,7 @@ class Base:
 
         Raises InputError like load(), also for what only checking finds.
         """
-        base = cls(drafted(path, overrides, settings))
+        base = cls(draft_scenario(path, overrides, settings))
         _ = base.scenario  # checks it
         return base
 
@@ -96,7 +96,7 @@ class Base:
         """Files of data that a run of the scenario without changes may read, each once."""
         return data_files(self.settled.source)
 
-    def relocated(self, moved: Mapping[str, str]) -> Base:
+    def relocate(self, moved: Mapping[str, str]) -> Base:
         """One that finds its files of data elsewhere: path as text -> the new one."""
         return Base(self.draft, {**self.moved, **moved})
 
@@ -105,9 +105,9 @@ class Base:
         draft = self.draft
         content = {
             "path": str(draft.path),
-            "source": _packed(draft.source),
-            "own": [[key, _packed(value)] for key, value in draft.own],
-            "outside": [[key, _packed(value)] for key, value in draft.outside],
+            "source": _serialise_source(draft.source),
+            "own": [[key, _serialise_source(value)] for key, value in draft.own],
+            "outside": [[key, _serialise_source(value)] for key, value in draft.outside],
             "overrides": draft.overrides,
             "moved": dict(self.moved),
         }
@@ -128,8 +128,10 @@ class Base:
     def from_json(cls, text: str) -> Base:
         """The base of which `text` was made."""
         content = json.loads(text)
-        own, outside = (tuple((key, _unpacked(value)) for key, value in content[name]) for name in ("own", "outside"))
-        source = _unpacked(content["source"])
+        own, outside = (
+            tuple((key, _deserialise_source(value)) for key, value in content[name]) for name in ("own", "outside")
+        )
+        source = _deserialise_source(content["source"])
         draft = Draft(Path(content["path"]), source, own, outside, tuple(content["overrides"]), [])
         return cls(draft, content["moved"])
 
@@ -140,21 +142,21 @@ def data_files(source: Source, place: Place = ()) -> tuple[Path, ...]:
 
 
 def _named_files(source: Source, place: Place) -> Iterator[tuple[Place, str]]:
-    data = at(source.data, place)
+    data = value_at(source.data, place)
     if isinstance(data, dict):
         for key in data:
             yield from _named_files(source, (*place, key))
     elif isinstance(data, list):
         for i in range(len(data)):
             yield from _named_files(source, (*place, i))
-    elif isinstance(data, str) and names_file(expected(Scenario, source.data, place)):
+    elif isinstance(data, str) and names_file(expected_annotation(Scenario, source.data, place)):
         yield place, data
 
 
 def _relocate(source: Source, place: Place, moved: Mapping[str, str]) -> None:
     for value, text in list(_named_files(source, place)) if moved else ():
         if text in moved:
-            at(source.data, value[:-1])[value[-1]] = moved[text]
+            value_at(source.data, value[:-1])[value[-1]] = moved[text]
 
 
 def _source(change: Change) -> Source:
@@ -163,11 +165,11 @@ def _source(change: Change) -> Source:
     return Source(change.data, {place: mark for place in places(change.data)})
 
 
-def _packed(source: Source) -> dict[str, Any]:
+def _serialise_source(source: Source) -> dict[str, Any]:
     marks = [[list(place), mark.where, str(mark.folder)] for place, mark in source.marks.items()]
     return {"data": source.data, "marks": marks}
 
 
-def _unpacked(content: Mapping[str, Any]) -> Source:
+def _deserialise_source(content: Mapping[str, Any]) -> Source:
     marks = {tuple(place): Mark(where, Path(folder)) for place, where, folder in content["marks"]}
     return Source(content["data"], marks)

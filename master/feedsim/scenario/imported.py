@@ -1,6 +1,6 @@
 """Values that a control's files hold, laid into a machine file; a value that the machine file cannot have is refused.
 
-May use control, files. Start reading at imported().
+May use control, files. Start reading at import_reading().
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.files.checked import check, fetch, in_order, read_group
-from feedsim.files.control.reading import Reading, Refused, Taken
+from feedsim.files.control.reading import Reading, RefusedValue, TakenValue
 from feedsim.files.fields import Quantity
-from feedsim.files.source import Mark, Place, Source, copied
+from feedsim.files.source import Mark, Place, Source, copy_tree
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.axis_units import Drive, Filter
 from feedsim.scenario.load import translate
@@ -27,14 +27,14 @@ SWITCHES = {"omega_0": "reference_model", "D": "reference_model"}
 # Groups that are taken whole or not at all.
 GROUP_PREFIXES = ("drive.filter_", "drive.friction_pulse")
 # Files that a machine file names and that stay where they are; the modes go with it.
-_NAMED = ("structure", "plant")
+_FILE_KEYS = ("structure", "plant")
 MODES_TABLE = "modes.csv"
-_PLAIN = re.compile(r"^[A-Za-z_][\w .,/()%-]*$")
+_PLAIN_TEXT = re.compile(r"^[A-Za-z_][\w .,/()%-]*$")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
 
 @dataclass
-class Imported:
+class ImportedMachine:
     """A machine file with values of a control.
 
     Attributes:
@@ -46,8 +46,8 @@ class Imported:
 
     tree: dict[str, Any]
     base: Machine | None
-    values: list[Taken]
-    refused: list[Refused]
+    values: list[TakenValue]
+    refused: list[RefusedValue]
     missing: list[str]
     before: dict[Place, Any] = field(default_factory=dict)
 
@@ -65,7 +65,7 @@ class Imported:
         return {Machine.IN_FOLDER: self.text(), **modes}
 
 
-def place_of(taken: Taken) -> Place:
+def place_of(taken: TakenValue) -> Place:
     """The place of a value in a machine file."""
     parts = tuple(int(part) if part.isdecimal() else part for part in taken.parameter.split("."))
     if taken.value == "off" and parts[-1] != "type":
@@ -73,34 +73,34 @@ def place_of(taken: Taken) -> Place:
     return ("axes", taken.axis, *parts) if taken.axis else parts
 
 
-def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
+def import_reading(reading: Reading, machine: Path | None, name: str) -> ImportedMachine:
     """Lay the values of a reading into a machine file; machine: file or folder; None: a draft. name: of a draft.
 
     A value, or a group of values that belong together, is refused where the machine file would be wrong with it.
     InputError: the machine is faulty, or has not one of the axes.
     """
-    source, base = _base(machine, name, reading)
-    result = Imported(source.data, base, [], [], [])
+    source, base = _base_source(machine, name, reading)
+    result = ImportedMachine(source.data, base, [], [], [])
     before = _faults(source)
     halved = {(entry.axis, _group(entry.name.parameter)) for entry in reading.refused if entry.weight == "doubt"}
     for group in _groups(reading.taken):
         trial = source.copy()
         for item in group:
-            _put(trial, item)
+            _set_value(trial, item)
         if (group[0].axis, whole := _group(group[0].parameter)) in halved and whole.startswith(GROUP_PREFIXES):
             reason = "a value that belongs to it was not taken; a half of a filter or of a pulse would be another one"
-            result.refused += [_not(taken, reason) for taken in group]
+            result.refused += [_refuse_value(taken, reason) for taken in group]
             continue
         if [taken.parameter for taken in group] in (["travel.0"], ["travel.1"]):
-            result.refused.append(_not(group[0], "a machine file takes both ends of the travel or none"))
+            result.refused.append(_refuse_value(group[0], "a machine file takes both ends of the travel or none"))
             continue
-        new = [fault for fault in _faults(trial) if fault not in before and not _lacking(fault)]
+        new = [fault for fault in _faults(trial) if fault not in before and not _is_missing_key(fault)]
         if new:
             reason = f"a machine file cannot have it: {new[0].partition(': ')[2] or new[0]}"
-            result.refused += [_not(taken, reason) for taken in group]
+            result.refused += [_refuse_value(taken, reason) for taken in group]
             continue
         for item in group:
-            result.before[place_of(item)] = _at(source.data, place_of(item))
+            result.before[place_of(item)] = _value_at(source.data, place_of(item))
         source = trial
         result.values += group
     source.data["control"] = reading.control
@@ -112,11 +112,11 @@ def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
     return result
 
 
-def _not(taken: Taken, reason: str) -> Refused:
-    return Refused(taken.axis, taken.name, taken.entry.text if taken.entry else "", reason, taken.where)
+def _refuse_value(taken: TakenValue, reason: str) -> RefusedValue:
+    return RefusedValue(taken.axis, taken.name, taken.entry.text if taken.entry else "", reason, taken.where)
 
 
-def _base(machine: Path | None, name: str, reading: Reading) -> tuple[Source, Machine | None]:
+def _base_source(machine: Path | None, name: str, reading: Reading) -> tuple[Source, Machine | None]:
     if machine is None:
         note = "Imported from a control; what its files do not hold is missing"
         axes: dict[str, Any] = {axis: {"drive": {}} for axis in reading.axes}
@@ -139,7 +139,7 @@ def _base(machine: Path | None, name: str, reading: Reading) -> tuple[Source, Ma
     fetch(source, Machine, (), faults)
     translate(source, ("axes",), faults)
     source.data["modes"] = MODES_TABLE
-    for key in _NAMED:
+    for key in _FILE_KEYS:
         if isinstance(source.data.get(key), str):
             source.data[key] = str(Path(source.data[key]).resolve())
     for axis in source.data["axes"].values():
@@ -161,7 +161,7 @@ def _faults(source: Source) -> list[str]:
     return faults
 
 
-def _lacking(fault: str) -> bool:
+def _is_missing_key(fault: str) -> bool:
     return ": missing" in fault
 
 
@@ -171,15 +171,15 @@ def _group(parameter: str) -> str:
     return way if way not in ("", "drive", "cycles") else SWITCHES.get(last, last)
 
 
-def _groups(taken: Sequence[Taken]) -> Iterator[list[Taken]]:
+def _groups(taken: Sequence[TakenValue]) -> Iterator[list[TakenValue]]:
     """Values that can only go together: those of a filter, of the pulse, of the reference model, both ends of a way."""
-    result: dict[tuple[str, str], list[Taken]] = {}
+    result: dict[tuple[str, str], list[TakenValue]] = {}
     for entry in taken:
         result.setdefault((entry.axis, _group(entry.parameter)), []).append(entry)
     yield from result.values()
 
 
-def _put(source: Source, taken: Taken) -> None:
+def _set_value(source: Source, taken: TakenValue) -> None:
     place = place_of(taken)
     data: Any = source.data
     for key, following in pairwise(place):
@@ -187,12 +187,12 @@ def _put(source: Source, taken: Taken) -> None:
             data[key] = ["", ""] if isinstance(following, int) else {}
         data = data[key]
     last = place[-1]
-    data[last] = written(taken)
+    data[last] = machine_file_value(taken)
     if taken.value == "off" and last != "type":
         del data[last]
 
 
-def written(taken: Taken) -> Any:
+def machine_file_value(taken: TakenValue) -> Any:
     """A value as a machine file has it: with the unit that people write."""
     value = taken.value
     if isinstance(value, bool | str | int):
@@ -212,7 +212,7 @@ def _quantity(parameter: str) -> Quantity | None:
     return Quantity.of(info) if info is not None else None
 
 
-def _at(data: Any, place: Place) -> Any:
+def _value_at(data: Any, place: Place) -> Any:
     for key in place:
         if isinstance(data, dict):
             data = data.get(str(key))
@@ -220,7 +220,7 @@ def _at(data: Any, place: Place) -> Any:
             data = data[key]
         else:
             return None
-    return copied(data)
+    return copy_tree(data)
 
 
 def _lines(data: Mapping[str, Any], place: Place, remarks: Mapping[Place, str], depth: int) -> Iterator[str]:
@@ -228,31 +228,31 @@ def _lines(data: Mapping[str, Any], place: Place, remarks: Mapping[Place, str], 
     pad = "  " * depth
     for key, value in data.items():
         own = (*place, key)
-        head = f"{pad}{_scalar(key)}:"
+        head = f"{pad}{_scalar_text(key)}:"
         if isinstance(value, dict) and value:
             yield head
             yield from _lines(value, own, remarks, depth + 1)
         elif isinstance(value, list):
             reported = "; ".join(remarks[(*own, k)] for k in range(len(value)) if (*own, k) in remarks)
-            yield _commented(f"{head} {_flow(value)}", reported)
+            yield _append_remark(f"{head} {_flow_text(value)}", reported)
         else:
-            yield _commented(f"{head} {_flow(value)}", remarks.get(own, ""))
+            yield _append_remark(f"{head} {_flow_text(value)}", remarks.get(own, ""))
 
 
-def _commented(text: str, remark: str) -> str:
+def _append_remark(text: str, remark: str) -> str:
     plain = "".join(c if c.isprintable() else "." for c in remark)
     return f"{text:<36}  # {plain}" if remark else text
 
 
-def _flow(value: Any) -> str:
+def _flow_text(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_scalar(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{_scalar_text(key)}: {_flow_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(_flow(item) for item in value) + "]"
-    return _scalar(value)
+        return "[" + ", ".join(_flow_text(item) for item in value) + "]"
+    return _scalar_text(value)
 
 
-def _scalar(value: Any) -> str:
+def _scalar_text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None:
@@ -261,6 +261,8 @@ def _scalar(value: Any) -> str:
         return repr(value)
     text = str(value)
     quantity = re.match(r"^-?[\d.]+(e[+-]?\d+)? [\w./^()]+$", text)
-    if quantity or (_PLAIN.match(text) and text.lower() not in _WORDS and ", " not in text and not text.endswith(" ")):
+    if quantity or (
+        _PLAIN_TEXT.match(text) and text.lower() not in _WORDS and ", " not in text and not text.endswith(" ")
+    ):
         return text
     return json.dumps(text, ensure_ascii=False)

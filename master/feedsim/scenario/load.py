@@ -14,9 +14,9 @@ from feedsim.files.checked import (
     apply,
     as_text,
     check,
-    checked,
+    check_tree,
     describe,
-    dotted,
+    dotted_key,
     entries,
     fetch,
     in_order,
@@ -24,10 +24,10 @@ from feedsim.files.checked import (
     read_group,
     spread,
 )
-from feedsim.files.control import Name, known
+from feedsim.files.control import Name, find_name
 from feedsim.files.fields import AxisName, File, Model, Quantity, brief
-from feedsim.files.source import Mark, Place, Source, is_program, places, read
-from feedsim.foundation.arguments import spelt
+from feedsim.files.source import Mark, Place, Source, is_program, places, read_yaml
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import InputError, no_such_file
 from feedsim.scenario.axis_units import Friction, FrictionParameters, GmsFriction
 from feedsim.scenario.machine import Machine
@@ -40,14 +40,14 @@ from feedsim.scenario.structure.parts import FiniteElements, GeometryStructure
 # --- Keys and values of a control in scenario and machine files: MD32200: 4 in place of K_v: 4 (m/min)/mm -------------
 
 
-def translated(key: str, value: Source) -> tuple[str, Source]:
+def translate_change(key: str, value: Source) -> tuple[str, Source]:
     """A change by a control's number as one by our name; any other as it is.
 
     "machine.axes.Z.drive.MD32200", "Z.MD32200" and "MD32200" (all axes) mean the same parameter. InputError: the
     number's unit is not confirmed, or the value is no number.
     """
     prefix, _, number = key.rpartition(".")
-    name = known(number)
+    name = find_name(number)
     if name is None:
         return key, value
     where = prefix.removesuffix(".drive")
@@ -68,7 +68,7 @@ def translate(source: Source, axes: Place, faults: list[str]) -> None:
         for place in ((*axes, axis), (*axes, axis, "drive")):
             inner = group if place[-1] == axis else group.get("drive") if isinstance(group, dict) else None
             for key in [*inner] if isinstance(inner, dict) else ():
-                if (name := known(key)) is not None:
+                if (name := find_name(key)) is not None:
                     _rename(source, (*axes, axis), (*place, key), name, faults)
 
 
@@ -145,7 +145,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     >>> fs.load_scenario("xz_circle.yaml", ["motions.0.radius=20 mm"]).motions[0].radius
     0.02
     """
-    draft = drafted(Path(path), overrides)
+    draft = draft_scenario(Path(path), overrides)
     draft.settle()
     return draft.scenario()
 
@@ -186,8 +186,8 @@ class Draft:
     def apply(self, settings: Iterable[Setting]) -> None:
         """Apply further settings."""
         for key, value in settings:
-            with _collecting(self.faults):
-                key, value = translated(key, value)
+            with _collect_faults(self.faults):
+                key, value = translate_change(key, value)
                 for place in apply(self.source, Scenario, key, value):
                     self.changed.append((place, value.mark(()).where))
                     fetch(self.source, Scenario, place, self.faults)
@@ -210,7 +210,7 @@ class Draft:
         return scenario
 
 
-def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Setting] = ()) -> Draft:
+def draft_scenario(path: Path, overrides: Sequence[str] = (), settings: Sequence[Setting] = ()) -> Draft:
     """Read a scenario file and the files it names; nothing is set yet but the machine.
 
     `settings` come from outside too, before the `overrides`. InputError: the scenario file itself cannot be read.
@@ -221,7 +221,7 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
     outside = [*settings]
     given: list[str] = []
     for text in overrides:
-        with _collecting(faults):
+        with _collect_faults(faults):
             given += spread([text])
             outside += options(text, Path())
     # A machine chosen from outside comes first: the scenario's own settings then meet that machine.
@@ -230,7 +230,7 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
             source.put(("machine",), value)
     if is_program(path) and "machine" not in source.data:
         raise InputError(
-            f"{path}: an NC program needs a machine: {spelt('machine')} MACHINE, a machine file or its folder"
+            f"{path}: an NC program needs a machine: {spell_argument('machine')} MACHINE, a machine file or its folder"
         )
     own = tuple(_own_settings(source, faults))
     fetch(source, Scenario, (), faults)
@@ -280,9 +280,9 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     fetch(source, Machine, (), faults)
     translate(source, ("axes",), faults)
     for text in overrides:
-        with _collecting(faults):
+        with _collect_faults(faults):
             for given in options(text, Path()):
-                key, value = translated(*given)
+                key, value = translate_change(*given)
                 for place in apply(source, Machine, key.removeprefix("machine."), value):
                     fetch(source, Machine, place, faults)
     machine = check(source, Machine, faults)
@@ -296,7 +296,7 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
 def read_friction(path: str | Path) -> FrictionParameters:
     """Read a file with the friction of one axis, as identification leaves it. Raises InputError like load()."""
     source = read_group(Path(path))
-    return checked(source, GmsFriction if source.data.get("law") == GMS else Friction, path)
+    return check_tree(source, GmsFriction if source.data.get("law") == GMS else Friction, path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,7 +353,7 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
 def _is_machine(path: Path) -> bool:
     if is_program(path):
         return False
-    data = read(path).data
+    data = read_yaml(path).data
     return isinstance(data, dict) and "axes" in data and "machine" not in data
 
 
@@ -381,7 +381,7 @@ def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Sour
 
 
 @contextmanager
-def _collecting(faults: list[str]) -> Iterator[None]:
+def _collect_faults(faults: list[str]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
@@ -396,7 +396,7 @@ def _collecting(faults: list[str]) -> Iterator[None]:
 SAME_LENGTH = 1e-9
 
 
-class _Beginning(Model):
+class _MachineBeginning(Model):
     """Of a machine file that is not complete: its structure and the pose. Other keys stay unread."""
 
     model_config = ConfigDict(extra="ignore")
@@ -410,7 +410,7 @@ class _Beginning(Model):
 
 
 @dataclass(frozen=True, eq=False)
-class Described:
+class MachineDescription:
     """What there is of a machine.
 
     Attributes:
@@ -432,7 +432,7 @@ class Described:
     gaps: tuple[str, ...]
 
 
-def load_described(path: str | Path) -> Described:
+def load_described(path: str | Path) -> MachineDescription:
     """Read a machine file, a structure file, a folder with either, or a scenario's machine.
 
     A machine file need not be complete, nor its table of modes be there, if it names a structure.
@@ -448,20 +448,20 @@ def load_described(path: str | Path) -> Described:
         path = paths[0]
     source = read_group(path)
     if "kind" in source.data or path.name == STRUCTURE_FILE:
-        return _alone(path)
+        return _describe_structure(path)
     if "machine" in source.data:
         return _of_scenario(path)
     return _of_machine(path, source)
 
 
-def _alone(path: Path) -> Described:
+def _describe_structure(path: Path) -> MachineDescription:
     structure = load_structure(path)
     pose = structure.pose if isinstance(structure, FiniteElements) else {}
     name = structure.name or path.stem
-    return Described(name, structure.note, structure, None, None, dict(pose), (("structure", path),), ())
+    return MachineDescription(name, structure.note, structure, None, None, dict(pose), (("structure", path),), ())
 
 
-def _of_scenario(path: Path) -> Described:
+def _of_scenario(path: Path) -> MachineDescription:
     """Without a look for contradictions: a scenario may change single values of its machine on purpose."""
     scenario = load(path)
     machine = scenario.machine
@@ -470,12 +470,12 @@ def _of_scenario(path: Path) -> Described:
     if machine.structure is not None:
         structure = load_structure(machine.structure)
         files.append(("structure", machine.structure))
-    return Described(
+    return MachineDescription(
         machine.name, machine.note, structure, machine, machine.modes, dict(machine.pose), tuple(files), ()
     )
 
 
-def _of_machine(path: Path, source: Source) -> Described:
+def _of_machine(path: Path, source: Source) -> MachineDescription:
     # A table that is yet to be built is no fault of the file: any file that is there stands in for it.
     data = source.data
     table = path.parent / data["modes"] if isinstance(data.get("modes"), str) and data["modes"] else None
@@ -496,7 +496,7 @@ def _of_machine(path: Path, source: Source) -> Described:
                 f"{path}: modes: {missing}; and there is no key structure, from whose file it could be computed"
             )
         files: tuple[tuple[str, Path], ...] = (("machine", path),)
-        return Described(machine.name, machine.note, None, machine, modes, dict(machine.pose), files, ())
+        return MachineDescription(machine.name, machine.note, None, machine, modes, dict(machine.pose), files, ())
     file = machine.structure
     structure = load_structure(file)
     if problems := list(_contradictions(source, machine, structure, file)):
@@ -504,19 +504,19 @@ def _of_machine(path: Path, source: Source) -> Described:
     machine = machine.model_copy(update={"modes": table} if table is not None else {})
     machine._directory = path.parent
     files = (("machine", path), ("structure", file))
-    return Described(machine.name, machine.note, structure, machine, modes, dict(machine.pose), files, ())
+    return MachineDescription(machine.name, machine.note, structure, machine, modes, dict(machine.pose), files, ())
 
 
-def _incomplete(path: Path, modes: Path | None, gaps: list[str]) -> Described:
+def _incomplete(path: Path, modes: Path | None, gaps: list[str]) -> MachineDescription:
     """Of a machine file that is not complete the structure and the pose, which then must be right."""
     source, faults = read_group(path), list[str]()
-    source.data = {key: value for key, value in source.data.items() if key in _Beginning.model_fields}
-    fetch(source, _Beginning, (), faults)
-    beginning = check(source, _Beginning, faults)
+    source.data = {key: value for key, value in source.data.items() if key in _MachineBeginning.model_fields}
+    fetch(source, _MachineBeginning, (), faults)
+    beginning = check(source, _MachineBeginning, faults)
     if beginning is None or faults or beginning.structure is None:
         raise InputError.of(str(path), in_order(faults) or gaps)
     structure = load_structure(beginning.structure)
-    return Described(
+    return MachineDescription(
         name=beginning.name or structure.name or path.stem,
         note=beginning.note or structure.note,
         structure=structure,
@@ -534,8 +534,8 @@ def _contradictions(source: Source, machine: Machine, structure: Structure, file
 
     def both(place: Place, here: str, there_place: Place, there: str) -> str:
         return (
-            f"{source.mark(place).where}: {dotted(place)}: {here}; "
-            f"{other.mark(there_place).where}: {dotted(there_place)}: {there}"
+            f"{source.mark(place).where}: {dotted_key(place)}: {here}; "
+            f"{other.mark(there_place).where}: {dotted_key(there_place)}: {there}"
         )
 
     axes = tuple(structure.axes) if isinstance(structure, (GeometryStructure, FiniteElements)) else ()

@@ -27,7 +27,7 @@ class Table(Model):
 
     @field_validator("time")
     @classmethod
-    def _increasing(cls, time: tuple[float, ...]) -> tuple[float, ...]:
+    def _check_increasing(cls, time: tuple[float, ...]) -> tuple[float, ...]:
         for before, after in pairwise(time):
             if after <= before:
                 raise fault(f"{after:.9g} s follows {before:.9g} s; the time must increase")

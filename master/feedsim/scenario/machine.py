@@ -40,7 +40,7 @@ from feedsim.scenario.axis_units import (
     friction_filled,
     group,
 )
-from feedsim.scenario.roles import ANOTHER_LAW, FOREIGN, SHIPPED, ForeignUnit, filled
+from feedsim.scenario.roles import ANOTHER_LAW, FOREIGN, SHIPPED, ForeignUnit, role_unit_tag
 
 
 class Axis(Model):
@@ -73,9 +73,9 @@ class Axis(Model):
     )
     guide: Guide | None = Field(default=None, description="Friction between slide and rail, beside that at the motor")
     display_sign: Literal[1, -1] = Field(default=1, description="Sign of torque and current in figures, nowhere else")
-    drive: Annotated[Annotated[Drive, Tag(SHIPPED)] | Annotated[ForeignDrive, Tag(FOREIGN)], Discriminator(filled)] = (
-        Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
-    )
+    drive: Annotated[
+        Annotated[Drive, Tag(SHIPPED)] | Annotated[ForeignDrive, Tag(FOREIGN)], Discriminator(role_unit_tag)
+    ] = Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
     friction: Annotated[
         Annotated[Friction, Tag(SHIPPED)]
         | Annotated[GmsFriction, Tag(ANOTHER_LAW)]
@@ -306,7 +306,7 @@ class Machine(Model):
         """The parameters of an axis's drive, which `who` needs. InputError: it is another maker's unit."""
         drive = self.axes[axis].drive
         if isinstance(drive, ForeignUnit):
-            raise InputError(_foreign(axis, drive, who))
+            raise InputError(_foreign_unit_message(axis, drive, who))
         return drive
 
     @property
@@ -328,7 +328,7 @@ class Machine(Model):
         """The parameters of an axis's friction, of whatever law. InputError: as :meth:`shipped_drive`."""
         friction = self.axes[axis].friction
         if isinstance(friction, ForeignUnit):
-            raise InputError(_foreign(axis, friction, who))
+            raise InputError(_foreign_unit_message(axis, friction, who))
         return friction
 
     def shipped_friction(self, axis: str, who: str) -> Friction:
@@ -367,7 +367,7 @@ class Machine(Model):
         return axes
 
 
-def _foreign(axis: str, unit: ForeignUnit, who: str) -> str:
+def _foreign_unit_message(axis: str, unit: ForeignUnit, who: str) -> str:
     return (
         f"axis {axis}: its {unit.role.name} is {unit.fmu.name}, a unit of another maker; {who} needs the law of the "
         f"shipped {unit.role.shipped}.fmu with its parameters"

@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
-from feedsim.files.fields import AxisName, Model, Quantity, Reading, did_you_mean, fault, is_multiple, no_axis
+from feedsim.files.fields import AxisName, Model, Quantity, ReadingContext, did_you_mean, fault, is_multiple, no_axis
 from feedsim.files.source import Place
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
@@ -125,7 +125,7 @@ class Sheet(Model):
     xlsx: StrictBool = Field(default=False, description="Write sheet.xlsx too, a workbook of all sheets of the run")
 
 
-def checked(sheet: Sheet | None, known: tuple[str, ...]) -> Sheet | None:
+def check_sheet(sheet: Sheet | None, known: tuple[str, ...]) -> Sheet | None:
     """The sheet, whose limits are of figures that its test has."""
     for name in sheet.limits if sheet is not None else ():
         if name not in known:
@@ -151,7 +151,7 @@ def interval_fault(interval: float, control_cycle: float) -> str | None:
 
 def on_the_grid(interval: float, info: ValidationInfo) -> float:
     """A recording interval [s] of a file that is read, checked against its control cycle as far as that is known."""
-    cycle = info.context.control_cycle if isinstance(info.context, Reading) else None
+    cycle = info.context.control_cycle if isinstance(info.context, ReadingContext) else None
     if cycle and (message := interval_fault(interval, cycle)):
         raise fault(message)
     return interval
@@ -192,7 +192,7 @@ class _Level:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         def validate(value: Any, info: ValidationInfo) -> Level:
-            return self.read(value, text=isinstance(info.context, Reading))
+            return self.read(value, text=isinstance(info.context, ReadingContext))
 
         return core_schema.with_info_plain_validator_function(validate)
 
@@ -212,7 +212,7 @@ class _PerSignal(Model):
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 
 
-_MEASURED = (
+_MEASURED_SIGNALS = (
     "x_s", "n_ffw", "x_a", "n_a", "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "M_fr",
 )  # fmt: skip
 _RESOLUTIONS = {"m": "1 nm", "rad/s": "0.001 rad/s", "N.m": "0.01 N.m", "A": "1 mA", "V": "0.1 V"}  # examples
@@ -221,7 +221,7 @@ _RESOLUTIONS = {"m": "1 nm", "rad/s": "0.001 rad/s", "N.m": "0.01 N.m", "A": "1 
 def _per_signal(name: str, text: str, value: Callable[[str, str], tuple[Any, str]]) -> Any:
     """A group with a key per measured signal; `value`: signal and its unit -> what the key takes, its description."""
     units_of = {name: signal.unit for role in (DRIVE, FRICTION_ROLE) for name, signal in role.signals.items()}
-    result = {signal: value(signal, units_of[signal]) for signal in _MEASURED}
+    result = {signal: value(signal, units_of[signal]) for signal in _MEASURED_SIGNALS}
     fields: Any = {name: (kind | None, Field(default=None, description=said)) for name, (kind, said) in result.items()}
     return create_model(name, __base__=_PerSignal, __module__=__name__, __doc__=text, **fields)
 
@@ -270,7 +270,7 @@ class Logging(Model):
     seed: Annotated[StrictInt, Field(ge=0, le=2**63 - 1)] = Field(default=1, description="Of the noise")
 
     @model_validator(mode="after")
-    def _once(self) -> Self:
+    def _check_entries_once(self) -> Self:
         for name in ("axes", "signals"):
             entries = getattr(self, name) or ()
             if twice := [entry for i, entry in enumerate(entries) if entry in entries[:i]]:
@@ -333,7 +333,7 @@ class CircleTest(Model):
     @field_validator("sheet", mode="after")
     @classmethod
     def _sheet(cls, sheet: Sheet | None) -> Sheet | None:
-        return checked(sheet, OF_CIRCLES)
+        return check_sheet(sheet, OF_CIRCLES)
 
 
 class PositioningAccuracy(Model):
@@ -352,7 +352,7 @@ class PositioningAccuracy(Model):
     @field_validator("sheet", mode="after")
     @classmethod
     def _sheet(cls, sheet: Sheet | None) -> Sheet | None:
-        return checked(sheet, OF_POSITIONING)
+        return check_sheet(sheet, OF_POSITIONING)
 
 
 class ContourTest(Model):
@@ -442,7 +442,7 @@ class Scenario(Model):
             return data
         recording, machine = data.get("recording", {}), data.get("machine")
         interval: Any
-        if isinstance(info.context, Reading):
+        if isinstance(info.context, ReadingContext):
             # A cycle that cannot be read is reported where it stands; what is recorded does not matter then.
             interval = f"{info.context.position_cycle or info.context.control_cycle or 1.0!r} s"
         elif isinstance(machine, Machine):
@@ -456,7 +456,9 @@ class Scenario(Model):
     @model_validator(mode="after")
     def _no_contradictions(self, info: ValidationInfo) -> Self:
         # A file's contradictions are reported by load(), which knows their lines.
-        if not isinstance(info.context, Reading) and (result := [message for _, message in contradictions(self)]):
+        if not isinstance(info.context, ReadingContext) and (
+            result := [message for _, message in contradictions(self)]
+        ):
             raise fault("; ".join(result))
         return self
 

@@ -92,13 +92,13 @@ FRICTION_ROLE = _role("friction", "friction", "n_fr", "M_fr", others=FRICTION_UN
 VariableName = Annotated[StrictStr, Field(min_length=1)]
 
 
-def _plain(value: Any) -> Any:
+def _check_plain_value(value: Any) -> Any:
     if not isinstance(value, (bool, int, float, str)):
         raise fault(f"{brief(value)} is no value of a variable; a number, a text, true or false is expected")
     return value
 
 
-ForeignValue = Annotated[StrictBool | StrictInt | StrictFloat | StrictStr, BeforeValidator(_plain)]
+ForeignValue = Annotated[StrictBool | StrictInt | StrictFloat | StrictStr, BeforeValidator(_check_plain_value)]
 
 
 class ForeignUnit(Model):
@@ -140,13 +140,13 @@ class ForeignUnit(Model):
         }
 
 
-def mapping(name: str, signals: tuple[Signal, ...]) -> Any:
+def signal_mapping(name: str, signals: tuple[Signal, ...]) -> Any:
     """A group of keys, one per signal, whose values are names of variables."""
     fields: dict[str, Any] = {
         f"{signal.name}_" if signal.name == "lambda" else signal.name: (
-            (VariableName, Field(alias=signal.name, description=_described(signal)))
+            (VariableName, Field(alias=signal.name, description=_describe_signal(signal)))
             if signal.needed
-            else (VariableName | None, Field(default=None, alias=signal.name, description=_described(signal)))
+            else (VariableName | None, Field(default=None, alias=signal.name, description=_describe_signal(signal)))
         )
         for signal in signals
     }
@@ -155,12 +155,12 @@ def mapping(name: str, signals: tuple[Signal, ...]) -> Any:
     return globals()[name]
 
 
-def _described(signal: Signal) -> str:
+def _describe_signal(signal: Signal) -> str:
     unit = f" [{signal.unit}]" if signal.unit not in (BOOLEAN, "1") else ""
     return f"variable of the archive for: {signal.text}{unit}"
 
 
-def filled(data: Any) -> str:
+def role_unit_tag(data: Any) -> str:
     """Which of the two stands there, as the tag of a pydantic union; in brackets, being no key."""
     foreign = isinstance(data, ForeignUnit) or (isinstance(data, Mapping) and ForeignUnit.TOLD_BY in data)
     return FOREIGN if foreign else SHIPPED

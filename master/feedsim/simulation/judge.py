@@ -14,17 +14,17 @@ import numpy as np
 from feedsim import linear
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding
-from feedsim.foundation.owned import cached
+from feedsim.foundation.owned import cache_answer
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim import Crossings, Run
-from feedsim.simulation.cosim.loads import LOAD_TAKEN_UP, Acting, at_motor
+from feedsim.simulation.cosim.loads import LOAD_TAKEN_UP, ActingLoad, at_motor
 from feedsim.simulation.nc import Program
 from feedsim.structure import Modes, checked_modes, read_modes
 from feedsim.structure.modes import damped_twice
-from feedsim.structure.mounts import factored, read_mounts
+from feedsim.structure.mounts import read_mounts, scale_elements
 from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, table_mismatch, warnings
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 # Of F_C: a load that never exceeds it is lost in what friction itself is known to. Newtons read as kilonewtons are.
-FELT = 1e-2
+NOTICEABLE_LOAD_SHARE = 1e-2
 # A load that drives: the share of its work that it does on the machine and not the machine on it, net, and the least
 # share of the friction work that makes it matter.
 DRIVING, MATTERS = 0.5, 0.05
@@ -43,7 +43,7 @@ DRIVING, MATTERS = 0.5, 0.05
 FACTOR_OFF, WORK_OFF, FACTOR_SEEN = 0.5, 0.1, 0.3
 
 
-def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[Finding]:
+def warn_unbalanced_loads(scenario: Scenario, loads: Sequence[ActingLoad]) -> list[Finding]:
     """The drive's integrators start empty: an axis under load sags before it holds."""
     if scenario.motions[0].held >= LOAD_TAKEN_UP:
         return []
@@ -69,7 +69,7 @@ def unbalanced(scenario: Scenario, loads: Sequence[Acting]) -> list[Finding]:
     return reported
 
 
-def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[Finding]:
+def sizes(machine: Machine, program: Program, loads: Sequence[ActingLoad]) -> list[Finding]:
     """Loads that the drive cannot hold, and such that nothing feels: of another unit or at another place than meant."""
     reported = []
     for acting in loads:
@@ -87,7 +87,7 @@ def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[F
                 "cannot hold it; are unit, kind and factor right?",
                 acting.place,
             ))  # fmt: skip
-        elif isinstance(friction, FrictionParameters) and abs(torque) < FELT * friction.F_C:
+        elif isinstance(friction, FrictionParameters) and abs(torque) < NOTICEABLE_LOAD_SHARE * friction.F_C:
             reported.append(Finding(
                 "load-too-small", "doubt",
                 f"{size}, {abs(torque) / friction.F_C:.2g} of the Coulomb friction F_C, {friction.F_C:.4g} N.m: next "
@@ -97,7 +97,7 @@ def sizes(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[F
     return reported
 
 
-def driving(run: Run) -> list[Finding]:
+def warn_driving_loads(run: Run) -> list[Finding]:
     """By the energy: a load that drives the machine, where forces of a process resist its motion."""
     friction = float(np.abs([run.coupling[f"{axis}.friction_work"] for axis in run.scenario.machine.axes]).sum())
     return [
@@ -114,7 +114,7 @@ def driving(run: Run) -> list[Finding]:
     ]  # fmt: skip
 
 
-def contradicted(run: Run) -> list[Finding]:
+def warn_contradicted_loads(run: Run) -> list[Finding]:
     """By the energy: loads with which the motor of the run does other work than that of the record."""
     scenario, reported = run.scenario, []
     for work in run.loads:
@@ -231,7 +231,7 @@ def exchange_stability(scenario: Scenario, modes: Modes) -> list[Finding]:
     return warnings
 
 
-def energy(run: Run, loops: Sequence[Loop]) -> list[Finding]:
+def warn_coupling_energy(run: Run, loops: Sequence[Loop]) -> list[Finding]:
     """The coupling is blamed where nothing else is known to make an axis chatter."""
     coupling = run.scenario.coupling
     steps = coupling.steps(run.scenario.machine)
@@ -273,10 +273,10 @@ def loops_of(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     def find() -> list[dict[str, Any]]:
         return [asdict(loop) | {"growing": int(loop.growing)} for loop in judge(machine, modes)]
 
-    return tuple(Loop(**loop) for loop in cached("loops", [described, state.hexdigest()], CODE, find))
+    return tuple(Loop(**loop) for loop in cache_answer("loops", [described, state.hexdigest()], CODE, find))
 
 
-def control(machine: Machine, loops: Sequence[Loop], program: Program | None = None) -> list[Finding]:
+def warn_control_loops(machine: Machine, loops: Sequence[Loop], program: Program | None = None) -> list[Finding]:
     """Loops that are unstable or have less than the usual margins, with the gain that would do, and those not judged.
 
     A loop is wrong where it is unstable in a state that the motion brings about: axes that do not move rest. Without a
@@ -302,12 +302,12 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
             text = f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better} {usual}"
             result.append(Finding("loop-margins-thin", "doubt", text, axis, remedy))
             continue
-        where = "; ".join(map(_where, states))
+        where = "; ".join(map(_describe_stability, states))
         text = (
             f"axis {axis}: the {kind} loop is unstable with {now}: {where}{better} {usual}. The instability is "
             "physical; a smaller step does not remove it"
         )
-        met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
+        met = any(loop.growing and (loop.state == "at rest" or _moves_axis(program, axis)) for loop in unstable)
         result.append(Finding("loop-unstable", "wrong" if met else "doubt", text, axis, remedy))
     if unknown := [name for name, axis in machine.axes.items() if isinstance(axis.drive, ForeignUnit)]:
         others = "; the other axes are judged with its motor free" if loops else ""
@@ -320,14 +320,14 @@ def control(machine: Machine, loops: Sequence[Loop], program: Program | None = N
     return result
 
 
-def _moves(program: Program | None, axis: str) -> bool:
+def _moves_axis(program: Program | None, axis: str) -> bool:
     if program is None:
         return True
     low, high = program.reached(axis)
     return low < high
 
 
-def _where(loop: Loop) -> str:
+def _describe_stability(loop: Loop) -> str:
     """In which state a loop is stable, and from which gain on it is not."""
     if loop.limit is None:
         bound = ""
@@ -365,7 +365,7 @@ class JudgedRun(Run):
     warnings: tuple[Finding, ...]
 
 
-def judged(run: Run, *, keep: bool = True) -> JudgedRun:
+def judge_run(run: Run, *, keep: bool = True) -> JudgedRun:
     """The run with its doubts: those of its units, of the parameters, of the pose, and what the run itself shows.
 
     keep: whether the judged loops are kept on disk for the next process; a study has thousands of machines.
@@ -377,9 +377,14 @@ def judged(run: Run, *, keep: bool = True) -> JudgedRun:
     modes = checked_modes(scenario.machine)
     loops = loops_of(scenario.machine, modes) if keep else judge(scenario.machine, modes)
     pose = pose_use(scenario.machine, program, run.grid, run.crossings)
-    foreseen = _foreseen(scenario, modes, program, loops, run.acting)
+    foreseen = _foresee_doubts(scenario, modes, program, loops, run.acting)
     wrong = tuple(finding for finding in foreseen if finding.severity == "wrong")
-    shown = (*energy(run, loops), *_limits(run), *driving(run), *contradicted(run))
+    shown = (
+        *warn_coupling_energy(run, loops),
+        *_warn_limits(run),
+        *warn_driving_loads(run),
+        *warn_contradicted_loads(run),
+    )
     # What an unstable run shows besides follows from that.
     warnings = (
         *run.notes, *(wrong or (*foreseen, *pose.warnings, *shown)), *run.executor_notes,
@@ -400,29 +405,32 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
     modes = checked_modes(scenario.machine)
     loops = loops_of(scenario.machine, modes)
     pose = pose_use(scenario.machine, program, ready.grid)
-    return (*ready.notes, *_foreseen(scenario, modes, program, loops, ready.acting), *pose.warnings)
+    return (*ready.notes, *_foresee_doubts(scenario, modes, program, loops, ready.acting), *pose.warnings)
 
 
-def _foreseen(
-    scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop], acting: Sequence[Acting]
+def _foresee_doubts(
+    scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop], acting: Sequence[ActingLoad]
 ) -> tuple[Finding, ...]:
     """What the parameters and the loads alone show a user to doubt."""
     return (
-        *control(scenario.machine, loops, program), *exchange_stability(scenario, modes),
-        *unbalanced(scenario, acting), *sizes(scenario.machine, program, acting), *mounts(scenario.machine),
-    )  # fmt: skip
+        *warn_control_loops(scenario.machine, loops, program),
+        *exchange_stability(scenario, modes),
+        *warn_unbalanced_loads(scenario, acting),
+        *sizes(scenario.machine, program, acting),
+        *warn_mount_damping(scenario.machine),
+    )
 
 
-def mounts(machine: Machine) -> list[Finding]:
+def warn_mount_damping(machine: Machine) -> list[Finding]:
     """Damping of mounts that the table of modes has besides."""
     if machine.mounts is None:
         return []
     modes = read_modes(machine.modes, list(machine.axes))
     table = read_mounts(machine.mounts.table, len(modes.frequency))
-    return damped_twice(modes, table, factored(table, machine.mounts.parameters()))
+    return damped_twice(modes, table, scale_elements(table, machine.mounts.parameters()))
 
 
-def _limits(run: Run) -> list[Finding]:
+def _warn_limits(run: Run) -> list[Finding]:
     """Limits at which a drive was while it was recorded."""
     return [
         Finding(

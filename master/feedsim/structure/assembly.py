@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation import errors
-from feedsim.foundation.owned import digest
+from feedsim.foundation.owned import file_digest
 from feedsim.scenario.structure.parts import SI, UnitSystem
 
 if TYPE_CHECKING:
@@ -109,12 +109,12 @@ def translating_mass(assembly: Assembly) -> Floats:
     return masses
 
 
-def few(labels: Sequence[str], indices: Integers) -> str:
+def shorten_labels(labels: Sequence[str], indices: Integers) -> str:
     """The first labels, and how many there are beyond."""
-    return errors.few([labels[int(i)] for i in indices], MAX_SHOWN_LABELS)
+    return errors.shorten_list([labels[int(i)] for i in indices], MAX_SHOWN_LABELS)
 
 
-def counted(count: int, one: str, several: str) -> str:
+def count_text(count: int, one: str, several: str) -> str:
     """ "1 degree of freedom has", "3 degrees of freedom have"."""
     return f"{count} {one if count == 1 else several}"
 
@@ -137,4 +137,4 @@ def state_of(file: Path) -> State:
 @lru_cache(maxsize=8)
 def digest_of(file: Path, state: State) -> str:
     """SHA-256 of the file, which is read anew where its state is another one. Raises OSError."""
-    return digest(file)
+    return file_digest(file)

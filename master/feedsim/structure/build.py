@@ -23,8 +23,8 @@ from feedsim.structure.assembly import (
     Assembly,
     Floats,
     Integers,
-    counted,
-    few,
+    count_text,
+    shorten_labels,
     translating_mass,
 )
 from feedsim.structure.eigenpairs import symmetric_factors
@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 
 
 # Of the scaled matrix, whose diagonal is 1. Assembly and text of 13 digits leave 1e-12.
-NEGATIVE = 1e-9
+NEGATIVE_TOLERANCE = 1e-9
 # Round-off of a minor: |a_ij| may exceed sqrt(a_ii a_jj) by this share where two degrees of freedom move as one.
-MINOR = 1e-9
+MINOR_ROUNDING = 1e-9
 LANCZOS_STEPS = 60
 
 
@@ -62,17 +62,22 @@ def mass_faults(assembly: Assembly) -> tuple[list[str], list[Finding]]:
         return [], []
     if len(massless) == len(assembly.labels):
         return ["the mass matrix is zero"], []
-    loose = _loose(assembly.stiffness, massless)
+    loose = _find_unheld_freedoms(assembly.stiffness, massless)
     if loose is not None:
         return [
-            f"{few(assembly.labels, massless[loose])}: no mass, and no stiffness against moving on their own; give "
+            f"{shorten_labels(assembly.labels, massless[loose])}: no mass, and no stiffness against moving on "
+            f"their own; give "
             "them a mass, hold them, or leave them out"
         ], []
-    return [], [Finding(
-        "freedom-massless", "doubt",
-        f"{counted(len(massless), 'degree of freedom follows', 'degrees of freedom follow')} statically, without mass: "
-        f"{few(assembly.labels, massless)}",
-    )]  # fmt: skip
+    return [], [
+        Finding(
+            "freedom-massless",
+            "doubt",
+            f"{count_text(len(massless), 'degree of freedom follows', 'degrees of freedom follow')} statically, "
+            f"without mass: "
+            f"{shorten_labels(assembly.labels, massless)}",
+        )
+    ]
 
 
 def stiffness_faults(assembly: Assembly) -> tuple[list[str], list[Finding]]:
@@ -86,8 +91,8 @@ def _indefinite(assembly: Assembly, matrix: sparse.csc_array, what: str) -> list
     if len(negative):
         worst = negative[np.argsort(diagonal[negative])]
         return [
-            f"{counted(len(worst), 'degree of freedom has', 'degrees of freedom have')} negative {what} on the "
-            f"diagonal, down to {diagonal[worst[0]]:.6g} at {few(assembly.labels, worst)}"
+            f"{count_text(len(worst), 'degree of freedom has', 'degrees of freedom have')} negative {what} on the "
+            f"diagonal, down to {diagonal[worst[0]]:.6g} at {shorten_labels(assembly.labels, worst)}"
         ]
     pair = _worst_pair(matrix, diagonal)
     if pair is not None:
@@ -97,12 +102,13 @@ def _indefinite(assembly: Assembly, matrix: sparse.csc_array, what: str) -> list
             f"coupled by {matrix[i, j]:.6g}, more than the root of their diagonal entries {diagonal[i]:.6g} and "
             f"{diagonal[j]:.6g} multiplied"
         ]
-    value, vector = _lowest(matrix, diagonal)
-    if value < -NEGATIVE:
+    value, vector = _lowest_ritz_pair(matrix, diagonal)
+    if value < -NEGATIVE_TOLERANCE:
         most = np.argsort(-np.abs(vector))
         most = most[np.abs(vector[most]) > 0.3 * np.abs(vector[most[0]])]
         return [
-            f"the {what} matrix is not positive semidefinite: a motion mainly of {few(assembly.labels, most)} has "
+            f"the {what} matrix is not positive semidefinite: a motion mainly of "
+            f"{shorten_labels(assembly.labels, most)} has "
             f"negative {what} ({value:.3g} of that of its degrees of freedom alone)"
         ]
     return []
@@ -115,7 +121,7 @@ def _worst_pair(matrix: sparse.csc_array, diagonal: Floats) -> tuple[int, int] |
     rows, columns, values = entries.row[off], entries.col[off], np.abs(entries.data[off])
     root = np.sqrt(diagonal)
     limit = root[rows] * root[columns]
-    broken = np.flatnonzero((values > limit * (1 + MINOR)) & (values > 0))
+    broken = np.flatnonzero((values > limit * (1 + MINOR_ROUNDING)) & (values > 0))
     if not len(broken):
         return None
     with np.errstate(divide="ignore"):
@@ -123,7 +129,7 @@ def _worst_pair(matrix: sparse.csc_array, diagonal: Floats) -> tuple[int, int] |
     return int(rows[worst]), int(columns[worst])
 
 
-def _lowest(matrix: sparse.csc_array, diagonal: Floats) -> tuple[float, Floats]:
+def _lowest_ritz_pair(matrix: sparse.csc_array, diagonal: Floats) -> tuple[float, Floats]:
     """Lowest Ritz value of D^-1/2 A D^-1/2 after some Lanczos steps with full reorthogonalisation, and its vector (N,)
     in the coordinates of A; 0 where the diagonal is 0."""
     positive = diagonal > 0
@@ -151,7 +157,7 @@ def _lowest(matrix: sparse.csc_array, diagonal: Floats) -> tuple[float, Floats]:
     return float(values[0]), root * (basis[:done].T @ vectors[:, 0])
 
 
-def _loose(stiffness: sparse.csc_array, massless: NDArray[np.int64]) -> NDArray[np.int64] | None:
+def _find_unheld_freedoms(stiffness: sparse.csc_array, massless: NDArray[np.int64]) -> NDArray[np.int64] | None:
     """Positions within `massless` that no stiffness holds (their own block of K is singular); None where all are held.
 
     The factorisation is of that block alone, which falls into small parts: rotations of single nodes, say.
@@ -201,7 +207,7 @@ def check(assembly: Assembly) -> list[Finding]:
     """
     for faults in (_shapes(assembly), _finite(assembly), _symmetry(assembly)):
         _refuse(assembly, faults)  # what follows needs each of these
-    faults, warnings = _empty(assembly), list[Finding]()
+    faults, warnings = _report_empty_freedoms(assembly), list[Finding]()
     _refuse(assembly, faults)
     for more_faults, more_warnings in (mass_faults(assembly), stiffness_faults(assembly), _ports(assembly)):
         faults += more_faults
@@ -244,7 +250,7 @@ def _finite(assembly: Assembly) -> list[str]:
             row = int(matrix.indices[bad[0]])
             column = int(np.searchsorted(matrix.indptr, bad[0], side="right")) - 1
             faults.append(
-                f"{counted(len(bad), 'entry', 'entries')} of the {what} matrix not finite, the first "
+                f"{count_text(len(bad), 'entry', 'entries')} of the {what} matrix not finite, the first "
                 f"{matrix.data[bad[0]]} at ({assembly.labels[row]}, {assembly.labels[column]})"
             )
     for port, vector in assembly.ports.items():
@@ -285,15 +291,15 @@ def _triangular(matrix: object) -> bool:
     return bool(sparse.tril(matrix, -1).nnz == 0 or sparse.triu(matrix, 1).nnz == 0)
 
 
-def _empty(assembly: Assembly) -> list[str]:
+def _report_empty_freedoms(assembly: Assembly) -> list[str]:
     """Degrees of freedom with neither mass nor stiffness: nothing says how they move."""
     used = _columns(assembly.mass) | _columns(assembly.stiffness)
     empty = np.flatnonzero(~used)
     if not len(empty):
         return []
     return [
-        f"{counted(len(empty), 'degree of freedom has', 'degrees of freedom have')} neither mass nor stiffness: "
-        f"{few(assembly.labels, empty)}; constrain them or leave them out"
+        f"{count_text(len(empty), 'degree of freedom has', 'degrees of freedom have')} neither mass nor stiffness: "
+        f"{shorten_labels(assembly.labels, empty)}; constrain them or leave them out"
     ]
 
 
@@ -403,15 +409,17 @@ def _part_faults(assembly: Assembly) -> tuple[list[str], list[Finding]]:
         if p == main:
             continue
         members = order[starts[p] : starts[p + 1]]
-        axes = [axis for axis in assembly.axes if _touched(assembly, axis, members)]
+        axes = [axis for axis in assembly.axes if _drives_part(assembly, axis, members)]
         if free[p] > len(axes):
             faults.append((p, members, axes))
         elif free[p] == 0:
             fixed.append(members)
-    return _flying(assembly, faults, free, sizes, main, count), _grounded_parts(assembly, fixed, int(sizes[main]))
+    return _report_flying_parts(assembly, faults, free, sizes, main, count), _grounded_parts(
+        assembly, fixed, int(sizes[main])
+    )
 
 
-def _flying(
+def _report_flying_parts(
     assembly: Assembly,
     parts: list[tuple[int, Integers, list[str]]],
     free: dict[int, int],
@@ -422,9 +430,9 @@ def _flying(
     faults = []
     for p, members, axes in parts[:MAX_SHOWN_LABELS]:
         allowed = f" ({len(axes)} for the axes {', '.join(axes)} that act on it)" if axes else ""
-        size = counted(len(members), *DEGREES)
+        size = count_text(len(members), *DEGREES)
         faults.append(
-            f"a part flies freely: {size} ({few(assembly.labels, members)}) that nothing connects to the "
+            f"a part flies freely: {size} ({shorten_labels(assembly.labels, members)}) that nothing connects to the "
             f"{sizes[main]} of the largest part, with {_modes(free[p])}{allowed}; connect it, hold it or leave it out"
         )
     if len(parts) > MAX_SHOWN_LABELS:
@@ -434,14 +442,17 @@ def _flying(
 
 def _modes(count: int) -> str:
     return (
-        f"{MOST_RIGID - 1} rigid modes or more" if count >= MOST_RIGID else counted(count, "rigid mode", "rigid modes")
+        f"{MOST_RIGID - 1} rigid modes or more"
+        if count >= MOST_RIGID
+        else count_text(count, "rigid mode", "rigid modes")
     )
 
 
 def _grounded_parts(assembly: Assembly, parts: list[Integers], largest: int) -> list[Finding]:
     texts = [
-        f"a part of {counted(len(members), *DEGREES)} "
-        f"({few(assembly.labels, members)}) is connected to the ground alone, not to the {largest} of the largest part"
+        f"a part of {count_text(len(members), *DEGREES)} "
+        f"({shorten_labels(assembly.labels, members)}) is connected to the ground alone, not to the {largest} of "
+        f"the largest part"
         for members in parts[:MAX_SHOWN_LABELS]
     ]
     if len(parts) > MAX_SHOWN_LABELS:
@@ -449,7 +460,7 @@ def _grounded_parts(assembly: Assembly, parts: list[Integers], largest: int) -> 
     return [Finding("part-on-ground", "doubt", text) for text in texts]
 
 
-def _touched(assembly: Assembly, axis: str, members: Integers) -> bool:
+def _drives_part(assembly: Assembly, axis: str, members: Integers) -> bool:
     return any(np.any(assembly.ports[f"{quantity}_{axis}"][members]) for quantity in ("n", "x"))
 
 

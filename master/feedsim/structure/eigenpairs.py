@@ -14,7 +14,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, SuperLU, eigsh, splu
 
 from feedsim.foundation.errors import FeedsimError, InputError
-from feedsim.structure.assembly import Assembly, few
+from feedsim.structure.assembly import Assembly, shorten_labels
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # A factorisation without pivoting is trusted where it solves a random system to this backward error: an eigenvalue
 # that near to the shift, relative to the largest one, may be counted on the wrong side of it, and no other.
-TRUSTED = 1e-9
+SHIFT_DISTANCE = 1e-9
 
 
 class Factor(Protocol):
@@ -36,7 +36,7 @@ class Factor(Protocol):
         ...
 
 
-def shifted(assembly: Assembly, sigma: float) -> tuple[csc_array, Floats]:
+def shift_stiffness(assembly: Assembly, sigma: float) -> tuple[csc_array, Floats]:
     """D (K - sigma M) D and the diagonal of D, which makes translations and rotations comparable.
 
     Raises:
@@ -48,7 +48,7 @@ def shifted(assembly: Assembly, sigma: float) -> tuple[csc_array, Floats]:
         wrong = np.flatnonzero(~(size > 0))
         raise InputError(
             f"{assembly.name}: {len(wrong)} degrees of freedom have neither mass nor stiffness (or negative ones): "
-            f"{few(assembly.labels, wrong)}"
+            f"{shorten_labels(assembly.labels, wrong)}"
         )
     scale = 1 / np.sqrt(size)
     diagonal = sparse.diags_array(scale)
@@ -60,7 +60,7 @@ class DenseFactor:
 
     def __init__(self, assembly: Assembly, shift: float) -> None:
         """InputError: the matrix is not positive definite; names the degree of freedom at which that shows."""
-        matrix, self._scale = shifted(assembly, -shift)
+        matrix, self._scale = shift_stiffness(assembly, -shift)
         self.matrix: Floats = matrix.toarray()
         try:
             self._factor = linalg.cho_factor(self.matrix, lower=True)
@@ -82,7 +82,7 @@ class SparseFactor:
 
     def __init__(self, assembly: Assembly, sigma: float) -> None:
         """RuntimeError: the matrix is singular to rounding (sigma is an eigenvalue)."""
-        self._matrix, self._scale = shifted(assembly, sigma)
+        self._matrix, self._scale = shift_stiffness(assembly, sigma)
         self._lu = symmetric_factors(self._matrix, Equil=False)
 
     @property
@@ -99,7 +99,7 @@ class SparseFactor:
 
         It does not where a pivot had to be taken off the diagonal, or where the pivots on it lost too many digits.
         """
-        if not np.array_equal(self._lu.perm_r, self._lu.perm_c) or self._backward_error() > TRUSTED:
+        if not np.array_equal(self._lu.perm_r, self._lu.perm_c) or self._backward_error() > SHIFT_DISTANCE:
             return None
         return int(np.count_nonzero(self._lu.U.diagonal() < 0))
 
@@ -130,7 +130,7 @@ def not_definite(assembly: Assembly) -> InputError:
 
 
 Floats = NDArray[np.float64]
-Say = Callable[[str], None]
+StepReporter = Callable[[str], None]
 
 # Of a large model that many modes above the cut-off are computed as well: they are reported, and the ones below
 # converge the faster for them.
@@ -138,7 +138,7 @@ EXTRA_MODES = 6
 # 1/(lambda + shift) below this part of the largest one is rounding: a mode without mass.
 MASSLESS = 1e-12
 # A matrix shifted onto an eigenvalue cannot be factorised: the shift is then moved by this part, more each time.
-NUDGE = 1e-6
+SHIFT_STEP = 1e-6
 ATTEMPTS = 4
 SECONDS_BETWEEN_MESSAGES = 5.0
 
@@ -187,7 +187,7 @@ def dense(assembly: Assembly, shift: float) -> Eigenpairs:
     return Eigenpairs(1 / theta - shift, shapes, len(theta), factor, shift, "dense", verification)
 
 
-def lanczos(assembly: Assembly, cutoff: float, shift: float, say: Say) -> Eigenpairs:
+def lanczos(assembly: Assembly, cutoff: float, shift: float, say: StepReporter) -> Eigenpairs:
     """The modes up to the cut-off [rad/s] and a few above, by shift-invert Lanczos about -shift.
 
     The number of modes to look for comes from a factorisation at the cut-off (Sturm sequence), and so does the
@@ -210,12 +210,12 @@ def lanczos(assembly: Assembly, cutoff: float, shift: float, say: Say) -> Eigenp
         )
         values, shapes = _up_to(assembly, factor, shift, border, finite, say)
     else:
-        values, shapes = _counted(assembly, factor, shift, (border, below), finite, say)
+        values, shapes = _complete_pairs(assembly, factor, shift, (border, below), finite, say)
         verification = f"{below} modes below {math.sqrt(border) / (2 * math.pi):.6g} Hz, counted by a Sturm sequence"
     return Eigenpairs(values, shapes, finite, factor, shift, "Lanczos", verification)
 
 
-def _count(assembly: Assembly, cutoff: float, say: Say) -> tuple[float, int | None]:
+def _count(assembly: Assembly, cutoff: float, say: StepReporter) -> tuple[float, int | None]:
     """A shift at the cut-off or next to it [rad2/s2], and the number of modes below it where it can be had."""
     border = cutoff**2
     for attempt in range(ATTEMPTS):
@@ -230,12 +230,12 @@ def _count(assembly: Assembly, cutoff: float, say: Say) -> tuple[float, int | No
         if below is not None:
             say(f"{below} modes")
             return border, below
-        border *= 1 + NUDGE * 10**attempt
+        border *= 1 + SHIFT_STEP * 10**attempt
     return cutoff**2, None
 
 
-def _counted(
-    assembly: Assembly, factor: Factor, shift: float, expected: tuple[float, int], finite: int, say: Say
+def _complete_pairs(
+    assembly: Assembly, factor: Factor, shift: float, expected: tuple[float, int], finite: int, say: StepReporter
 ) -> tuple[Floats, Floats]:
     """The modes below a border whose number is known; looked for again, beside those found, until they are complete."""
     border, below = expected
@@ -261,7 +261,7 @@ def _counted(
 
 
 def _up_to(
-    assembly: Assembly, factor: Factor, shift: float, border: float, finite: int, say: Say
+    assembly: Assembly, factor: Factor, shift: float, border: float, finite: int, say: StepReporter
 ) -> tuple[Floats, Floats]:
     """The modes below a border whose number is not known: more and more, until some lie above it."""
     wanted = 20
@@ -274,7 +274,7 @@ def _up_to(
         wanted *= 2
 
 
-def _run(assembly: Assembly, factor: Factor, shift: float, wanted: int, known: Floats, say: Say) -> Floats:
+def _run(assembly: Assembly, factor: Factor, shift: float, wanted: int, known: Floats, say: StepReporter) -> Floats:
     """(N, wanted) approximate shapes of the lowest modes beside the known ones (mass-normalised columns)."""
     size = assembly.mass.shape[0]
     mass_known = assembly.mass @ known

@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files.trace.cells import named_columns, twice
+from feedsim.files.trace.cells import duplicate_names, named_columns
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import Floats
-from feedsim.structure.mounts import MountTable, factored, friction_cycle, read_mounts, viscous_cycle
+from feedsim.structure.mounts import MountTable, friction_cycle, read_mounts, scale_elements, viscous_cycle
 
 MODE, FREQUENCY, DAMPING = "mode", "frequency [Hz]", "damping ratio [1]"
 TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")
@@ -33,11 +33,11 @@ MOST_PROBLEMS = 20
 # A spring in the modes is the mounts' stiffness at rest where it agrees to this share: then the modes stay as they are.
 SAME_STIFFNESS = 1e-9
 # A mode lives in the mounts where so much of its strain energy is theirs.
-MOSTLY = 0.5
+MOUNT_ENERGY_SHARE = 0.5
 # Frames without their mounts have 1 to 3 %: what a table has beyond it is meant for mounts.
 FRAME_DAMPING = 0.03
 # Of a mode's damping in the table: what the mounts bring at their best that is worth a warning.
-NOTICED = 0.25
+MOUNT_DAMPING_SHARE = 0.25
 AMPLITUDES = np.logspace(-1, 1, 21)  # of x_2, among which friction damps most
 
 
@@ -105,11 +105,11 @@ def read_modes(file: Path, axes: Sequence[str]) -> Modes:
         raise InputError(f"{file}: no such file (table of modes)") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: cannot be read as a table of modes: {error}") from error
-    return _read(file, text, tuple(axes))
+    return _read_table(file, text, tuple(axes))
 
 
 @lru_cache(maxsize=8)  # a run asks several times, many runs of a machine ask for the same
-def _read(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
+def _read_table(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
     try:
         rows = named_columns(list(csv.reader(io.StringIO(text, newline=""))))
     except csv.Error as error:
@@ -161,7 +161,7 @@ def _header_problems(file: Path, header: Sequence[str], needed: Sequence[str]) -
     there = ", ".join(header)
     problems = [f"{file}:1: column '{name}' is missing; there is {there}" for name in needed if name not in header]
     problems += [f"{file}:1: column '{name}' belongs to no axis here" for name in header if name not in needed]
-    problems += [f"{file}:1: column '{name}' occurs twice" for name in twice(header)]
+    problems += [f"{file}:1: column '{name}' occurs twice" for name in duplicate_names(header)]
     return problems
 
 
@@ -194,7 +194,7 @@ def _number(cell: str) -> float:
 
 
 @lru_cache(maxsize=8)
-def joined(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) -> Modes:
+def join_motors(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) -> Modes:
     """Modes of a structure whose motors are joined to it by contacts, each closed: (axis, stiffness [N.m/rad], damping
     [N.m.s/rad], inertia on the motor's side [kg.m2]).
 
@@ -278,7 +278,7 @@ def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[Findi
     reported = []
     for k in np.flatnonzero(~modes.rigid).tolist():
         omega, squares = 2 * np.pi * modes.frequency[k], table.shapes[:, k] ** 2
-        if K_lin @ squares < MOSTLY * omega**2 or modes.damping[k] <= FRAME_DAMPING:
+        if K_lin @ squares < MOUNT_ENERGY_SHARE * omega**2 or modes.damping[k] <= FRAME_DAMPING:
             continue
         deflection = np.sqrt(squares / squares.max())
         typical = float(np.min(x_2[F_max > 0], initial=1.0))
@@ -286,7 +286,7 @@ def damped_twice(modes: Modes, table: MountTable, element: Floats) -> list[Findi
             float((friction_cycle(F_max, x_2, a * typical * deflection)[1] + viscous_cycle(K_v, c, omega)[1]) @ squares)
             for a in AMPLITUDES.tolist()
         ) / (2 * omega**2)
-        if bring > NOTICED * modes.damping[k]:
+        if bring > MOUNT_DAMPING_SHARE * modes.damping[k]:
             reported.append(
                 f"{modes.frequency[k]:.4g} Hz ({100 * modes.damping[k]:.3g} % and up to {100 * bring:.2g} %)"
             )
@@ -328,7 +328,7 @@ def linear_modes(machine: Machine, modes: Modes, amplitude: float = 0.0) -> Mode
     amplitude [m] (:func:`with_mounts`), and transmissions. Raises InputError."""
     if machine.mounts is not None:
         table = read_mounts(machine.mounts.table, len(modes.frequency))
-        modes = with_mounts(modes, table, factored(table, machine.mounts.parameters()), amplitude)
+        modes = with_mounts(modes, table, scale_elements(table, machine.mounts.parameters()), amplitude)
     return with_transmissions(machine, modes)
 
 
@@ -338,4 +338,4 @@ def with_transmissions(machine: Machine, modes: Modes) -> Modes:
         (name, entry.stiffness * axis.I_P**2, entry.damping * axis.I_P**2, entry.inertia)
         for name, axis in machine.axes.items() if (entry := axis.transmission) is not None and entry.stiffness > 0
     )  # fmt: skip
-    return joined(modes, contacts) if contacts else modes
+    return join_motors(modes, contacts) if contacts else modes

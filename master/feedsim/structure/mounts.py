@@ -73,11 +73,11 @@ def read_mounts(path: Path, modes: int) -> MountTable:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read as a table of mounts: {error.strerror}") from error
-    return _read(path, content, modes)
+    return _read_table(path, content, modes)
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, content: bytes, modes: int) -> MountTable:
+def _read_table(path: Path, content: bytes, modes: int) -> MountTable:
     from feedsim_packager.machine_tables import mount_problems
 
     if problems := list(mount_problems(content, modes)):
@@ -106,7 +106,7 @@ def viscous_cycle(K_v: Floats, c: Floats, omega: float) -> tuple[Floats, Floats]
     return K_v * r**2 / (1 + r**2), K_v * r / (1 + r**2)
 
 
-def factored(table: MountTable, factors: Mapping[str, Any]) -> Floats:
+def scale_elements(table: MountTable, factors: Mapping[str, Any]) -> Floats:
     """The elements (P, 6) with the factors that a machine has for all of them."""
     names = ("K_lin", "K_e", "F_max", "x_2", "K_v", "c")
     return np.asarray(table.element * np.array([float(factors.get(name, 1.0)) for name in names]))

@@ -29,7 +29,7 @@ MOUNTS_IN_ARCHIVE = "resources/mounts.csv"
 
 
 @dataclass(frozen=True)
-class Packed:
+class PackedArchive:
     """A packed archive.
 
     Attributes:
@@ -57,7 +57,7 @@ def pack(
     trial: bool = True,
     level: int = 9,
     terminals: bool = True,
-) -> Packed:
+) -> PackedArchive:
     """Pack a machine into the plant archive `base`; write it to `out`, whole or not at all.
 
     Args:
@@ -74,13 +74,13 @@ def pack(
         InputError: a file is not what it should be, or the unit refuses the machine.
         OutputError: `out` cannot be written.
     """
-    with packaging():
+    with translate_packager_errors():
         given = plant_tables(modes, pose, poses, mounts)
-        return packed(base, out, given, name=name, note=note, trial=trial, level=level, terminals=terminals)
+        return pack_unit(base, out, given, name=name, note=note, trial=trial, level=level, terminals=terminals)
 
 
 @contextmanager
-def packaging() -> Iterator[None]:
+def translate_packager_errors() -> Iterator[None]:
     """The packager's errors within are InputError and OutputError of this house."""
     from feedsim_packager import errors
 
@@ -115,7 +115,7 @@ def setpoint_table(program: Program) -> Setpoints:
     return setpoints.check(File("setpoints.csv", setpoints.write(program.time, columns)))
 
 
-def packed(
+def pack_unit(
     base: Path,
     out: Path,
     given: Resources,
@@ -126,7 +126,7 @@ def packed(
     trial: bool = True,
     level: int = 9,
     terminals: bool = True,
-) -> Packed:
+) -> PackedArchive:
     """Pack the unit of the archive `base` with what is `given`; `model`: its modelName, where it is not the unit's; the
     rest as in `pack`."""
     from feedsim_packager.machine import named
@@ -137,4 +137,4 @@ def packed(
             base, given, named(name, note, model), out, trial_run=trial, level=level, stage=stage,
             with_terminals=terminals,
         )  # fmt: skip
-    return Packed(done.path, done.size, done.guid, done.platforms)
+    return PackedArchive(done.path, done.size, done.guid, done.platforms)

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation import units
-from feedsim.foundation.errors import FeedsimError, Finding, few
-from feedsim.foundation.owned import cached
+from feedsim.foundation.errors import FeedsimError, Finding, shorten_list
+from feedsim.foundation.owned import cache_answer
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import CODE, MAX_SHOWN_LABELS, State, digest_of, state_of
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
@@ -174,8 +174,8 @@ def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesO
         pose = _Pose(machine.structure, state_of(machine.structure), tuple(machine.pose.items()))
         if axis not in _assembler(pose).structure.axes:
             return None
-        solution, frequency = _middle(pose)[1], _middle(pose)[1].modes.frequency
-        own = np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= MAX_MODE_FREQUENCY))
+        solution, frequency = _solve_pose(pose)[1], _solve_pose(pose)[1].modes.frequency
+        own = np.flatnonzero(_find_visible_modes(solution) & (frequency > 0) & (frequency <= MAX_MODE_FREQUENCY))
         there = [
             _end(pose, axis, None if abs(x - machine.pose[axis]) <= MIN_POSE_DISTANCE else round(x, DECIMALS))
             for x in positions
@@ -236,11 +236,11 @@ def _kept_between(
     def find() -> Any:
         if axis not in _assembler(pose).structure.axes:
             return [[], []]
-        modes, compliances = _between(pose, axis, low, high)
+        modes, compliances = _changes_between(pose, axis, low, high)
         return [[astuple(mode) for mode in modes], [astuple(compliance) for compliance in compliances]]
 
     follows_from = [digest_of(pose.structure, pose.state), pose.axes, axis, low, high]
-    modes, compliances = cached("modes-over-pose", follows_from, CODE, find)
+    modes, compliances = cache_answer("modes-over-pose", follows_from, CODE, find)
     return (
         tuple(ModeChange(f, (ends[0], ends[1]), change, mac, moving) for f, ends, change, mac, moving in modes),
         tuple(Compliance(name, unit, (at[0], at[1], at[2])) for name, unit, at in compliances),
@@ -261,7 +261,7 @@ def _with_modes(pose: _Pose, axis: AxisChange) -> AxisChange:
 
 # A few numbers per mode each: a study's runs, whose ends are the same to the rounding, find theirs here.
 @lru_cache(maxsize=256)
-def _between(
+def _changes_between(
     pose: _Pose, axis: str, low: float | None, high: float | None
 ) -> tuple[tuple[ModeChange, ...], tuple[Compliance, ...]]:
     """Of an axis that reaches from `low` to `high`, to be rounded by the caller; None stands for the pose itself."""
@@ -271,13 +271,13 @@ def _between(
 
 @lru_cache(maxsize=256)
 def _end(pose: _Pose, axis: str, position: float | None) -> _End:
-    middle = _middle(pose)
+    middle = _solve_pose(pose)
     model = middle
     if position is not None:
         # Beyond the structure's travel (a following error, a recording) its end counts.
         low, high = _assembler(pose).structure.axes[axis].travel
         model = _model(pose, {axis: min(max(position, low), high)}, described=False)
-    return _End(*_matched(*middle, model[1]), tuple(_static(axis, *model)))
+    return _End(*_match_modes(*middle, model[1]), tuple(_static(axis, *model)))
 
 
 def _assembler(pose: _Pose) -> Assembler:
@@ -287,7 +287,7 @@ def _assembler(pose: _Pose) -> Assembler:
 
 
 @lru_cache(maxsize=4)  # matrices: large ones of large structures
-def _middle(pose: _Pose) -> tuple[Assembly, Solution]:
+def _solve_pose(pose: _Pose) -> tuple[Assembly, Solution]:
     return _model(pose, {}, described=True)
 
 
@@ -304,10 +304,12 @@ def _model(pose: _Pose, moved: Mapping[str, float], described: bool) -> tuple[As
 
 
 def _modes(pose: _Pose, ends: Sequence[_End]) -> tuple[ModeChange, ...]:
-    solution = _middle(pose)[1]
+    solution = _solve_pose(pose)[1]
     frequency = solution.modes.frequency
     changes = []
-    for mode in np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= MAX_MODE_FREQUENCY)).tolist():
+    for mode in np.flatnonzero(
+        _find_visible_modes(solution) & (frequency > 0) & (frequency <= MAX_MODE_FREQUENCY)
+    ).tolist():
         at_ends = [float(end.frequency[mode]) for end in ends]
         shifts = [f / float(frequency[mode]) - 1 for f in at_ends]
         changes.append(
@@ -322,7 +324,7 @@ def _modes(pose: _Pose, ends: Sequence[_End]) -> tuple[ModeChange, ...]:
     return tuple(changes)
 
 
-def _matched(assembly: Assembly, one: Solution, other: Solution) -> tuple[Floats, Floats]:
+def _match_modes(assembly: Assembly, one: Solution, other: Solution) -> tuple[Floats, Floats]:
     """Per mode of `one`, frequency [Hz] and MAC of the mode of `other` that it becomes; each is taken once."""
     # scipy.optimize does the same for full matrices, but takes a tenth of a second to load.
     from scipy.sparse import csr_array
@@ -337,7 +339,7 @@ def _matched(assembly: Assembly, one: Solution, other: Solution) -> tuple[Floats
     return frequency, best
 
 
-def _seen(solution: Solution) -> NDArray[np.bool_]:
+def _find_visible_modes(solution: Solution) -> NDArray[np.bool_]:
     """(n,) modes that hold a share of the static compliance of a port."""
     modes = solution.modes
     stiffness = np.where(modes.rigid, np.inf, (2 * math.pi * modes.frequency) ** 2)
@@ -401,26 +403,26 @@ def table_mismatch(machine: Machine) -> Finding | None:
         if built is None:
             return ""
         table = read_modes(machine.modes, list(machine.axes))
-        return stale(table, built[0], SAME_FREQUENCY) or _other_mounts(machine, table, built[1])
+        return describe_stale_table(table, built[0], SAME_FREQUENCY) or _other_mounts(machine, table, built[1])
 
     try:
         paths = (structure, machine.modes, *([machine.mounts.table] if machine.mounts is not None else []))
         files = [digest_of(path, state_of(path)) for path in paths]
-        how = cached("table-of-modes", [files, [*machine.pose.items()], [*machine.axes]], CODE, find)
+        how = cache_answer("table-of-modes", [files, [*machine.pose.items()], [*machine.axes]], CODE, find)
     except (OSError, FeedsimError):
         return None
     if not how:
         return None
-    build = f"feedsim machine build {machine.structure} --at {_shown(machine.pose, '=')} --out DIR"
+    build = f"feedsim machine build {machine.structure} --at {_pose_text(machine.pose, '=')} --out DIR"
     return Finding(
         "modes-stale", "doubt",
-        f"the table of modes {machine.modes} is not that of the pose {_shown(machine.pose, ' ')}: {how}; build it "
+        f"the table of modes {machine.modes} is not that of the pose {_pose_text(machine.pose, ' ')}: {how}; build it "
         f"anew: {build}",
         str(machine.modes), build,
     )  # fmt: skip
 
 
-def _shown(pose: Mapping[str, float], between: str) -> str:
+def _pose_text(pose: Mapping[str, float], between: str) -> str:
     if between == "=":
         return " ".join(f"{axis}={1e3 * position:.9g}mm" for axis, position in pose.items())
     return ", ".join(f"{axis}{between}{units.show(position, 'm')}" for axis, position in pose.items())
@@ -453,7 +455,7 @@ def _other_mounts(machine: Machine, modes: Modes, built: MountTable | None) -> s
         return f"{machine.mounts.table} has mounts that are not linear; the structure has none"
     table = read_mounts(machine.mounts.table, len(modes.frequency))
     if table.names != built.names:
-        own, others = (few(names, MAX_SHOWN_LABELS) for names in (table.names, built.names))
+        own, others = (shorten_list(names, MAX_SHOWN_LABELS) for names in (table.names, built.names))
         return f"{machine.mounts.table} has the mounts {own}; the structure has {others}"
     if table.shapes.shape != built.shapes.shape:
         return ""  # cut off elsewhere, or with pseudo-modes
@@ -465,7 +467,7 @@ def _other_mounts(machine: Machine, modes: Modes, built: MountTable | None) -> s
     return f"mount {name} of {machine.mounts.table} is another one than the structure's"
 
 
-def stale(table: Modes, built: Modes, tolerance: float = EIGENVALUE_TOLERANCE) -> str:
+def describe_stale_table(table: Modes, built: Modes, tolerance: float = EIGENVALUE_TOLERANCE) -> str:
     """In words where a table of modes is not what the structure gives at the pose that it belongs to; "" where it is.
 
     Compared are what the drives see of it: frequencies of modes and inertias of axes. A table may have been cut off

@@ -140,7 +140,10 @@ def _words(body: _Body, weights: Floats, shapes: Floats) -> list[str]:
             continue
         spin = float(weights[body.directions >= 3].sum() * (motion[3:, mode] @ motion[3:, mode]))
         turning = "turning" if spin > OWN_INERTIA_SHARE * energy[3:].sum() else "rocking"
-        named = [f"moving along {_strongest(energy[:3])}", f"{turning} about {_strongest(energy[3:])}"]
+        named = [
+            f"moving along {_strongest_direction(energy[:3])}",
+            f"{turning} about {_strongest_direction(energy[3:])}",
+        ]
         shares = [energy[:3].sum() / energy.sum(), energy[3:].sum() / energy.sum()]
         if _turns(energy, motion[:3, mode], np.cross(motion[3:, mode], arms)):
             named, shares = named[::-1], shares[::-1]
@@ -148,7 +151,7 @@ def _words(body: _Body, weights: Floats, shapes: Floats) -> list[str]:
     return words
 
 
-def _strongest(energy: Floats) -> str:
+def _strongest_direction(energy: Floats) -> str:
     return AXIS_LETTERS[int(np.argmax(energy))]
 
 
@@ -185,15 +188,15 @@ def _rigid_motions(body: _Body, weights: Floats) -> tuple[Floats, Floats]:
 # A mode is rigid where the strain energies of its degrees of freedom cancel to this part of their sum. In exact
 # matrices rounding leaves 1e-16, in matrices written as text with 13 digits 1e-13; a mode at 20 Hz of a machine of
 # beams has 1e-5, the first bending of a free rod of 300 elements 1e-9.
-CANCELLED = 1e-12
+RIGID_ENERGY_TOLERANCE = 1e-12
 # Whatever is slower than this [rad/s], a turn of seventeen minutes, is held by nothing: rounding of large models.
 AT_REST = 2 * math.pi * 1e-3
 # More than the axes have, and the six of a machine that is not held, is not worth looking at one by one.
 MAX_RIGID_MOTIONS = 30
 # An axis is blocked where this part or less of its rotor's motion is rigid (an inertia that many times the rotor's).
-BLOCKED = 1e-9
+BLOCKED_MOTION_SHARE = 1e-9
 # Two axes that turn together to this part are one.
-TOGETHER = 1e-9
+COUPLED_MOTION_SHARE = 1e-9
 # The lowest mode worth naming for a blocked axis turns its rotor by this part of what the strongest one does.
 NOTABLE = 0.1
 SWEEPS = 3
@@ -209,9 +212,9 @@ def rigid_count(assembly: Assembly, pairs: Eigenpairs) -> int:
     shapes = pairs.shapes[:, : len(assembly.axes) + MAX_RIGID_MOTIONS]
     energy = np.einsum("ij,ij->j", shapes, assembly.stiffness @ shapes)
     parts = np.einsum("ij,ij->j", abs(shapes), abs(assembly.stiffness) @ abs(shapes))
-    if np.any(energy < -CANCELLED * parts):
+    if np.any(energy < -RIGID_ENERGY_TOLERANCE * parts):
         raise not_definite(assembly)
-    return int(np.count_nonzero((energy <= CANCELLED * parts) | (energy <= AT_REST**2)))
+    return int(np.count_nonzero((energy <= RIGID_ENERGY_TOLERANCE * parts) | (energy <= AT_REST**2)))
 
 
 def check_count(assembly: Assembly, rigid: Floats, elastic: Floats, values: Floats) -> None:
@@ -226,15 +229,18 @@ def check_count(assembly: Assembly, rigid: Floats, elastic: Floats, values: Floa
     """
     rotors = rotor_rows(assembly.ports, assembly.axes)
     problems = []
-    turns = np.array([_turning(rotor, rigid, elastic) for rotor in rotors])
-    blocked = [axis for axis, row in zip(assembly.axes, turns, strict=True) if row @ row <= BLOCKED]
+    turns = np.array([_rigid_rotor_motion(rotor, rigid, elastic) for rotor in rotors])
+    blocked = [axis for axis, row in zip(assembly.axes, turns, strict=True) if row @ row <= BLOCKED_MOTION_SHARE]
     for axis in blocked:
-        problems.append(f"axis {axis} cannot move freely: {_lowest(assembly, axis, elastic, values[rigid.shape[1] :])}")
+        problems.append(
+            f"axis {axis} cannot move freely: "
+            f"{_describe_lowest_mode(assembly, axis, elastic, values[rigid.shape[1] :])}"
+        )
     free = [axis for axis in assembly.axes if axis not in blocked]
-    rows = np.array([row / np.linalg.norm(row) for row in turns if row @ row > BLOCKED])
+    rows = np.array([row / np.linalg.norm(row) for row in turns if row @ row > BLOCKED_MOTION_SHARE])
     rows = rows.reshape(len(free), rigid.shape[1])
     _, sizes, directions = np.linalg.svd(rows)
-    rank = int(np.count_nonzero(sizes > math.sqrt(TOGETHER)))
+    rank = int(np.count_nonzero(sizes > math.sqrt(COUPLED_MOTION_SHARE)))
     if rank < len(free):
         problems.append(f"axes {', '.join(free)} do not move independently of one another: {rank} of {len(free)} do")
     surplus = rigid @ directions[rank:].T
@@ -245,7 +251,7 @@ def check_count(assembly: Assembly, rigid: Floats, elastic: Floats, values: Floa
         raise InputError("\n  ".join((headline, *problems)), problems)
 
 
-def _turning(rotor: Floats, rigid: Floats, elastic: Floats) -> Floats:
+def _rigid_rotor_motion(rotor: Floats, rigid: Floats, elastic: Floats) -> Floats:
     """(r,) motion of a rotor in the rigid modes, as parts of its motion in all modes."""
     all_of_it = np.linalg.norm(np.concatenate([rotor @ rigid, rotor @ elastic]))
     return np.asarray(rotor @ rigid / (all_of_it or 1.0))
@@ -259,7 +265,7 @@ def _surplus(assembly: Assembly, shape: Floats) -> str:
     )
 
 
-def _lowest(assembly: Assembly, axis: str, elastic: Floats, values: Floats) -> str:
+def _describe_lowest_mode(assembly: Assembly, axis: str, elastic: Floats, values: Floats) -> str:
     turns = abs(assembly.ports[f"n_{axis}"] @ elastic)
     if not turns.any():
         return "its rotor turns in no mode"
@@ -271,7 +277,7 @@ def _lowest(assembly: Assembly, axis: str, elastic: Floats, values: Floats) -> s
     )
 
 
-def cleaned(assembly: Assembly, pairs: Eigenpairs, rigid: Floats, elastic: Floats, values: Floats) -> Floats:
+def remove_strain(assembly: Assembly, pairs: Eigenpairs, rigid: Floats, elastic: Floats, values: Floats) -> Floats:
     """The rigid shapes with their rest of strain removed: K phi is rounding, M-orthonormal.
 
     The strain that the computed elastic modes carry is removed in their coordinates, the strain of all higher modes
@@ -470,7 +476,7 @@ def _definite(assembly: Assembly, pairs: Eigenpairs, rigid: int) -> tuple[Floats
     elastic, values = pairs.shapes[:, rigid:], pairs.values[rigid:]
     free = pairs.shapes[:, :rigid]
     check_count(assembly, free, elastic, pairs.values)
-    free = cleaned(assembly, pairs, free, elastic, values)
+    free = remove_strain(assembly, pairs, free, elastic, values)
     free = definite_basis(free, rotor_rows(assembly.ports, assembly.axes))
     elastic = elastic - free @ ((assembly.mass @ free).T @ elastic)
     rows = np.array([assembly.ports[port] for port in sorted(assembly.ports)])

@@ -8,7 +8,14 @@ has.
 from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, Vibration, diagnose
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import separating_radius
-from feedsim.analysis.circle.words import answer, further, name, sentence, swinging, worth_telling
+from feedsim.analysis.circle.words import (
+    cause_sentence,
+    describe_vibrations,
+    explain_circle,
+    suggest_circles,
+    term_name,
+    worth_telling,
+)
 
 __all__ = [
     "CircleUnderTest",
@@ -17,12 +24,12 @@ __all__ = [
     "Term",
     "TurnedPath",
     "Vibration",
-    "answer",
+    "cause_sentence",
+    "describe_vibrations",
     "diagnose",
-    "further",
-    "name",
-    "sentence",
+    "explain_circle",
     "separating_radius",
-    "swinging",
+    "suggest_circles",
+    "term_name",
     "worth_telling",
 ]

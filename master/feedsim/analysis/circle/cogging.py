@@ -3,7 +3,7 @@
 A torque A sin(k phi + psi), phi the angle of the motor, is along a circle a torque over the time of a turn, as phi
 follows the position of the axis. Its harmonics move the axis by the response of the loops to a torque at the motor.
 Speed and resonances are in that response, so the amplitude comes out in N.m. Looked for between the reversals, beside
-all terms of the model. Start reading at fitted().
+all terms of the model. Start reading at fit_with_waves().
 """
 
 from __future__ import annotations
@@ -82,21 +82,21 @@ class Wave:
         return np.asarray(self.columns(circle, angle, sense) @ np.array(self.parts))
 
 
-def fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
+def fit_with_waves(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
     """The model fitted to the paths without waves of the motors' torque, and these waves."""
     result, waves = fit(circle, paths), list[Wave]()
     plain = result
-    while len(waves) < MAX_WAVES and (wave := strongest(circle, result)) is not None:
+    while len(waves) < MAX_WAVES and (wave := find_strongest_wave(circle, result)) is not None:
         waves.append(wave)
-        result = fit(circle, without(circle, paths, waves))
-        waves = settled(circle, result, waves)
+        result = fit(circle, remove_waves(circle, paths, waves))
+        waves = settle_waves(circle, result, waves)
     if len(certain := [wave for wave in waves if wave.amplitude > wave.half]) < len(waves):
         waves = certain  # what may be nothing must not change the other terms
-        result = fit(circle, without(circle, paths, waves))
+        result = fit(circle, remove_waves(circle, paths, waves))
     return (result, waves) if stand_out(plain, result) else (plain, [])
 
 
-def without(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequence[Wave]) -> list[TurnedPath]:
+def remove_waves(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequence[Wave]) -> list[TurnedPath]:
     """Paths with the waves taken off the positions of their axes."""
     turned_paths = []
     for path in paths:
@@ -109,9 +109,9 @@ def without(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequenc
     return turned_paths
 
 
-def strongest(circle: CircleUnderTest, result: Fit) -> Wave | None:
+def find_strongest_wave(circle: CircleUnderTest, result: Fit) -> Wave | None:
     """The wave that explains most of what the model leaves between the reversals; None where none stands out."""
-    rest = _Rest(result, few=True)
+    rest = _Remainder(result, few=True)
     if circle.response is None or rest.deviation < MIN_REMAINDER:
         return None
     tried = sorted(
@@ -125,17 +125,17 @@ def strongest(circle: CircleUnderTest, result: Fit) -> Wave | None:
         rest.explained(best, circle, beside=other) < MIN_KEPT_SHARE * tried[0][0] for _, other in tried[1:RIVAL_COUNT]
     ):
         return None
-    return settled(circle, result, [best])[0]
+    return settle_waves(circle, result, [best])[0]
 
 
 def stand_out(before: Fit, after: Fit) -> bool:
     """Whether waves that are no part of ``before`` and are taken off in ``after`` explain what was left."""
-    return _Rest(after).deviation ** 2 <= (1 - MIN_EXPLAINED_BY_ALL) * _Rest(before).deviation ** 2
+    return _Remainder(after).deviation ** 2 <= (1 - MIN_EXPLAINED_BY_ALL) * _Remainder(before).deviation ** 2
 
 
-def settled(circle: CircleUnderTest, results: Fit, waves: Sequence[Wave]) -> list[Wave]:
+def settle_waves(circle: CircleUnderTest, results: Fit, waves: Sequence[Wave]) -> list[Wave]:
     """Waves with what the model leaves of them, and their intervals."""
-    rest = _Rest(results)
+    rest = _Remainder(results)
     matrix = np.hstack([rest.outside(rest.columns(wave, circle)) for wave in waves])
     change = np.linalg.lstsq(matrix, rest.left, rcond=None)[0]
     off = rest.left - matrix @ change
@@ -185,7 +185,7 @@ def _waves(circle: CircleUnderTest, axis: str) -> Iterator[Wave]:
         yield Wave(axis, order, (0.0, 0.0), math.inf, np.array([moved.real, moved.imag]))
 
 
-class _Rest:
+class _Remainder:
     """What a fit leaves between the reversals, of all samples or of a few, and what is no term of it, nor a tail."""
 
     def __init__(self, result: Fit, *, few: bool = False) -> None:
@@ -219,9 +219,9 @@ class _Rest:
         """Share of the variance [1]; beside another wave, what it explains of it that the other does not."""
         others = [] if beside is None else [self.outside(self.columns(beside, circle))]
         columns = np.hstack([*others, self.outside(self.columns(wave, circle))])
-        return (self._unexplained(others[0]) if others else 1.0) - self._unexplained(columns)
+        return (self._unexplained_share(others[0]) if others else 1.0) - self._unexplained_share(columns)
 
-    def _unexplained(self, columns: Array) -> float:
+    def _unexplained_share(self, columns: Array) -> float:
         # by the normal equations: a share that a threshold judges needs no more digits
         off = self.left - columns @ np.linalg.lstsq(columns.T @ columns, columns.T @ self.left, rcond=None)[0]
         return float(off @ off) / max(float(self.left @ self.left), 1e-300)

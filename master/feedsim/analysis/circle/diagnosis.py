@@ -12,13 +12,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.cogging import fitted, without
+from feedsim.analysis.circle.cogging import fit_with_waves, remove_waves
 from feedsim.analysis.circle.geometry import ANGLE_TERMS, CircleUnderTest, TurnedPath, enough_pitches
 from feedsim.analysis.circle.model import ESSENTIAL, Fit
 from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circularity import fitted_centre
-from feedsim.analysis.figures import Array, averaged
-from feedsim.estimation.least_squares import CHANGE_FLOOR, shows
+from feedsim.analysis.figures import Array, moving_mean
+from feedsim.estimation.least_squares import CHANGE_FLOOR, is_significant
 
 # --- Vibrations on a circle, between the reversals: of every axis whose position is known, else of the radius ---------
 
@@ -29,7 +29,7 @@ AMPLITUDE_FLOOR = 10e-9  # an amplitude of less [m] is not reported: it may be a
 # in the axes, so that its lines are not independent: five times is then reached now and then among some thousand lines.
 VIBRATION_LINES, BACKGROUND_LINES, STANDS_OUT = 7, 101, 10.0
 FIRST_ORDER = 13  # below it is form
-FINE = 0.05  # of a line: the step in which the frequency is looked for
+LINE_STEP = 0.05  # of a line: the step in which the frequency is looked for
 # about an axis' reversal its friction swings, not the machine
 SECTOR_AHEAD, SECTOR_BEHIND = math.radians(5), math.radians(60)
 
@@ -54,7 +54,7 @@ def vibrations(circle: CircleUnderTest, fit: Fit, paths: Sequence[TurnedPath]) -
     for k, path in enumerate(paths):
         part = path.covered / (2 * math.pi)  # an arc is taken for a turn: its waves are counted over what it covers
         for axis, angle, off, free in _signals(circle, fit, k, path):
-            vibration = _strongest(
+            vibration = _find_strongest_vibration(
                 replace(circle, radius=part * circle.radius), axis, angle / part, off, free, fit.quantile
             )
             if vibration is not None and (axis not in best or vibration.amplitude > best[axis].amplitude):
@@ -89,7 +89,7 @@ def _signals(circle: CircleUnderTest, fit: Fit, k: int, path: TurnedPath) -> lis
     return signals
 
 
-def _strongest(
+def _find_strongest_vibration(
     circle: CircleUnderTest, axis: str, angle: Array, off: Array, free: NDArray[np.bool_], quantile: float
 ) -> Vibration | None:
     even = np.arange(len(angle)) * (2 * math.pi / len(angle))
@@ -97,7 +97,7 @@ def _strongest(
     usable = np.abs(np.fft.rfft(still))[FIRST_ORDER:] ** 2
     if len(usable) < 2 * BACKGROUND_LINES:
         return None
-    mean = averaged(usable, VIBRATION_LINES)
+    mean = moving_mean(usable, VIBRATION_LINES)
     beside = np.pad(mean, 2 * VIBRATION_LINES, mode="edge")
     sides = np.maximum(beside[: -4 * VIBRATION_LINES], beside[4 * VIBRATION_LINES :])
     sides[: 2 * VIBRATION_LINES] = np.maximum(
@@ -108,7 +108,7 @@ def _strongest(
     if not out[at]:
         return None
     lines = np.arange(max(at - VIBRATION_LINES // 2, 0), min(at + VIBRATION_LINES // 2 + 1, len(usable)))
-    orders = np.arange(lines[0], lines[-1] + FINE, FINE) + FIRST_ORDER
+    orders = np.arange(lines[0], lines[-1] + LINE_STEP, LINE_STEP) + FIRST_ORDER
     power = [abs(np.exp(-1j * order * angle[free]) @ off[free]) for order in orders]
     order = float(orders[int(np.argmax(power))])
     amplitude, noise = _amplitude(angle[free], off[free], order)
@@ -187,7 +187,7 @@ class Term:
     def shows(self) -> bool:
         """Whether it differs from zero by more than its interval and rounding."""
         size = abs(self.value) if self.key == "radius" else self.size
-        return size > DEVIATION_FLOOR and shows(self.value, self.half)
+        return size > DEVIATION_FLOOR and is_significant(self.value, self.half)
 
     @property
     def determined(self) -> bool:
@@ -284,14 +284,14 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     centred: the centre is that of the measurement's set-up and no error of the machine; G is then about the fitted one.
     """
     whole, paths = paths, [path.thinned() for path in paths]
-    fit, waves = fitted(circle, paths)
+    fit, waves = fit_with_waves(circle, paths)
     circle = replace(circle, response=None)  # a result is data
     curves = _curves(fit, paths, circle)
     total = [path.deviation for path in paths]
     for wave in waves:
         curves[f"cogging {wave.axis} {wave.order}"] = [wave.curve(circle, path.angle, path.sense) for path in paths]
     orders = {f"cogging {wave.axis} {wave.order}": wave for wave in waves}
-    whole, paths = without(circle, whole, waves), without(circle, paths, waves)
+    whole, paths = remove_waves(circle, whole, waves), remove_waves(circle, paths, waves)
     if centred:
         offset = curves.pop("offset ")
         total = [e - part for e, part in zip(total, offset, strict=True)]
@@ -344,15 +344,15 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         peaks=peaks,
         vibrations=vibrations(circle, fit, whole),
         lag=_lag(circle),
-        unlike=_unlike(circle),
+        unlike=_gain_difference(circle),
         form=_form(fit),
         noise=fit.noise,
         left_out=fit.left_out,
         centre=(fit["offset_0"], fit["offset_1"]) if arc is None else _centre(circle, paths),
-        apart=_apart(paths),
+        apart=_difference_of_turns(paths),
         angles=fit.offset,
         hidden=2 / circle.radius * fit.hidden,
-        unseparated=() if arc is None else _unseparated(fit),
+        unseparated=() if arc is None else _find_unseparated_terms(fit),
         rest=tuple((path.angle, path.deviation - residual) for path, residual in zip(paths, fit.residual, strict=True)),
     )
 
@@ -381,7 +381,7 @@ def _lag(circle: CircleUnderTest) -> float | None:
     return circle.radius * (abs(sum(circle.gain[axis] for axis in circle.axes)) / 2 - 1)
 
 
-def _unlike(circle: CircleUnderTest) -> float | None:
+def _gain_difference(circle: CircleUnderTest) -> float | None:
     """Compliance behind a motor encoder makes an axis travel further; without feedforward the slower one falls back."""
     if any(axis not in circle.gain for axis in circle.axes):
         return None
@@ -425,7 +425,7 @@ def _set_up(circle: CircleUnderTest, made: Mapping[str, Array]) -> dict[str, Arr
     return named
 
 
-def _other(fit: Fit) -> int:
+def _opposite_path(fit: Fit) -> int:
     """Number of the first path in the other direction than the first path; 1 where there is none."""
     return next((k for k, sense in enumerate(fit.senses) if sense != fit.senses[0]), 1)
 
@@ -450,8 +450,8 @@ def _value(circle: CircleUnderTest, fit: Fit, peaks: Sequence[Peak], key: str, a
         "straightness": ((f"bend_{number}",), 1.0, "m"),
         "third": (("third",), 1.0, "m"),
         "drift": (("drift_0", "drift_1"), 1.0, "m"),
-        "centres": ((f"centre_{_other(fit)}_0", f"centre_{_other(fit)}_1"), 1.0, "m"),
-        "radii": ((f"radius_{_other(fit)}",), -float(fit.senses[0]), "m"),
+        "centres": ((f"centre_{_opposite_path(fit)}_0", f"centre_{_opposite_path(fit)}_1"), 1.0, "m"),
+        "radii": ((f"radius_{_opposite_path(fit)}",), -float(fit.senses[0]), "m"),
     }[key]
     if not fit.determined(*names):
         return math.nan, math.nan, unit
@@ -462,7 +462,7 @@ def _value(circle: CircleUnderTest, fit: Fit, peaks: Sequence[Peak], key: str, a
 def _peaks(circle: CircleUnderTest, fit: Fit, k: int, path: TurnedPath) -> list[Peak]:
     """What stands out behind every reversal of path ``k``."""
     sense, per_sample = path.sense, path.covered / len(fit.angle[k])
-    calm = _Calm(fit, k, sense, max(1, round(math.radians(PEAK_ANGLE) / per_sample)))
+    calm = _CalmMeans(fit, k, sense, max(1, round(math.radians(PEAK_ANGLE) / per_sample)))
     ellipse = math.hypot(fit["scale"], fit["squareness"] + sense * fit["servo"]) / circle.radius
     peaks = []
     for which in range(4):
@@ -488,50 +488,50 @@ def _peaks(circle: CircleUnderTest, fit: Fit, k: int, path: TurnedPath) -> list[
     return peaks
 
 
-def _peak(circle: CircleUnderTest, fit: Fit, k: int, nothing: Peak, own: NDArray[np.intp], calm: _Calm) -> Peak:
+def _peak(circle: CircleUnderTest, fit: Fit, k: int, nothing: Peak, own: NDArray[np.intp], calm: _CalmMeans) -> Peak:
     """What stands out in the samples ``own`` of path ``k``, in their order; nothing: where that is none."""
     if len(own) < 5 * calm.wide:
         return nothing
     since, off = fit.since[k][own], fit.residual[k][own]
-    clear, count = _clearest(off, calm.levels)
+    clear, count = _find_clearest_mean(off, calm.levels)
     if clear < 1:
         return replace(nothing, half=calm.levels[calm.wide])
-    curve, at, count = _sharpened(off, count, fit.noise)
+    curve, at, count = _sharpen_means(off, count, fit.noise)
     height = float(curve[at])
     # What averaging over as much again takes from it is not less than what averaging has taken already.
-    blur = float(averaged(off, 2 * count)[at]) - height if count > 1 else 0.0
+    blur = float(moving_mean(off, 2 * count)[at]) - height if count > 1 else 0.0
     relative, rate = curve / height, circle.speed / circle.radius
-    begin, end = _falls(since, relative, at, 0.5, -1), _falls(since, relative, at, 0.5, 1)
+    begin, end = _fall_angle(since, relative, at, 0.5, -1), _fall_angle(since, relative, at, 0.5, 1)
     return replace(
         nothing,
         height=height,
         half=math.hypot(fit.quantile * calm.spread(count), blur),
         angle=float(fit.angle[k][own[at]]) + (fit.offset.angle if fit.offset else 0.0),
         width=float(end - begin) / rate,
-        decay=float(_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
+        decay=float(_fall_angle(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
     )
 
 
-def _clearest(off: Array, levels: Mapping[int, float]) -> tuple[float, int]:
+def _find_clearest_mean(off: Array, levels: Mapping[int, float]) -> tuple[float, int]:
     """How far means stand out, as a multiple of their level, and over how many samples they do so most.
 
     A narrow peak stands out most where as much is averaged as it is wide. levels: number of samples -> level [m].
     """
     clear = []
     for count, level in levels.items():
-        curve, at = _top(off, count)
+        curve, at = _find_largest_mean(off, count)
         clear.append((abs(float(curve[at])) / level, count))
     return max(clear)
 
 
-def _sharpened(off: Array, count: int, noise: float) -> tuple[Array, int, int]:
+def _sharpen_means(off: Array, count: int, noise: float) -> tuple[Array, int, int]:
     """Means over ``count`` samples, or over as few as noise allows and the steeper side of the peak needs; number of
     the largest, and over how many samples they are.
 
     Averaging makes a narrow peak look wide: as often as fewer samples show it narrower, fewer are taken.
     """
     while True:
-        curve, at = _top(off, count)
+        curve, at = _find_largest_mean(off, count)
         relative = np.abs(curve) / abs(curve[at])
         below = [np.flatnonzero(side < 0.5) for side in (relative[at:], relative[at::-1])]
         steeper = min((int(side[0]) for side in below if len(side)), default=2 * count)
@@ -541,13 +541,13 @@ def _sharpened(off: Array, count: int, noise: float) -> tuple[Array, int, int]:
         count = enough
 
 
-def _top(off: Array, count: int) -> tuple[Array, int]:
+def _find_largest_mean(off: Array, count: int) -> tuple[Array, int]:
     """Means over ``count`` samples and the number of the largest; not of one at an end, which fewer samples make."""
-    curve, end = averaged(off, count), count // 2
+    curve, end = moving_mean(off, count), count // 2
     return curve, end + int(np.abs(curve[end : len(curve) - end]).argmax())
 
 
-class _Calm:
+class _CalmMeans:
     """Means of neighbouring samples of path ``k`` where no axis reverses: what those behind a reversal compare with.
 
     wide: over how many samples at most. levels: number of samples -> what such a mean must exceed to be a peak [m].
@@ -578,10 +578,10 @@ class _Calm:
 
     def _means(self, count: int) -> Array:
         whole = np.convolve(self._free, np.ones(count), "same") > count - 0.5
-        return averaged(self._off, count)[whole if whole.any() else self._free]
+        return moving_mean(self._off, count)[whole if whole.any() else self._free]
 
 
-def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> float:
+def _fall_angle(since: Array, relative: Array, at: int, level: float, way: int) -> float:
     """Angle at which a peak falls to ``level`` of its height, on one side (``way`` +-1) of its top ``at``; NaN: never.
 
     Interpolated between two samples.
@@ -595,7 +595,7 @@ def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> fl
     return float(since[before] + share * (since[out] - since[before]))
 
 
-def _apart(paths: Sequence[TurnedPath]) -> float:
+def _difference_of_turns(paths: Sequence[TurnedPath]) -> float:
     """Difference of turns of one sense, from peak to valley of its means over SECTORS of a turn; the largest [m].
 
     Without its mean and its first order: the centre and the radius may drift from one turn to the next.
@@ -619,7 +619,7 @@ def _coarse(path: TurnedPath) -> Array:
     return np.where(count > 0, np.bincount(part, path.deviation, SECTORS) / np.maximum(count, 1), math.nan)
 
 
-def _unseparated(fit: Fit) -> tuple[str, ...]:
+def _find_unseparated_terms(fit: Fit) -> tuple[str, ...]:
     """Keys of terms that trade with others: what the arcs leave of their correlations."""
     spread = np.sqrt(np.maximum(np.diag(fit.covariance), CHANGE_FLOOR**2))
     correlation = np.abs(fit.covariance / np.outer(spread, spread)) - np.eye(len(spread))

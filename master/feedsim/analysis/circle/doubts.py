@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath, Undone
+from feedsim.analysis.circle.geometry import CircleUnderTest, CorrectedPath, TurnedPath
 from feedsim.analysis.figures import Array
 from feedsim.foundation.errors import Finding, InputError
 
@@ -42,7 +42,7 @@ ROUNDING_STEP = 1e-12  # [m]; below it a step is rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Checked:
+class CheckedTurn:
     """keep: rows of a turn that are no spikes (N,) bool. doubts: findings about it."""
 
     keep: NDArray[np.bool_]
@@ -113,11 +113,11 @@ def unusual_feed(feed: float) -> list[Finding]:
     return []
 
 
-def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: tuple[str, str]) -> Checked:
+def check_turn(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: tuple[str, str]) -> CheckedTurn:
     """A turn, (N,) angles as they follow [rad] and deviations from `radius` [m]; by_axes: from positions of `axes`."""
     turned = np.unwrap(angle)
-    keep = ~_alone(turned, deviation)
-    doubts = list(_spikes(turned, deviation, keep)) + list(_missing(turned[keep]))
+    keep = ~_find_outliers(turned, deviation)
+    doubts = list(_report_spikes(turned, deviation, keep)) + list(_report_gaps(turned[keep]))
     angles, rest = turned[keep], deviation[keep]
     if by_axes:
         columns = {axes[0]: (radius + rest) * np.cos(angles), axes[1]: (radius + rest) * np.sin(angles)}
@@ -135,10 +135,10 @@ def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: 
                 f"{what} has steps of {step * 1e6:.4g} um, the radial deviation ranges over {span * 1e6:.4g} um: "
                 "nothing smaller than a step can be diagnosed",
             ))  # fmt: skip
-    return Checked(keep, tuple(doubts))
+    return CheckedTurn(keep, tuple(doubts))
 
 
-def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
+def _find_outliers(turned: Array, deviation: Array) -> NDArray[np.bool_]:
     """Rows that stand out alone, one or two beside each other."""
     padded = np.pad(deviation, OUTLIER_NEIGHBOURS, mode="edge")
     median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * OUTLIER_NEIGHBOURS + 1), axis=1)
@@ -156,7 +156,7 @@ def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
     return alone
 
 
-def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterator[Finding]:
+def _report_spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterator[Finding]:
     rows = np.flatnonzero(~keep)
     if rows.size:
         worst = int(rows[np.argmax(np.abs(deviation[rows] - np.median(deviation)))])
@@ -169,7 +169,7 @@ def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterato
         )  # fmt: skip
 
 
-def _missing(turned: Array) -> Iterator[Finding]:
+def _report_gaps(turned: Array) -> Iterator[Finding]:
     steps = np.abs(np.diff(turned))
     usual = float(np.median(steps))
     for row in np.flatnonzero((steps > GAP_STEPS * usual) & (steps > GAP_ANGLE)):
@@ -237,12 +237,12 @@ def _degrees(angle: float) -> str:
 # reading at fading_tails() and known_tails().
 
 
-NEXT = 4.0  # angle of the means [deg] between the windows
+MEANS_ANGLE = 4.0  # angle of the means [deg] between the windows
 # What a peak leaves at the end of its window may be off by this multiple of what the window shows; less than the floor
 # [m] is not looked at. Angles in which it may fall to 1/e [deg].
 TAIL, TAIL_FLOOR = 2.0, 10e-9
-DECAYS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 21.0, 25.0, 30.0)
-FALLEN = 2.0  # angle of the means [deg] that say where a peak has fallen to half its height
+DECAY_ANGLES = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 21.0, 25.0, 30.0)
+HALF_HEIGHT_ANGLE = 2.0  # angle of the means [deg] that say where a peak has fallen to half its height
 # Of known responses: the angle in which friction turns round [deg]; points of a turn.
 TURNS, PERIOD = 10.0, 2048
 # Friction rises with the logarithm of 1 + v/RISE_SPEED [m/s] of the slide, by this share of its size at rest for every
@@ -269,8 +269,8 @@ def what_is_left(
     where the peak has fallen to half on. usual: of means elsewhere, above which a peak must stand [m]. A
     tail is one that is more than what the exponential leaves of the means.
     """
-    width = math.radians(FALLEN)
-    decays = np.radians(DECAYS)[:, None]
+    width = math.radians(HALF_HEIGHT_ANGLE)
+    decays = np.radians(DECAY_ANGLES)[:, None]
     result = [(0.0, 0.0)] * 4
     for axis in (0, 1):
         sizes: dict[int, Array] = {}
@@ -280,7 +280,7 @@ def what_is_left(
             part = np.floor(since[own] / width).astype(int)
             means = np.bincount(part, residual[own] / np.cos(since[own])) / np.maximum(np.bincount(part), 1)
             top = int(np.abs(means).argmax()) if len(means) else 0
-            if len(means) == 0 or abs(means[top]) <= NEXT * usual:
+            if len(means) == 0 or abs(means[top]) <= MEANS_ANGLE * usual:
                 continue
             means *= np.sign(means[top])
             fallen = top + np.flatnonzero(means[top:] < 0.5 * means[top])
@@ -300,7 +300,10 @@ def what_is_left(
 
 
 def fading_tails(
-    undone: Sequence[Undone], paths: Sequence[TurnedPath], remaining: Sequence[tuple[float, float]], window: float
+    undone: Sequence[CorrectedPath],
+    paths: Sequence[TurnedPath],
+    remaining: Sequence[tuple[float, float]],
+    window: float,
 ) -> Tails:
     """Tails of the peaks at the half axes; both senses share one: the axis reverses there from the same way.
 
@@ -324,7 +327,7 @@ def fading_tails(
 
 def known_tails(
     circle: CircleUnderTest,
-    undone: Sequence[Undone],
+    undone: Sequence[CorrectedPath],
     paths: Sequence[TurnedPath],
     residual: Array,
     which: NDArray[np.int64],

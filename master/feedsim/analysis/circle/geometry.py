@@ -1,6 +1,6 @@
 """A circle that is measured, and what displaces its points: the ellipse, lost motion and pitch errors.
 
-model.py has the equations. Start reading at undo(), which takes known displacements off a path.
+model.py has the equations. Start reading at correct_path(), which takes known displacements off a path.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ COURSE_POINTS = 1024
 MAX_TURN_SAMPLES = 8000
 ANGLE_TERMS = ("angle", "angle_cos", "angle_sin")  # terms that written angles may be larger by
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
-CLOSED = 0.01
+CLOSED_TURN_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class CircleUnderTest:
 
 # What moves the points of a path for 1 m of a term, as it follows from time and turn alone: name -> number of the axis,
 # None where the radius grows, and the displacement (N,) [m].
-Moved = Mapping[str, tuple[int | None, Array]]
+AxisDisplacements = Mapping[str, tuple[int | None, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class TurnedPath:
     def covered(self) -> float:
         """The angle of the path [rad]: 2 pi of a full turn, less of an arc."""
         covered = float(self.turned[-1])
-        return 2 * math.pi if covered > 2 * math.pi * (1 - CLOSED) else covered
+        return 2 * math.pi if covered > 2 * math.pi * (1 - CLOSED_TURN_TOLERANCE) else covered
 
     @property
     def whole(self) -> bool:
@@ -97,7 +97,7 @@ class TurnedPath:
 
 
 @dataclass(frozen=True, eq=False)
-class Undone:
+class CorrectedPath:
     """A path with its distortion undone: angle [rad] and deviation of the radius [m]; measured positions (2, N) [m],
     where the axes reverse at their half axis + [rad], and what moved the centre."""
 
@@ -105,7 +105,7 @@ class Undone:
     angle: Array
     deviation: Array
     turned: tuple[float, float]
-    moved: Moved
+    moved: AxisDisplacements
 
 
 def enough_pitches(circle: CircleUnderTest, axis: str, pitches: float = PITCHES) -> bool:
@@ -113,7 +113,7 @@ def enough_pitches(circle: CircleUnderTest, axis: str, pitches: float = PITCHES)
     return axis in circle.pitch and 2 * circle.radius >= pitches * circle.pitch[axis]
 
 
-def followed(circle: CircleUnderTest, i: int, angle: Array, positions: Array, sense: int) -> tuple[Array, Array]:
+def follow_errors(circle: CircleUnderTest, i: int, angle: Array, positions: Array, sense: int) -> tuple[Array, Array]:
     """What axis ``i`` does of errors cos(2 pi x/p) and sin(2 pi x/p) of its measured position at angles (N,) [rad] of a
     turn, x its positions (N,) [m]: 1 m of each, as far as the loops follow, where their response is known."""
     axis = circle.axes[i]
@@ -133,9 +133,9 @@ def followed(circle: CircleUnderTest, i: int, angle: Array, positions: Array, se
     return courses[0], courses[1] * (sense if i else 1)
 
 
-def undo(
-    circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], by_program: bool, moved: Moved
-) -> Undone:
+def correct_path(
+    circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], by_program: bool, moved: AxisDisplacements
+) -> CorrectedPath:
     """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse.
 
     values: of the terms [m]. by_program: its angles are the programmed ones, unless both axes' positions were measured.
@@ -170,7 +170,7 @@ def undo(
         p[axis] -= of(name) * displacement
     plain = np.linalg.solve(distortion, p)
     radius = np.hypot(plain[0], plain[1])
-    return Undone(positions, np.arctan2(plain[1], plain[0]), radius - circle.radius, turned, moved)
+    return CorrectedPath(positions, np.arctan2(plain[1], plain[0]), radius - circle.radius, turned, moved)
 
 
 def angle_waves(path: TurnedPath) -> dict[str, Array]:
@@ -203,7 +203,7 @@ def displacements(
             result[f"lost_{i}"] = (i, 0.5 * side)
     for i, axis in enumerate(circle.axes):
         if axis in circle.pitch:
-            cos, sin = followed(circle, i, angle, positions[i], sense)
+            cos, sin = follow_errors(circle, i, angle, positions[i], sense)
             result[f"pitch_{i}_cos"], result[f"pitch_{i}_sin"] = (i, cos), (i, sin)
     if circle.recorded:
         u, w = positions / circle.radius
@@ -212,7 +212,7 @@ def displacements(
 
 
 def columns_of(
-    circle: CircleUnderTest, path: TurnedPath, undone: Undone, both: bool, values: Mapping[str, float]
+    circle: CircleUnderTest, path: TurnedPath, undone: CorrectedPath, both: bool, values: Mapping[str, float]
 ) -> dict[str, Array]:
     """Radial deviation for 1 m of every term; ``both`` senses are there to separate a delay from an angle."""
     angle, sense = undone.angle, path.sense

@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.doubts import NEXT, Tails, fading_tails, known_tails, what_is_left
+from feedsim.analysis.circle.doubts import MEANS_ANGLE, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.circle.geometry import (
     ANGLE_TERMS,
     FEWEST_PITCHES,
@@ -44,20 +44,27 @@ from feedsim.analysis.circle.geometry import (
     PLAY,
     PLAYED,
     CircleUnderTest,
+    CorrectedPath,
     TurnedPath,
-    Undone,
     columns_of,
+    correct_path,
     enough_pitches,
-    undo,
 )
 from feedsim.analysis.circle.setup import Offset, angle_offset, axle_by_clock, form_waves, set_up_moves
 from feedsim.analysis.figures import Array
-from feedsim.estimation.least_squares import CHANGE_FLOOR, covariance_of, pair_quantile, robust_fit, rounding, student
+from feedsim.estimation.least_squares import (
+    CHANGE_FLOOR,
+    covariance_of,
+    pair_quantile,
+    robust_fit,
+    rounding_columns,
+    student,
+)
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
 ANGLE_AHEAD, ANGLES_BEHIND = 2.0, (30.0, 45.0, 60.0)
 # Just behind the window the deviation is calm if it is below this share of the peak, or not larger than noise makes it.
-CALM = 0.05
+CALM_SHARE = 0.05
 # The same where the angles may be off by as much [deg]: edges are looked for within.
 EDGE_SEARCH_ANGLES = 10.0, 40.0
 # Of the difference in third order that bent guides show, what their sum may add to the squareness.
@@ -65,7 +72,7 @@ THIRD_ORDER_SHARE = 0.45
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK_ANGLE = 6.0
 # Friction is no clean step: the response to it outside the windows is known to this share.
-KNOWN = 0.1
+RESPONSE_TOLERANCE = 0.1
 # Before it slides, friction is elastic, and no step at all: of a peak this share may look like lost motion. Between the
 # reversals it changes with the speed: of the largest peak this share may look like any term.
 # Where nothing is known of the drive, what winds up beside a peak may be this share of it.
@@ -184,7 +191,7 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     if not circle.recorded:
         return _fit_with_lengths(circle, paths, {})
     still = dict.fromkeys(ANGLE_TERMS, (0.0, CHANGE_FLOOR))
-    wide = _fit(circle, paths, Left(*np.radians(EDGE_SEARCH_ANGLES)), Shape(known=still))
+    wide = _fit(circle, paths, ExcludedAngles(*np.radians(EDGE_SEARCH_ANGLES)), Shape(known=still))
     lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
     signals = [residual + step for residual, step in zip(wide.residual, lost, strict=True)]
     axle = axle_by_clock(paths, np.array([wide["offset_0"], wide["offset_1"]]), circle.radius)
@@ -194,18 +201,18 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     return replace(_fit_with_lengths(circle, paths, dict(zip(still, lengths, strict=True))), offset=offset)
 
 
-def _fit_with_lengths(circle: CircleUnderTest, paths: Sequence[TurnedPath], known: Known) -> Fit:
+def _fit_with_lengths(circle: CircleUnderTest, paths: Sequence[TurnedPath], known: KnownTerms) -> Fit:
     """With what is known of terms beforehand."""
-    pitched = _pitched(circle, paths, Shape(known=known))
+    pitched = _fit_pitch_errors(circle, paths, Shape(known=known))
     moved = sum(math.hypot(pitched[a], pitched[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
     moved += abs(pitched["squareness"])
     if all(path.phase is not None for path in paths) or moved**2 < circle.radius * PROGRAMMED_TOLERANCE:
         return pitched
-    other = _pitched(circle, paths, Shape(by_program=True, known=known))
+    other = _fit_pitch_errors(circle, paths, Shape(by_program=True, known=known))
     return other if other.noise < pitched.noise else pitched
 
 
-class Left(NamedTuple):
+class ExcludedAngles(NamedTuple):
     """Angles ahead of a reversal and behind it that are left out [rad]."""
 
     ahead: float
@@ -213,7 +220,7 @@ class Left(NamedTuple):
 
 
 # What is known of terms beforehand: name -> value and standard deviation [m].
-Known = Mapping[str, tuple[float, float]]
+KnownTerms = Mapping[str, tuple[float, float]]
 
 
 class Shape(NamedTuple):
@@ -223,20 +230,20 @@ class Shape(NamedTuple):
     by_program: bool = False
     play: bool = False
     pitches: bool = False
-    known: Known = MappingProxyType({})
+    known: KnownTerms = MappingProxyType({})
 
 
-def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
+def _fit_pitch_errors(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     """Without errors that hardly repeat between two windows, unless they make all of it much clearer.
 
     Where they do not, friction's response may look like them, or they like other terms: what they would move these is
     part of the intervals. Of fewer than PITCHES they are no terms, but are kept out of the others.
     """
-    shaped = _shaped(circle, paths, shape)
+    shaped = _fit_lost_motion(circle, paths, shape)
     least = PITCHES if shaped.noise < CLEAR_NOISE else FEWEST_PITCHES
     if not any(enough_pitches(circle, axis, least) for axis in shaped.left_out):
         return shaped
-    other = _shaped(circle, paths, shape._replace(pitches=True))
+    other = _fit_lost_motion(circle, paths, shape._replace(pitches=True))
     if other.noise < CLEARER * shaped.noise:
         return other
     if not any(enough_pitches(circle, axis) for axis in shaped.left_out):
@@ -245,30 +252,30 @@ def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape)
     return replace(shaped, covariance=shaped.covariance + np.outer(moved, moved))
 
 
-def _shaped(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
+def _fit_lost_motion(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     """Lost motion as a step, or as play that is used up first, whichever leaves less behind the reversals."""
-    windowed = _windowed(circle, paths, shape)
+    windowed = _fit_windows(circle, paths, shape)
     if max(windowed["lost_0"], windowed["lost_1"]) < PLAY:
         return windowed
-    other = _windowed(circle, paths, shape._replace(play=True))
-    return other if _behind(other) < _behind(windowed) else windowed
+    other = _fit_windows(circle, paths, shape._replace(play=True))
+    return other if _squares_behind_reversals(other) < _squares_behind_reversals(windowed) else windowed
 
 
-def _behind(result: Fit) -> float:
+def _squares_behind_reversals(result: Fit) -> float:
     """What is left behind the reversals, in squares [m2]."""
     return sum(float((off[which >= 0] ** 2).sum()) for off, which in zip(result.residual, result.reversal, strict=True))
 
 
-def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
+def _fit_windows(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     for degrees in ANGLES_BEHIND:
-        result = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(degrees)), shape)
-        if _calm(result):
+        result = _fit(circle, paths, ExcludedAngles(math.radians(ANGLE_AHEAD), math.radians(degrees)), shape)
+        if _are_peaks_decayed(result):
             break
     if not (circle.recorded and result.whole):
         return result
     # Nobody knows how the peaks of a recorded machine die away.
     beside = ANGLES_BEHIND[2 if degrees == ANGLES_BEHIND[1] else 1]
-    other = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(beside)), shape)
+    other = _fit(circle, paths, ExcludedAngles(math.radians(ANGLE_AHEAD), math.radians(beside)), shape)
     return replace(result, moved=result.values - other.values)
 
 
@@ -279,7 +286,7 @@ def separating_radius(circle: CircleUnderTest, axes: Sequence[str]) -> float:
     return max(PITCHES / 2, REPEATS / free if circle.drag else 0.0) * pitch
 
 
-def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape: Shape) -> Fit:
+def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: ExcludedAngles, shape: Shape) -> Fit:
     window = out.behind
     both, whole = len({path.sense for path in paths}) == 2, all(path.whole for path in paths)
     asked = [axis for axis in circle.axes if axis in circle.pitch]
@@ -300,7 +307,10 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     tails = Tails(np.empty((sum(len(path.angle) for path in paths), 0)), np.empty(0))
     residual: Array = np.empty(0)
     for number in range(MAX_WINDOW_PASSES):
-        undone = [undo(circle, path, values, shape.by_program, moved) for path, moved in zip(paths, moves, strict=True)]
+        undone = [
+            correct_path(circle, path, values, shape.by_program, moved)
+            for path, moved in zip(paths, moves, strict=True)
+        ]
         parts = [columns_of(circle, path, value, both, values) for value, path in zip(undone, paths, strict=True)]
         windows = [_windows(value, path.sense, out) for value, path in zip(undone, paths, strict=True)]
         arc = [name for name in parts[0] if name not in ESSENTIAL and not whole]
@@ -313,7 +323,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         kept = which < 0
         if number == 2:  # the ellipse is undone, so that the windows show the peaks alone
             angles, clear = [entry.angle for entry in undone], [reversal < 0 for reversal, _ in windows]
-            usual = _usual(angles, np.split(residual, ends), [reversal for reversal, _ in windows])
+            usual = _deviation_of_means(angles, np.split(residual, ends), [reversal for reversal, _ in windows])
             tails = (
                 known_tails(circle, undone, paths, residual, which)
                 if all(axis in circle.drag for axis in circle.axes)
@@ -340,7 +350,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         if number > 1 and float(np.abs(step).max()) < CHANGE_FLOOR:
             break
     tail = tails.columns @ robust.values[len(names) :]
-    rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
+    rounded = rounding_columns([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
     covariance, count = covariance_of(
         fitted,
         (residual - tail)[kept],
@@ -374,17 +384,17 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
             for i in (0, 1)
             if wound
         },
-        unsure=_unsure(circle, tail[kept], residual[~kept], window),
+        unsure=_tail_uncertainty(circle, tail[kept], residual[~kept], window),
         tails=tuple(np.split(tails.columns, ends)),
         whole=whole,
     )
 
 
-def _unsure(circle: CircleUnderTest, tail: Array, peaks: Array, window: float) -> float:
+def _tail_uncertainty(circle: CircleUnderTest, tail: Array, peaks: Array, window: float) -> float:
     """What a term may be off by, as nobody knows how a peak dies away [m]. tail, peaks: behind the windows, in them."""
     if len(circle.drag) == 2:
         largest = float(np.abs(peaks).max(initial=0.0))
-        return math.hypot(KNOWN * float(np.abs(tail).max(initial=0.0)), SPEED_SHARE * largest)
+        return math.hypot(RESPONSE_TOLERANCE * float(np.abs(tail).max(initial=0.0)), SPEED_SHARE * largest)
     if not circle.recorded:
         return 0.0
     passed = window * circle.radius / circle.speed
@@ -396,7 +406,7 @@ def blocks_of(angles: Sequence[Array]) -> Array:
     return np.concatenate([1000 * k + np.floor(angle / math.radians(BLOCK_ANGLE)) for k, angle in enumerate(angles)])
 
 
-def _windows(undone: Undone, sense: int, out: Left) -> tuple[NDArray[np.int64], Array]:
+def _windows(undone: CorrectedPath, sense: int, out: ExcludedAngles) -> tuple[NDArray[np.int64], Array]:
     """Behind which reversal each sample is, -1 where behind none, and the angle since then [rad]."""
     which = np.full(len(undone.angle), -1)
     since = np.full(len(undone.angle), math.inf)
@@ -408,21 +418,23 @@ def _windows(undone: Undone, sense: int, out: Left) -> tuple[NDArray[np.int64], 
     return which, since
 
 
-def _usual(angles: Sequence[Array], residuals: Sequence[Array], reversals: Sequence[NDArray[np.int64]]) -> float:
+def _deviation_of_means(
+    angles: Sequence[Array], residuals: Sequence[Array], reversals: Sequence[NDArray[np.int64]]
+) -> float:
     """Standard deviation of the means over NEXT of what is left between the windows [m]."""
     around = []
     for angle, residual, which in zip(angles, residuals, reversals, strict=True):
-        _, block = np.unique(np.floor(angle[which < 0] / math.radians(NEXT)), return_inverse=True)
+        _, block = np.unique(np.floor(angle[which < 0] / math.radians(MEANS_ANGLE)), return_inverse=True)
         around.append(np.bincount(block, residual[which < 0]) / np.bincount(block))
     return float(np.median(np.abs(np.concatenate(around)))) / 0.6745
 
 
-def _calm(result: Fit) -> bool:
+def _are_peaks_decayed(result: Fit) -> bool:
     """Whether the peaks have died away where their windows end, as far as noise and what else is left let one see."""
-    width = math.radians(NEXT)
+    width = math.radians(MEANS_ANGLE)
     off = [residual - tail for residual, tail in zip(result.residual, result.tail, strict=True)]
     # What repeats all the way round, a pitch error or form, is no tail of a peak, however much a window leaves out.
-    usual = _usual(result.angle, off, result.reversal)
+    usual = _deviation_of_means(result.angle, off, result.reversal)
     for angle, residual, which, since in zip(result.angle, off, result.reversal, result.since, strict=True):
         for k in range(4):
             own = which == k
@@ -434,6 +446,6 @@ def _calm(result: Fit) -> bool:
             if not next_.any():
                 continue
             remaining = abs(float(residual[next_].mean()))
-            if remaining > max(CALM * float(np.abs(residual[own]).max()), 4 * usual):
+            if remaining > max(CALM_SHARE * float(np.abs(residual[own]).max()), 4 * usual):
                 return False
     return True

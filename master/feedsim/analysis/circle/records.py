@@ -21,20 +21,20 @@ from feedsim.analysis.circle.doubts import (
     OFF_FEED,
     check_feed,
     check_radius,
-    checked,
+    check_turn,
     longest_run,
     unusual_feed,
     unusual_radius,
 )
-from feedsim.analysis.circle.geometry import CLOSED, CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.geometry import CLOSED_TURN_TOLERANCE, CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.files.columns import Columns
 from feedsim.files.trace import Recording, read_recording
-from feedsim.files.trace.recording import mapped
+from feedsim.files.trace.recording import map_columns
 from feedsim.foundation import units
-from feedsim.foundation.errors import Finding, InputError, few
-from feedsim.foundation.units import spelled
+from feedsim.foundation.errors import Finding, InputError, shorten_list
+from feedsim.foundation.units import spell_unit
 from feedsim.motions.circular import SENSE_WORDS
 
 # --- Radius and feed that an instrument writes ahead of the columns of a circle, such as "Radius: 150 mm" -------------
@@ -80,7 +80,7 @@ def header_values(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
             unit = (match["before"] or match["behind"] or "").strip()
             value = float(match["value"].replace(",", "."))
             try:
-                size = value * float(units.factor(spelled(unit), kind)) if unit else None
+                size = value * float(units.factor(spell_unit(unit), kind)) if unit else None
             except InputError:
                 size = None
             if what == "diameter":
@@ -94,7 +94,7 @@ def header_values(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
     return values, notes
 
 
-class Told:
+class HeaderValues:
     """What the headers of several files give of one circle. given: what is known without them; notes, doubts: words."""
 
     def __init__(self, radius: float | None, feed: float | None) -> None:
@@ -110,12 +110,12 @@ class Told:
         for what, value in values.items():
             if self._given[what] is not None:
                 continue
-            self.notes.append(f"{file}: the {what} is {_shown(what, value)}, as its header says")
+            self.notes.append(f"{file}: the {what} is {_value_text(what, value)}, as its header says")
             first, other = self._ahead.setdefault(what, (file, value))
             if abs(other / value - 1) > 1e-9:
                 raise InputError(
-                    f"{file}: its header gives a {what} of {_shown(what, value)}, that of {first} one of "
-                    f"{_shown(what, other)}; give files of one circle"
+                    f"{file}: its header gives a {what} of {_value_text(what, value)}, that of {first} one of "
+                    f"{_value_text(what, other)}; give files of one circle"
                 )
 
     @property
@@ -132,7 +132,7 @@ class Told:
         return self._ahead[what][1] if what in self._ahead else self._given[what]
 
 
-def _shown(what: str, value: float) -> str:
+def _value_text(what: str, value: float) -> str:
     return f"{value * 1e3:.6g} mm" if what == "radius" else f"{value * 6e4:.6g} mm/min"
 
 
@@ -151,7 +151,7 @@ LEAST_RADIUS = 1e-3  # [m]; where a name does not say, what is never less is a r
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
 # An axis that moves by less than this share of what the others do rests.
-RESTING = 0.05
+RESTING_AXIS_SHARE = 0.05
 # Turns whose feeds differ by more than this share are of different circles: path lag and peaks grow with the feed.
 SAME_FEED = 0.02
 # A turn needs so many samples for its parts to be separated, an arc its share of them.
@@ -212,9 +212,9 @@ def read_circle(
     timed: list[tuple[Path, RecordedTurn, float]] = []
     radii: list[float] = []
     days: list[str] = []
-    headers = Told(radius, feed)
+    headers = HeaderValues(radius, feed)
     for file in files:
-        recording = mapped(read_recording(file), mappings)
+        recording = map_columns(read_recording(file), mappings)
         days += filter(None, [recording.day])
         headers.add(file, recording.remarks)
         radius = headers.radius
@@ -275,15 +275,15 @@ def _one_feed(timed: Sequence[tuple[Path, RecordedTurn, float]], radius: float) 
         )
 
 
-def _plain(name: str) -> str:
+def _plain_name(name: str) -> str:
     return " ".join(re.split(r"[\s_-]+", name.strip().lower()))
 
 
 def _column(recording: Recording, names: Sequence[str], unit: str) -> str | None:
     """The column that has one of these names and a unit of this kind; None where there is none."""
     for name in recording.names:
-        if _plain(name) in names:
-            if not _is(recording, name, unit):
+        if _plain_name(name) in names:
+            if not _has_unit(recording, name, unit):
                 raise InputError(
                     f"{recording.header}: column {name!r} is in {recording.units[name] or 'no unit'}; one such as "
                     f"{name} [{unit}] is needed"
@@ -294,20 +294,20 @@ def _column(recording: Recording, names: Sequence[str], unit: str) -> str | None
 
 def _only(recording: Recording, unit: str) -> str | None:
     """The one column that has a unit of this kind, whatever its name is; None where there is none or a choice."""
-    result = [name for name in recording.names if _is(recording, name, unit)]
+    result = [name for name in recording.names if _has_unit(recording, name, unit)]
     return result[0] if len(result) == 1 else None
 
 
-def _is(recording: Recording, name: str, unit: str) -> bool:
+def _has_unit(recording: Recording, name: str, unit: str) -> bool:
     try:
-        units.factor(spelled(recording.units[name]) or "1", unit)
+        units.factor(spell_unit(recording.units[name]) or "1", unit)
     except InputError:
         return False
     return bool(recording.units[name])
 
 
 def _values(recording: Recording, name: str, unit: str) -> Array:
-    factor = float(units.factor(spelled(recording.units[name]), unit))
+    factor = float(units.factor(spell_unit(recording.units[name]), unit))
     return np.asarray(recording.read([name])[name], dtype=np.float64) * factor
 
 
@@ -335,13 +335,13 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
         if deviation is None and radius is None:
             return angle, length, float(np.abs(_values(recording, length, "m")).min()) > LEAST_RADIUS
         return angle, length, deviation is None
-    has = few([f"{name} [{unit}]" if unit else name for name, unit in recording.units.items()], 20)
-    if all(_plain(name) in (*units.UNIT_SYMBOLS, *units.ALIASES) for name in recording.names):
+    has = shorten_list([f"{name} [{unit}]" if unit else name for name, unit in recording.units.items()], 20)
+    if all(_plain_name(name) in (*units.UNIT_SYMBOLS, *units.ALIASES) for name in recording.names):
         raise InputError(
             f"{recording.header}: is a row of units, {has}; needed is one row of names with their units, such as "
             "Angle [deg] and Deviation [um], and no other row between it and the values"
         )
-    lengths = [name for name in recording.names if _is(recording, name, "m")]
+    lengths = [name for name in recording.names if _has_unit(recording, name, "m")]
     one, other = lengths[:2] if len(lengths) > 1 else ("...", "...")
     raise InputError(
         f"{recording.header}: holds {has}; needed are positions of both axes ({axes[0]} [mm], {axes[1]} [mm]; --axes "
@@ -356,9 +356,9 @@ def _position(recording: Recording, axis: str) -> str | None:
     """The column of an axis' position: one that is called so, else the only length that has the axis as a word."""
     letter = axis.lower()
     names = (letter, f"{letter}.x a", f"{letter} position", f"position {letter}")
-    lengths = [name for name in recording.names if _is(recording, name, "m")]
-    called = [name for name in lengths if _plain(name) in names]
-    of_axis = [name for name in lengths if letter in re.findall(r"\w+", _plain(name))]
+    lengths = [name for name in recording.names if _has_unit(recording, name, "m")]
+    called = [name for name in lengths if _plain_name(name) in names]
+    of_axis = [name for name in lengths if letter in re.findall(r"\w+", _plain_name(name))]
     return called[0] if called else of_axis[0] if len(of_axis) == 1 else None
 
 
@@ -378,7 +378,7 @@ def _of_positions(
     _refuse_resting(recording, positions, axes)
     about, mean = fitted_circle(x, y)
     on = None
-    if not _whole(np.unwrap(np.arctan2(y - about[1], x - about[0]))):
+    if not _is_full_turn(np.unwrap(np.arctan2(y - about[1], x - about[0]))):
         about, on = _arc(x, y)
     for _ in range(2):  # the first fit may hold a way to the circle; the second one holds turns alone
         u, w = x - about[0], y - about[1]
@@ -391,7 +391,7 @@ def _of_positions(
     nominal = radius if radius is not None else mean
     u, w = x - about[0], y - about[1]
     angle, deviation = np.arctan2(w, u), np.hypot(u, w) - nominal
-    return _named(recording, angle, deviation, _time(recording), nominal, axes, on), mean
+    return _record_circle(recording, angle, deviation, _time(recording), nominal, axes, on), mean
 
 
 def _arc(x: Array, y: Array) -> tuple[tuple[float, float], NDArray[np.bool_]]:
@@ -411,9 +411,9 @@ def _refuse_resting(recording: Recording, positions: tuple[Array, Array], axes: 
     spans = {axis: float(np.ptp(values)) for axis, values in zip(axes, positions, strict=True)}
     for name in recording.names:
         letter = re.fullmatch(r"([A-Za-z][A-Za-z0-9]?)(\.x_a)?", name)
-        if letter and letter[1] not in spans and _is(recording, name, "m"):
+        if letter and letter[1] not in spans and _has_unit(recording, name, "m"):
             spans[letter[1]] = float(np.ptp(_values(recording, name, "m")))
-    moving = [axis for axis, span in spans.items() if span > RESTING * max(spans.values())]
+    moving = [axis for axis, span in spans.items() if span > RESTING_AXIS_SHARE * max(spans.values())]
     if (rests := [axis for axis in axes if axis not in moving]) and len(moving) == 2:
         raise InputError(
             f"{recording.path}: axis {rests[0]} rests; {moving[0]} and {moving[1]} move: --axes {','.join(moving)}"
@@ -425,7 +425,7 @@ def _of_angles(
 ) -> tuple[list[RecordedTurn], float]:
     phi = _values(recording, angle, "rad")
     deviation, mean = _deviation(recording, column, is_radius, radius)
-    return _named(recording, phi, deviation, _time(recording), mean if radius is None else radius), mean
+    return _record_circle(recording, phi, deviation, _time(recording), mean if radius is None else radius), mean
 
 
 def _beside_each_other(recording: Recording) -> tuple[str, Mapping[int, str]] | None:
@@ -446,7 +446,7 @@ def _of_both(
         is_radius = float(np.abs(_values(recording, name, "m")).min()) > LEAST_RADIUS
         deviation, mean = _deviation(recording, name, is_radius, radius)
         order = slice(None, None, 1 if sense * (phi[-1] - phi[0]) > 0 else -1)
-        turns += _named(recording, phi[order], deviation[order], None, mean if radius is None else radius)
+        turns += _record_circle(recording, phi[order], deviation[order], None, mean if radius is None else radius)
     return turns, mean
 
 
@@ -470,7 +470,7 @@ def _deviation(recording: Recording, column: str, is_radius: bool, radius: float
     return deviation, mean
 
 
-def _named(
+def _record_circle(
     recording: Recording,
     angle: Array,
     deviation: Array,
@@ -497,7 +497,7 @@ def _named(
             begin = float(time[rows][0])
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
             clock = (time[rows] - begin) * (2 * math.pi / duration)
-        reported = checked(angle[rows], deviation[rows], radius, axes is not None, axes or ("", ""))
+        reported = check_turn(angle[rows], deviation[rows], radius, axes is not None, axes or ("", ""))
         kept = reported.keep
         clock = None if clock is None else clock[kept]
         path = TurnedPath(
@@ -513,10 +513,10 @@ def _named(
     return recorded_turns
 
 
-def _whole(angle: Array) -> bool:
+def _is_full_turn(angle: Array) -> bool:
     """Whether a stretch in one direction is a full turn. angle: unwrapped (N,) [rad]."""
     most = max((abs(float(angle[last - 1] - angle[first])) for first, last in _stretches(angle)), default=0.0)
-    return most >= 2 * math.pi * (1 - CLOSED)
+    return most >= 2 * math.pi * (1 - CLOSED_TURN_TOLERANCE)
 
 
 def _turns(
@@ -524,8 +524,8 @@ def _turns(
 ) -> list[tuple[slice, int]]:
     """The middle full turn of every stretch in one direction, or, where there is none, every stretch that is an arc;
     and its sense. angle: unwrapped (N,) [rad]; time: (N,) [s]. on: which rows are on the circle (N,); None: all."""
-    whole = _whole(angle)
-    least_angle, most = 2 * math.pi * (1 - CLOSED) if whole else MIN_ARC, 0.0
+    whole = _is_full_turn(angle)
+    least_angle, most = 2 * math.pi * (1 - CLOSED_TURN_TOLERANCE) if whole else MIN_ARC, 0.0
     result = []
     for first, last in _stretches(angle):
         if on is not None and not whole:
@@ -540,7 +540,7 @@ def _turns(
             begin = max((end - 2 * math.pi) / 2, 0.0)
             end = min(end, begin + 2 * math.pi)
         elif time is not None and end >= MIN_ARC:
-            begin, end = _even(turned, time[first:last])
+            begin, end = _steady_arc(turned, time[first:last])
         most = max(most, end - begin)
         if end - begin < least_angle:
             continue
@@ -559,7 +559,7 @@ def _turns(
     return result
 
 
-def _even(turned: Array, time: Array) -> tuple[float, float]:
+def _steady_arc(turned: Array, time: Array) -> tuple[float, float]:
     """Where an arc begins and ends [rad] that is driven at its usual speed: without the ways from rest and to rest.
 
     turned: the angle that rises along the arc (N,) [rad].

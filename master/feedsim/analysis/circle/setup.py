@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.doubts import Tails
-from feedsim.analysis.circle.geometry import Moved, TurnedPath
+from feedsim.analysis.circle.geometry import AxisDisplacements, TurnedPath
 from feedsim.analysis.figures import Array
 
 # Angles [deg]: over which means are compared for an edge, how far it may be off its place, how far apart places are
@@ -56,11 +56,11 @@ class Offset(NamedTuple):
     at_reversals: tuple[float, float, float, float]
 
 
-def set_up_moves(paths: Sequence[TurnedPath]) -> list[Moved]:
+def set_up_moves(paths: Sequence[TurnedPath]) -> list[AxisDisplacements]:
     """Of every path: the centre's way in a turn, ("drift_0", "drift_1"), 0 in its middle, and of each path but the
     first how far its centre lies from that of the first, ("centre_1_0", "centre_1_1"), and how much larger its radius
     is ("radius_1"), about the mean of all paths."""
-    result: list[Moved] = []
+    result: list[AxisDisplacements] = []
     for k, path in enumerate(paths):
         passed = (path.turned - path.covered / 2) / (2 * math.pi)
         own: dict[str, tuple[int | None, Array]] = {f"drift_{i}": (i, passed) for i in (0, 1)}
@@ -109,7 +109,7 @@ def angle_offset(
         calm.append(jumps[quiet])
         for which in range(4):
             at = which * math.pi / 2 + path.sense * places
-            if not _within(path, angle, at[near]).all():
+            if not _covered_angles(path, angle, at[near]).all():
                 continue
             edge = path.sense * np.interp(at, even, jumps, period=2 * math.pi)
             edges.setdefault((which, path.sense), []).append(edge)
@@ -168,7 +168,7 @@ def _offset(edges: Sequence[tuple[int, float, float]], axle: tuple[Array, Array]
     )
 
 
-def _within(path: TurnedPath, angle: Array, at: NDArray[np.floating]) -> NDArray[np.bool_]:
+def _covered_angles(path: TurnedPath, angle: Array, at: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Which of ``at`` (M,) [rad] a path of angles (N,) reaches (M,)."""
     return np.asarray(path.whole | (path.sense * (at - angle[0]) % (2 * math.pi) <= path.covered))
 
@@ -183,7 +183,7 @@ def _jumps(
     order = np.argsort(angle)
     values = np.interp(even, angle[order], signal[order], period=2 * math.pi)
     clear = np.interp(even, angle[order], free[order].astype(float), period=2 * math.pi)
-    clear *= _within(path, angle, even)
+    clear *= _covered_angles(path, angle, even)
     width = round(EDGE_ANGLE / ANGLE_STEP)
     total = np.concatenate([[0.0], np.cumsum(np.concatenate([values, values, values]))])
     at = np.arange(count) + count

@@ -15,7 +15,7 @@ from feedsim.analysis.figures import Array
 # Of a cause that makes less of G, and of the largest deviation, there is no sentence.
 SHARE_NAMED = 0.05
 # Noise that is this share of G leaves little to diagnose.
-NOISY = 0.3
+NOISE_SHARE = 0.3
 # An angle of the written angles [rad], and what they make uncertain [m], of which there is a word.
 ANGLE, UNCERTAIN = math.radians(0.5), 0.2e-6
 # Rate of a turn [rad/s] at which peaks of friction die away well within a quarter turn.
@@ -28,7 +28,7 @@ MIN_CERTAINTY = 2.0
 CONTRADICT = 0.5
 
 
-def answer(diagnosis: Diagnosis, remedy: str = "") -> str:
+def explain_circle(diagnosis: Diagnosis, remedy: str = "") -> str:
     """Why the circle is not round: quantity and value, the main cause with its size, the remedy.
 
     remedy: of the main cause, where more is known of the machine than the circle shows.
@@ -44,20 +44,20 @@ def answer(diagnosis: Diagnosis, remedy: str = "") -> str:
             "counterclockwise, angles that fall as clockwise. Reverse the rows of that turn, or give each by itself."
         )
     if not terms:
-        return f"{G}. No single cause stands out; {_um(_rest(diagnosis).size)} remain unexplained."
-    what, own_remedy = described(diagnosis, terms[0])
+        return f"{G}. No single cause stands out; {_um(_rest_term(diagnosis).size)} remain unexplained."
+    what, own_remedy = describe_term(diagnosis, terms[0])
     remedy = remedy or own_remedy
     said = [
         f"{'Main' if terms[0].share > 0.5 else 'Largest'} cause: {what}",
         *([f"Remedy: {remedy}"] if remedy else []),
     ]
-    others = [described(diagnosis, term)[0] for term in terms[1:3]]
+    others = [describe_term(diagnosis, term)[0] for term in terms[1:3]]
     return ". ".join([G, *said, *(f"Also: {what}" for what in others)]) + "." + _trust(diagnosis)
 
 
-def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
+def describe_causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
     """Every term with its sentence, those that are separated from zero first, by how much G falls without them."""
-    return [(term, sentence(diagnosis, term)) for term in diagnosis.terms]
+    return [(term, cause_sentence(diagnosis, term)) for term in diagnosis.terms]
 
 
 def worth_telling(diagnosis: Diagnosis) -> list[Term]:
@@ -74,38 +74,46 @@ def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     return [*sorted(result, key=lambda term: (-term.gain, -term.share)), *sorted(besides, key=lambda term: -term.size)]
 
 
-def sentence(diagnosis: Diagnosis, term: Term) -> str:
+def cause_sentence(diagnosis: Diagnosis, term: Term) -> str:
     """A cause in words, with its amount and where to look."""
-    what, remedy = described(diagnosis, term)
+    what, remedy = describe_term(diagnosis, term)
     return f"{what}; remedy: {remedy}" if remedy else what
 
 
-def described(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
+def describe_term(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
     """A cause with its amount, and the remedy; "" where the cause says it, or none is known."""
     first, second = diagnosis.circle.axes
     value, axis = term.value, term.axis
     amount = abs(value)
     if not term.determined:
         reverses = term.key == "peaks" or (term.key == "lost_motion" and not diagnosis.reverses(axis))
-        return f"{name(term)}: not determined{f', as {axis} does not reverse on the arc' if reverses else ''}", ""
+        return f"{term_name(term)}: not determined{f', as {axis} does not reverse on the arc' if reverses else ''}", ""
     if not term.shows and term.key not in ("rest", "peaks"):
-        return f"{name(term)}: cannot be distinguished from zero", ""
+        return f"{term_name(term)}: cannot be distinguished from zero", ""
     match term.key:
         case "offset":
             return f"the centre lies {_um(amount)} off", "set up the measurement again, or look for drift"
         case "radius":
-            return f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: {_lag(diagnosis, value)}", ""
+            return (
+                f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: "
+                f"{_explain_lag(diagnosis, value)}",
+                "",
+            )
         case "scale":
             more, less = (first, second) if value > 0 else (second, first)
-            return f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: {_unlike(diagnosis, value)}", ""
+            return (
+                f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: "
+                f"{_explain_gain_difference(diagnosis, value)}",
+                "",
+            )
         case "squareness":
             return (
-                f"squareness: the angle between {first}+ and {second}+ is {_two(amount * 1e6)} um/m "
+                f"squareness: the angle between {first}+ and {second}+ is {_two_digits(amount * 1e6)} um/m "
                 f"{'less' if value > 0 else 'more'} than 90 deg"
             ), "align the guideways, or change their squareness compensation"
         case "servo":
             late, early = (first, second) if value > 0 else (second, first)
-            time = f"{_two(amount * 1e3)} ms"
+            time = f"{_two_digits(amount * 1e3)} ms"
             return (
                 f"servo mismatch: {late} lags {early} by {time}",
                 f"raise K_v or feedforward of {late}, or delay {early} by {time} (T_dyn)",
@@ -116,7 +124,7 @@ def described(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
             late, early = (first, second) if sense * value > 0 else (second, first)
             return (
                 f"an ellipse along {'+' if value > 0 else '-'}45 deg of {_um(amount)} amplitude: servo mismatch "
-                f"({late} lags {early} by {_two(delay)} ms) or squareness "
+                f"({late} lags {early} by {_two_digits(delay)} ms) or squareness "
                 f"({_digits(2 * amount / diagnosis.circle.radius * 1e6)} um/m)"
             ), "record the other direction; it separates the two"
         case "lost_motion" if value > 0:
@@ -135,7 +143,8 @@ def described(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
             )
         case "cogging":
             return (
-                f"cogging of {axis} ({_two(amount)} N.m amplitude, {term.order} times in a turn of the motor), or "
+                f"cogging of {axis} ({_two_digits(amount)} N.m amplitude, {term.order} times in a turn of the "
+                f"motor), or "
                 "torque that repeats with the screw"
             ), "cogging compensation"
         case "straightness":
@@ -168,7 +177,7 @@ def described(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
     return f"what no cause explains: {_um(term.size)} from peak to valley{f' ({form})' if form else ''}", ""
 
 
-def further(diagnosis: Diagnosis) -> list[str]:
+def suggest_circles(diagnosis: Diagnosis) -> list[str]:
     """What one cannot determine from these turns, and which circle would: radius, feed or direction."""
     circle = diagnosis.circle
     if diagnosis.angles is None:
@@ -217,9 +226,9 @@ def _arc(diagnosis: Diagnosis) -> str:
 def _of_arc(diagnosis: Diagnosis) -> list[str]:
     """What arcs do not determine, and what they do not separate."""
     result = [f"{_arc(diagnosis)} is no full turn: figures of ISO 230-4 are not determined"]
-    if unknown := [name(term) for term in diagnosis.terms if not term.determined]:
+    if unknown := [term_name(term) for term in diagnosis.terms if not term.determined]:
         result.append(f"not determined on this arc: {', '.join(unknown)}")
-    if len(trading := [name(term) for term in diagnosis.terms if term.key in diagnosis.unseparated]) > 0:
+    if len(trading := [term_name(term) for term in diagnosis.terms if term.key in diagnosis.unseparated]) > 0:
         result.append(
             f"this arc does not fully separate from other causes: {', '.join(trading)}; the intervals hold that, and a "
             "longer arc makes them smaller"
@@ -227,7 +236,7 @@ def _of_arc(diagnosis: Diagnosis) -> list[str]:
     return result
 
 
-def _lag(diagnosis: Diagnosis, change: float) -> str:
+def _explain_lag(diagnosis: Diagnosis, change: float) -> str:
     """What the mean radius is made of, as far as it can be known."""
     if diagnosis.lag is None:
         return (
@@ -241,7 +250,7 @@ def _lag(diagnosis: Diagnosis, change: float) -> str:
     )
 
 
-def _unlike(diagnosis: Diagnosis, value: float) -> str:
+def _explain_gain_difference(diagnosis: Diagnosis, value: float) -> str:
     """What unlike amplitudes are made of, as far as it can be known."""
     if diagnosis.unlike is None:
         return "scale, temperature or pitch compensation, or an unlike decrease of the amplitude by path lag"
@@ -259,7 +268,7 @@ def _peaks(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
         limit = max((peak.half for peak in own if math.isfinite(peak.half)), default=math.nan)
         above = f" (above {_um(limit)})" if limit > 1e-8 else ""
         return f"where {term.axis} reverses nothing stands out{above}", ""
-    wide = f", {_two(largest.width * 1e3)} ms wide" if math.isfinite(largest.width) else ""
+    wide = f", {_two_digits(largest.width * 1e3)} ms wide" if math.isfinite(largest.width) else ""
     if largest.height > 0:
         size = f"{_um(largest.height)} high{wide}"
         return f"reversal peaks of {term.axis} ({size}), caused by friction", "friction compensation"
@@ -267,7 +276,7 @@ def _peaks(diagnosis: Diagnosis, term: Term) -> tuple[str, str]:
     return f"reversal peaks of {term.axis} ({size}), caused by too much friction compensation", "less of it"
 
 
-def swinging(diagnosis: Diagnosis) -> str:
+def describe_vibrations(diagnosis: Diagnosis) -> str:
     """What vibrates between the reversals, in a sentence; "" where nothing stands out."""
     if not diagnosis.vibrations:
         return ""
@@ -280,19 +289,19 @@ def swinging(diagnosis: Diagnosis) -> str:
 
 
 def _trust(diagnosis: Diagnosis) -> str:
-    if diagnosis.noise > NOISY * diagnosis.G:
+    if diagnosis.noise > NOISE_SHARE * diagnosis.G:
         return f" Noise of {_um(diagnosis.noise)} hides much: measure again, or more slowly."
-    rest = _rest(diagnosis)
+    rest = _rest_term(diagnosis)
     if max(abs(rest.share), rest.size / diagnosis.G) > 0.5:
         return " The model explains less than half of G: look at the picture before acting on it."
     return ""
 
 
-def _rest(diagnosis: Diagnosis) -> Term:
+def _rest_term(diagnosis: Diagnosis) -> Term:
     return diagnosis["rest"]
 
 
-def name(term: Term) -> str:
+def term_name(term: Term) -> str:
     """What a term is called."""
     names = {
         "offset": "centre offset", "radius": "mean radius", "scale": "scale mismatch", "squareness": "squareness",
@@ -308,10 +317,10 @@ def name(term: Term) -> str:
 
 
 def _um(value: float) -> str:
-    return f"{_two(value * 1e6)} um"
+    return f"{_two_digits(value * 1e6)} um"
 
 
-def _two(value: float) -> str:
+def _two_digits(value: float) -> str:
     """Two digits that matter, no place before the point left out, and none after the third place behind it."""
     exponent = int(f"{value:.1e}".partition("e")[2])
     return f"{value:.{min(max(0, 1 - exponent), 3)}f}"
@@ -353,7 +362,7 @@ class Change:
         return self.after.value - self.before.value
 
 
-def changed(
+def compare_terms(
     before: Diagnosis, after: Diagnosis, turns: Sequence[TurnedPath] = (), later: Sequence[TurnedPath] = ()
 ) -> list[Change]:
     """Every cause that both records determine, those first that have changed beyond doubt, by what they make of G.
@@ -393,7 +402,7 @@ def differing_share(
     means = {}
     for which, diagnosis, paths in (("before", before, turns), ("after", after, later)):
         rest = dict(zip(diagnosis.senses, diagnosis.rest, strict=True))
-        means[which] = {path.sense: _means(path, *rest[path.sense]) for path in paths if path.sense in rest}
+        means[which] = {path.sense: _binned_means(path, *rest[path.sense]) for path in paths if path.sense in rest}
     senses = [sense for sense in means["before"] if sense in means["after"]]
     if not senses:
         return 1.0, math.inf
@@ -409,7 +418,7 @@ def differing_share(
     return min(1.0, max(LEAST_DIFFERING_SHARE, share * float(t.ppf(0.975, free) / norm.ppf(0.975)))), float(free)
 
 
-def _means(path: TurnedPath, angle: Array, rest: Array) -> Array:
+def _binned_means(path: TurnedPath, angle: Array, rest: Array) -> Array:
     """Means over BIN_WIDTH of what the fit leaves of a turn [m]; NaN near the axes, and where nothing is recorded."""
     about = np.argsort(angle % (2 * math.pi))
     own = path.angle % (2 * math.pi)
@@ -423,6 +432,6 @@ def _means(path: TurnedPath, angle: Array, rest: Array) -> Array:
         return np.asarray(np.where(count > 0, means, math.nan), dtype=np.float64)
 
 
-def named(changes: Sequence[Change]) -> list[Change]:
+def sure_changes(changes: Sequence[Change]) -> list[Change]:
     """Causes of the machine that have changed beyond doubt."""
     return [change for change in changes if change.sure and change.before.key not in SET_UP]

@@ -35,10 +35,10 @@ from feedsim.linear.margins import (
     peak,
 )
 from feedsim.linear.plant import OperatingPoint
-from feedsim.linear.system import Closed, LinearSystem
+from feedsim.linear.system import ClosedLoop, LinearSystem
 
 __all__ = [
-    "AxisResult", "Bandwidth", "Closed", "Extreme", "GainCrossing", "LinearResult", "LinearSystem", "Margins",
+    "AxisResult", "Bandwidth", "ClosedLoop", "Extreme", "GainCrossing", "LinearResult", "LinearSystem", "Margins",
     "OperatingPoint", "Pair", "PhaseCrossing", "PositionLoop", "SpeedLoop", "bandwidth", "compliance", "crossings",
     "delay", "evaluate", "extremes", "figures", "grid", "margins", "names", "pairs", "peak", "position_gain",
     "position_reference", "response", "scale_response", "speed_controlled_system", "speed_gain", "speed_reference",

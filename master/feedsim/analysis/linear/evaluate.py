@@ -29,7 +29,7 @@ from feedsim.linear.system import LinearSystem
 LOWEST_FREQUENCY = 1.0  # [Hz]
 LOW_BAND = 5.0  # [Hz] up to here the axis is its inertia
 DELAY_AT = 0.1  # [Hz] low against every mode and loop; the phase's curvature is removed anyway
-RISE = 1.0  # [dB] least rise from anti-resonance to resonance that is reported
+MIN_RESONANCE_RISE = 1.0  # [dB] least rise from anti-resonance to resonance that is reported
 RESONANCE_MARGIN = 1.05  # resonances are looked for up to this multiple of the highest mode's frequency
 BELOW_MIRROR = 0.999  # of 1/(2 T): at the mirror frequency itself a sampled loop gain is real, whatever the loop
 
@@ -143,14 +143,14 @@ def _axis(system: LinearSystem, axis: str, frequency: Floats) -> AxisResult:
     return AxisResult(
         J_tot=J_tot,
         low_deviation=float(np.max(np.abs(10 ** (low / 20) - 1))),
-        pairs=tuple(pairs(measured, frequency, RISE)),
-        structure_pairs=tuple(pairs(structure, frequency, RISE)),
-        speed=None if free else _speed(system, axis),
-        position=_position(system, axis) if system.position_gains[system.axes.index(axis)] > 0 else None,
+        pairs=tuple(pairs(measured, frequency, MIN_RESONANCE_RISE)),
+        structure_pairs=tuple(pairs(structure, frequency, MIN_RESONANCE_RISE)),
+        speed=None if free else _evaluate_speed_loop(system, axis),
+        position=_evaluate_position_loop(system, axis) if system.position_gains[system.axes.index(axis)] > 0 else None,
     )
 
 
-def _speed(system: LinearSystem, axis: str) -> SpeedLoop:
+def _evaluate_speed_loop(system: LinearSystem, axis: str) -> SpeedLoop:
     frequency = grid(system.modes, LOWEST_FREQUENCY, 0.5 / system.machine.cycles.T_c * BELOW_MIRROR)
 
     def reference(f: Floats) -> Complexes:
@@ -165,7 +165,7 @@ def _speed(system: LinearSystem, axis: str) -> SpeedLoop:
     )
 
 
-def _position(system: LinearSystem, axis: str) -> PositionLoop:
+def _evaluate_position_loop(system: LinearSystem, axis: str) -> PositionLoop:
     frequency = grid(system.modes, LOWEST_FREQUENCY, 0.5 / system.machine.cycles.T_pos * BELOW_MIRROR)
 
     def reference(f: Floats) -> Complexes:

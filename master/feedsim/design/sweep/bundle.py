@@ -25,11 +25,11 @@ import numpy as np
 from feedsim import analysis
 from feedsim.design.sweep import provenance
 from feedsim.design.sweep.design import Outcome, Task, design
-from feedsim.design.sweep.provenance import read, units_of
+from feedsim.design.sweep.provenance import read_content, units_of
 from feedsim.design.sweep.table import RECORD, read_table, record_of
 from feedsim.files.fields import did_you_mean
 from feedsim.foundation import units
-from feedsim.foundation.errors import FeedsimError, Finding, InputError, ranked
+from feedsim.foundation.errors import FeedsimError, Finding, InputError, rank_findings
 from feedsim.foundation.owned import PREFIX, TemporaryFolder
 from feedsim.scenario import Base, Scenario, load
 from feedsim.scenario.study import Parameter, Study, load_study
@@ -37,7 +37,7 @@ from feedsim.simulation import cosim
 from feedsim.simulation.cosim import fmus_directory
 from feedsim.simulation.cosim.exchange import LIBRARY_NAME as NATIVE
 from feedsim.simulation.cosim.unpacked import check_there
-from feedsim.simulation.judge import judged
+from feedsim.simulation.judge import judge_run
 from feedsim.simulation.nc import Program, plan
 
 # Figures come in units for people; tables hold these instead, where the dimension is the same.
@@ -86,9 +86,9 @@ class Bundle:
         native = fmus / NATIVE
         return cls(
             base=base.to_json(),
-            files={str(file): read(file) for file in sorted(set(files))},
-            fmus={name: read(file) for name, file in archives.items()},
-            native=(read(native), this_platform()) if native.is_file() else None,
+            files={str(file): read_content(file) for file in sorted(set(files))},
+            fmus={name: read_content(file) for name, file in archives.items()},
+            native=(read_content(native), this_platform()) if native.is_file() else None,
         )
 
     @cached_property
@@ -143,7 +143,7 @@ class Workplace:
             self._fmus.mkdir()
             for name, content in fmus.items():
                 (self._fmus / name).write_bytes(content)
-            self._base = base.relocated(moved)
+            self._base = base.relocate(moved)
         except BaseException:
             self.close()
             raise
@@ -165,14 +165,14 @@ class Workplace:
         named = self._as_named
         reported = tuple(
             replace(finding, text=named(finding.text), place=named(finding.place), remedy=named(finding.remedy))
-            for finding in ranked(warnings)
+            for finding in rank_findings(warnings)
         )
         return Outcome(task.run, figures, None, time.perf_counter() - begun, reported)
 
     def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[Finding]]:
         scenario = self._base.with_changes(task.changes)
         program = self._program(scenario)
-        result = judged(cosim.run(scenario, program=program, fmus=self._fmus), keep=False)
+        result = judge_run(cosim.run(scenario, program=program, fmus=self._fmus), keep=False)
         results = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
         return results, result.warnings
 

@@ -131,7 +131,7 @@ def design(study: Study) -> Design:
     d = len(parameters)
     if sampling.method == "sensitivity":
         shares = _sobol(2 * d, sampling.runs, sampling.seed)
-        return _crossed(parameters, _values(parameters, shares[:, :d]), _values(parameters, shares[:, d:]))
+        return _cross_samples(parameters, _values(parameters, shares[:, :d]), _values(parameters, shares[:, d:]))
     if sampling.method == "sobol":
         shares = _sobol(d, sampling.runs, sampling.seed)
     else:
@@ -149,7 +149,7 @@ def _sobol(d: int, runs: int, seed: int) -> Array:
     return np.asarray(points, dtype=np.float64)
 
 
-def _crossed(parameters: tuple[Parameter, ...], a: Array, b: Array) -> Design:
+def _cross_samples(parameters: tuple[Parameter, ...], a: Array, b: Array) -> Design:
     """A, B and the AB_i, sample by sample, so that what an unfinished study has are whole samples."""
     n, d = a.shape
     values = np.repeat(a[:, np.newaxis], d + 2, axis=1)  # (N, 2 + d, d)

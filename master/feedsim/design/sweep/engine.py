@@ -29,7 +29,7 @@ from feedsim.design.sweep import provenance, trial
 from feedsim.design.sweep.bundle import Bundle, Workplace
 from feedsim.design.sweep.design import Outcome, Task
 from feedsim.foundation.errors import Finding, InputError, SimulationError
-from feedsim.foundation.installation import ask
+from feedsim.foundation.installation import require_extras
 from feedsim.simulation.cosim.unpacked import STORE
 
 # --- Which tasks go to the workers together, and what becomes of those whose worker dies ------------------------------
@@ -43,9 +43,9 @@ from feedsim.simulation.cosim.unpacked import STORE
 AIM = 0.5  # s of work in a batch: handing one over costs some 10 ms, and as much progress as this may be lost
 MAX_BATCH_DELAY = 2.0  # a batch that takes so many times longer than meant is handed back unfinished
 MAX_BATCH_RUNS = 1000  # runs in a batch
-DEEP = 2  # batches per worker at a time, so that the next one is there when one ends
+BATCHES_PER_WORKER = 2  # batches per worker at a time, so that the next one is there when one ends
 DEATHS = 3  # of its worker, the last one in nobody's company, after which a task is not tried again
-WAITING = 8  # tasks to be run in nobody's company, for which the others are made to wait
+MAX_WAITING_TASKS = 8  # tasks to be run in nobody's company, for which the others are made to wait
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,34 +74,38 @@ class Batches:
     _fresh: deque[Task] = field(default_factory=deque)
     _suspects: deque[Task] = field(default_factory=deque)
     _loners: deque[Task] = field(default_factory=deque)  # suspects to be run alone
-    _clearing: bool = False  # the others wait until all loners have been run
+    _is_clearing: bool = False  # the others wait until all loners have been run
     _deaths: dict[int, int] = field(default_factory=dict)  # run -> deaths of its worker
-    _flying: set[Batch] = field(default_factory=set)
+    _batches_out: set[Batch] = field(default_factory=set)
     _mean: float | None = None  # s per run, the latest counting most
-    _exhausted: bool = False
+    _is_exhausted: bool = False
 
     def __post_init__(self) -> None:
         self._rest = iter(self.tasks)
 
     def next(self, workers: int) -> Batch | None:
         """A batch to be handed over now to one of `workers`; None: they have enough, or there is no more."""
-        if any(batch.alone for batch in self._flying):
+        if any(batch.alone for batch in self._batches_out):
             return None
-        if self._clearing or len(self._loners) >= WAITING:
-            self._clearing = bool(self._loners)
-            if self._clearing:
-                return None if self._flying else self._sent(Batch((self._loners.popleft(),), suspect=True, alone=True))
+        if self._is_clearing or len(self._loners) >= MAX_WAITING_TASKS:
+            self._is_clearing = bool(self._loners)
+            if self._is_clearing:
+                return (
+                    None
+                    if self._batches_out
+                    else self._sent(Batch((self._loners.popleft(),), suspect=True, alone=True))
+                )
         if self._suspects or self._deaths:
             # One at a time per worker: few wait behind a task that kills, and are taken for one.
-            if len(self._flying) >= workers:
+            if len(self._batches_out) >= workers:
                 return None
             if self._suspects:
                 return self._sent(Batch((self._suspects.popleft(),), suspect=True))
-        elif len(self._flying) >= DEEP * workers:
+        elif len(self._batches_out) >= BATCHES_PER_WORKER * workers:
             return None
         batch = self._fresh_batch(workers)
-        if batch is None and self._loners and not self._flying:
-            self._clearing = True
+        if batch is None and self._loners and not self._batches_out:
+            self._is_clearing = True
             return self.next(workers)
         return batch
 
@@ -110,18 +114,18 @@ class Batches:
         self._read(4 * size * workers)
         if not self._fresh:
             return None
-        if self._exhausted:
-            size = min(size, ceil(len(self._fresh) / (DEEP * workers)))
+        if self._is_exhausted:
+            size = min(size, ceil(len(self._fresh) / (BATCHES_PER_WORKER * workers)))
         return self._sent(Batch(tuple(self._fresh.popleft() for _ in range(min(size, len(self._fresh))))))
 
     def _read(self, least: int) -> None:
-        while not self._exhausted and len(self._fresh) < least:
+        while not self._is_exhausted and len(self._fresh) < least:
             more = tuple(islice(self._rest, least - len(self._fresh)))
             self._fresh.extend(more)
-            self._exhausted = not more
+            self._is_exhausted = not more
 
     def _sent(self, batch: Batch) -> Batch:
-        self._flying.add(batch)
+        self._batches_out.add(batch)
         return batch
 
     @property
@@ -131,28 +135,28 @@ class Batches:
         return bool(self._fresh or self._suspects or self._loners)
 
     @property
-    def flying(self) -> int:
+    def count_batches_out(self) -> int:
         """Batches handed over and not back yet."""
-        return len(self._flying)
+        return len(self._batches_out)
 
     def done(self, batch: Batch, outcomes: Sequence[Outcome]) -> None:
         """`batch` is back; the tasks without an outcome are handed over anew."""
-        self._flying.remove(batch)
+        self._batches_out.remove(batch)
         self._count(outcomes)
         self._fresh.extendleft(reversed(batch.tasks[len(outcomes) :]))
 
     def refused(self, batch: Batch) -> None:
         """No run of `batch` was begun: it is handed over anew, as what it was."""
-        self._flying.remove(batch)
+        self._batches_out.remove(batch)
         waiting = self._loners if batch.alone else self._suspects if batch.suspect else self._fresh
         waiting.extendleft(reversed(batch.tasks))
 
-    def died(self, batch: Batch, deaths: int, how: str, outcomes: Sequence[Outcome] = ()) -> list[Outcome]:
+    def record_death(self, batch: Batch, deaths: int, how: str, outcomes: Sequence[Outcome] = ()) -> list[Outcome]:
         """The worker of `batch` has died `deaths` times over it, or failed as `how` says, after `outcomes`.
 
         Returns outcomes of the tasks that are given up.
         """
-        self._flying.remove(batch)
+        self._batches_out.remove(batch)
         self._count(outcomes)
         given_up = []
         for task in batch.tasks[len(outcomes) :]:
@@ -172,10 +176,12 @@ class Batches:
             self._mean = mean if self._mean is None else (self._mean + mean) / 2
 
 
-LOST = 20.0  # s without the scheduler, after which a study is given up
-ALONE = 300.0  # s without any worker that can take part, likewise: on a busy machine one that died comes back slowly
-FETCH = 5.0  # s for a result to arrive; one that is lost with its worker is made again, and may take any time
-_LOOK = 1.0  # s between two looks at the cluster
+SCHEDULER_LOSS_TIME = 20.0  # s without the scheduler, after which a study is given up
+WORKER_LOSS_TIME = (
+    300.0  # s without any worker that can take part, likewise: on a busy machine one that died comes back slowly
+)
+FETCH_TIME = 5.0  # s for a result to arrive; one that is lost with its worker is made again, and may take any time
+_CLUSTER_POLL_INTERVAL = 1.0  # s between two looks at the cluster
 
 _log = logging.getLogger(__name__)
 
@@ -223,13 +229,13 @@ def open_engine(
     if workers is not None and workers < 0:
         raise InputError(f"workers: {workers} is outside the allowed range: at least 0")
     if workers == 0:
-        here = Here(bundle)
+        here = LocalEngine(bundle)
         try:
             yield here
         finally:
             here.leave()
         return
-    ask("a study on several processes", "sweep")
+    require_extras("a study on several processes", "sweep")
     if scheduler is None:
         count = workers or _cores()
         opened, where = trial.local(count), f"{count} local process{'es'[: 2 * (count != 1)]}"
@@ -243,7 +249,7 @@ def open_engine(
             engine.leave()
 
 
-class Here:
+class LocalEngine:
     """Runs made in this process, one after the other."""
 
     workers = 0
@@ -341,19 +347,19 @@ class _Flight:
         self._client = client
         self._key = key
         self._batches = batches
-        self._landed: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._returned_batches: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._of: dict[str, _Sent] = {}
         self._name = f"feedsim-{uuid.uuid4().hex[:12]}"
         self._count = 0
         self._given_up: list[Outcome] = []
-        self._there: frozenset[str] = frozenset()  # addresses of the workers
-        self._looked = 0.0
-        self._healthy = self._manned = time.monotonic()
+        self._worker_addresses: frozenset[str] = frozenset()  # addresses of the workers
+        self._last_check = 0.0
+        self._healthy = self._last_manned = time.monotonic()
 
     def next(self) -> list[Outcome] | None:
         """Outcomes of a batch that has come back; None when all have."""
         while True:
-            self._look()
+            self._check_cluster()
             if self._given_up:
                 given_up, self._given_up = self._given_up, []
                 return given_up
@@ -364,14 +370,14 @@ class _Flight:
             if not self._of and (ready or not self._batches.waiting):
                 return None
             with suppress(queue.Empty):
-                return self._outcomes(self._landed.get(timeout=_LOOK))
+                return self._outcomes(self._returned_batches.get(timeout=_CLUSTER_POLL_INTERVAL))
 
     def landed(self) -> list[Outcome]:
         """Outcomes that have come back and were not fetched yet."""
         outcomes: list[Outcome] = []
         with suppress(queue.Empty, InputError, SimulationError):  # what has called for them is to be raised
-            for _ in range(self._landed.qsize()):  # one that does not arrive comes again
-                future = self._landed.get_nowait()
+            for _ in range(self._returned_batches.qsize()):  # one that does not arrive comes again
+                future = self._returned_batches.get_nowait()
                 if future.status == "finished":
                     outcomes += self._outcomes(future)
         return outcomes
@@ -388,7 +394,7 @@ class _Flight:
     @property
     def _fit(self) -> frozenset[str]:
         """The workers that can take part, as far as is known."""
-        return self._there - self._crowd.refused.keys()
+        return self._worker_addresses - self._crowd.refused.keys()
 
     def _submit(self, batch: Batch) -> None:
 
@@ -400,7 +406,7 @@ class _Flight:
             priority=10 if batch.suspect else 0, workers=None if only is None else sorted(only),
         )  # fmt: skip
         self._of[key] = _Sent(future, batch, only)
-        future.add_done_callback(self._landed.put)
+        future.add_done_callback(self._returned_batches.put)
 
     def _outcomes(self, future: Any) -> list[Outcome]:
         from distributed import KilledWorker
@@ -410,26 +416,26 @@ class _Flight:
         sent = self._of.pop(future.key)
         batch = sent.batch
         try:
-            done = future.result(timeout=FETCH)
+            done = future.result(timeout=FETCH_TIME)
         except KilledWorker as error:
-            self._looked = 0.0  # one worker less, for a while
+            self._last_check = 0.0  # one worker less, for a while
             future.release()
-            return self._batches.died(batch, error.allowed_failures + 1, "its worker process died")
+            return self._batches.record_death(batch, error.allowed_failures + 1, "its worker process died")
         except (KeyboardInterrupt, SystemExit):
             self._of[future.key] = sent
-            self._landed.put(future)
+            self._returned_batches.put(future)
             raise
         except Exception as error:
             running = self._client.status == "running"
             if running and isinstance(error, TimeoutError) and future.status not in ("cancelled", "error"):
                 self._of[future.key] = sent
-                future.add_done_callback(self._landed.put)
+                future.add_done_callback(self._returned_batches.put)
                 return []
             if not running or future.status in ("cancelled", "lost"):
                 raise self._lost() from None
             future.release()
-            self._ask()
-            if not self._crowd.refused.keys().isdisjoint(self._there if sent.only is None else sent.only):
+            self._find_refusing_workers()
+            if not self._crowd.refused.keys().isdisjoint(self._worker_addresses if sent.only is None else sent.only):
                 self._batches.refused(batch)  # it may have gone to one that cannot take part
                 return []
             raise SimulationError(
@@ -441,21 +447,24 @@ class _Flight:
             self._batches.refused(batch)
             return []
         if done.out_of_memory:
-            return [*done.outcomes, *self._batches.died(batch, 1, "its worker ran out of memory", done.outcomes)]
+            return [
+                *done.outcomes,
+                *self._batches.record_death(batch, 1, "its worker ran out of memory", done.outcomes),
+            ]
         self._batches.done(batch, done.outcomes)
         return list(done.outcomes)
 
-    def _ask(self) -> None:
+    def _find_refusing_workers(self) -> None:
         """Find out which of the workers there are now cannot take part."""
         with suppress(Exception):  # the scheduler may be gone
-            self._there = frozenset(self._client.nthreads())
+            self._worker_addresses = frozenset(self._client.nthreads())
             asked = self._client.run(eval, provenance.QUESTION, workers=sorted(self._fit), on_error="return")
             for address, answer in asked.items():
                 known = isinstance(answer, dict | ModuleNotFoundError)  # else the worker has gone meanwhile
                 if known and (fault := provenance.fault(address, answer)):
                     self._crowd.refuse(address, fault)
 
-    def _look(self) -> None:
+    def _check_cluster(self) -> None:
         """Which workers there are now, and whether the scheduler is.
 
         Raises:
@@ -463,33 +472,34 @@ class _Flight:
             SimulationError: the scheduler is lost, or all workers are.
         """
         now = time.monotonic()
-        if now - self._looked < _LOOK:
+        if now - self._last_check < _CLUSTER_POLL_INTERVAL:
             return
-        self._looked = now
+        self._last_check = now
         if self._client.status == "running":
             with suppress(Exception):
-                self._there = frozenset(self._client.nthreads())
+                self._worker_addresses = frozenset(self._client.nthreads())
                 self._healthy = time.monotonic()
                 self._take_back()
         if self._fit:
-            self._manned = now
-        if self._client.status == "closed" or now - self._healthy > LOST:
+            self._last_manned = now
+        if self._client.status == "closed" or now - self._healthy > SCHEDULER_LOSS_TIME:
             raise self._lost()
-        if now - self._manned > (0.0 if self._crowd.own and self._there else ALONE):
-            if self._there:
-                faults = [why for address, why in self._crowd.refused.items() if address in self._there]
+        if now - self._last_manned > (0.0 if self._crowd.own and self._worker_addresses else WORKER_LOSS_TIME):
+            if self._worker_addresses:
+                faults = [why for address, why in self._crowd.refused.items() if address in self._worker_addresses]
                 raise InputError.of("no worker is left that can be used; what is done is kept", faults)
             raise SimulationError(
-                f"{self._crowd.where}: no worker is left (waited {ALONE:g} s); what is done is kept, and the study can "
+                f"{self._crowd.where}: no worker is left (waited {WORKER_LOSS_TIME:g} s); what is done is kept, "
+                f"and the study can "
                 "be continued"
             )
 
     def _take_back(self) -> None:
         """Batches meant for workers of which none is left: Dask would wait until one comes back."""
         for key, sent in [*self._of.items()]:
-            if sent.only is not None and not sent.only & self._there:
+            if sent.only is not None and not sent.only & self._worker_addresses:
                 del self._of[key]
-                self._given_up += self._batches.died(sent.batch, 1, "its worker process died")
+                self._given_up += self._batches.record_death(sent.batch, 1, "its worker process died")
                 self._client.cancel([sent.future], force=True)
 
     def _lost(self) -> SimulationError:
@@ -509,7 +519,7 @@ def _cores() -> int:
 
 
 @dataclass(frozen=True)
-class Done:
+class BatchResult:
     """What comes back of a batch: outcomes of its first tasks.
 
     Attributes:
@@ -542,15 +552,15 @@ class Carrier(WorkerPlugin):
 
     def setup(self, worker: Any) -> None:
         self.address, self.folder = str(worker.address), Path(worker.local_directory)
-        _carried[self.key] = self
+        _carriers[self.key] = self
 
     def teardown(self, worker: Any) -> None:
-        _carried.pop(self.key, None)
+        _carriers.pop(self.key, None)
         # Called in the worker's event loop, which must not wait for a run to end.
-        threading.Thread(target=_clear, args=(self.content.digest,), daemon=True).start()
+        threading.Thread(target=_clear_place, args=(self.content.digest,), daemon=True).start()
 
 
-_carried: dict[str, Carrier] = {}  # by their keys
+_carriers: dict[str, Carrier] = {}  # by their keys
 _places: dict[str, Workplace] = {}  # by the digest of the work, for all carriers of it
 # FMPy changes the working folder of the process, and libraries need not bear threads: one run at a time.
 _lock = threading.Lock()
@@ -560,42 +570,42 @@ def prepare(key: str) -> None:
     """Lay the work out, so that the first run need not wait for it; not where another study has a run under way."""
     if _lock.acquire(blocking=False):
         try:
-            if (carrier := _carried.get(key)) is not None:
+            if (carrier := _carriers.get(key)) is not None:
                 _place(carrier)
         finally:
             _lock.release()
 
 
-def _clear(digest: str) -> None:
+def _clear_place(digest: str) -> None:
     with _lock:
-        if any(carrier.content.digest == digest for carrier in tuple(_carried.values())):
+        if any(carrier.content.digest == digest for carrier in tuple(_carriers.values())):
             return
         if (place := _places.pop(digest, None)) is not None:
             place.close()
             STORE.clear()
 
 
-def work_batch(key: str, tasks: tuple[Task, ...], seconds: float) -> Done:
+def work_batch(key: str, tasks: tuple[Task, ...], seconds: float) -> BatchResult:
     """Work `tasks` in their order, until all are done or `seconds` [s] are over; one at the least. `key`: of the
     carrier that has brought what they need."""
     outcomes: list[Outcome] = []
     with _lock:
-        carrier = _carried.get(key)
+        carrier = _carriers.get(key)
         if carrier is None:
             address = str(get_worker().address)
-            return Done((), refused=f"worker {address}: has not got what the study needs", worker=address)
+            return BatchResult((), refused=f"worker {address}: has not got what the study needs", worker=address)
         own = provenance.versions()
         if carrier.asked != own and (fault := provenance.fault(carrier.address, own, carrier.asked)):
-            return Done((), refused=fault, worker=carrier.address)
+            return BatchResult((), refused=fault, worker=carrier.address)
         place, begun = _place(carrier), time.perf_counter()
         for task in tasks:
             try:
                 outcomes.append(place.run(task))
             except MemoryError:
-                return Done(tuple(outcomes), out_of_memory=True)
+                return BatchResult(tuple(outcomes), out_of_memory=True)
             if time.perf_counter() - begun >= seconds:
                 break
-    return Done(tuple(outcomes))
+    return BatchResult(tuple(outcomes))
 
 
 def _place(carrier: Carrier) -> Workplace:

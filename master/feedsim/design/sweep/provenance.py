@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.design.sweep.design import Design
-from feedsim.foundation.errors import Finding, InputError, few, no_such_file
+from feedsim.foundation.errors import Finding, InputError, no_such_file, shorten_list
 from feedsim.foundation.installation import version
 from feedsim.scenario import Base, FrictionParameters
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, FRICTION_UNITS
@@ -29,7 +29,7 @@ QUESTION = "__import__('feedsim.design.sweep.provenance', fromlist=['versions'])
 UNIT_NAMES = ("plant", DRIVE.shipped, FRICTION_ROLE.shipped)
 # Methods of which a study with more runs has those of a smaller one, with the same seed, as its first ones: points of a
 # Sobol sequence, and for indices what is made of them sample by sample.
-PREFIXED = ("sobol", "sensitivity")
+SAMPLEWISE_METHODS = ("sobol", "sensitivity")
 
 
 def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
@@ -38,13 +38,16 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
 
     InputError: a file cannot be read.
     """
-    hashes = {str(file): _of_bytes(read(file)) for file in study.files}
+    hashes = {str(file): _of_bytes(read_content(file)) for file in study.files}
     text = study.base.content(hashes)
     return {
         "version of feedsim": _version("feedsim"),
         "parameters and sampling": _of_bytes(_canonical(_plan(study, hashes)) + _values(study, design)),
         "scenario and machine": _of_bytes(text.encode()),
-        **{f"{unit}.fmu": _of_bytes(read(fmus / f"{unit}.fmu")) for unit in units_of(study.base, study.parameters)},
+        **{
+            f"{unit}.fmu": _of_bytes(read_content(fmus / f"{unit}.fmu"))
+            for unit in units_of(study.base, study.parameters)
+        },
     }
 
 
@@ -71,13 +74,13 @@ def fingerprint(result: Mapping[str, str]) -> str:
 
 def first_runs(study: Study, design: Design) -> Callable[[int], str] | None:
     """Number of runs -> SHA-256 of the values of the first so many; None where a study with more runs has others."""
-    if study.sampling.method not in PREFIXED:
+    if study.sampling.method not in SAMPLEWISE_METHODS:
         return None
     return lambda runs: _of_bytes(design.values[:runs].tobytes())
 
 
 def _values(study: Study, design: Design) -> bytes:
-    return b"" if study.sampling.method in PREFIXED else design.values.tobytes()
+    return b"" if study.sampling.method in SAMPLEWISE_METHODS else design.values.tobytes()
 
 
 def _plan(study: Study, hashes: Mapping[str, str]) -> Any:
@@ -91,12 +94,12 @@ def _plan(study: Study, hashes: Mapping[str, str]) -> Any:
         return hashes.get(value, value) if isinstance(value, str) else value
 
     sampling = asdict(study.sampling)
-    if study.sampling.method in PREFIXED:
+    if study.sampling.method in SAMPLEWISE_METHODS:
         del sampling["runs"]
     return told({"sampling": sampling, "parameters": [asdict(p) for p in study.parameters]})
 
 
-def described(study: Study, design: Design, result: Mapping[str, str]) -> dict[str, Any]:
+def describe_study(study: Study, design: Design, result: Mapping[str, str]) -> dict[str, Any]:
     """What is the same whenever and wherever the study's runs are made."""
     return {
         "study": study.name,
@@ -179,8 +182,8 @@ def differences(answers: Mapping[str, Mapping[str, str]]) -> tuple[Finding, ...]
     return tuple(
         Finding(
             "workers-differ", "doubt",
-            f"{few(addresses, 3)}: {what}; figures from there may differ in the last digits",
-            few(addresses, 3),
+            f"{shorten_list(addresses, 3)}: {what}; figures from there may differ in the last digits",
+            shorten_list(addresses, 3),
         )
         for what, addresses in result.items()
     )  # fmt: skip
@@ -194,7 +197,7 @@ def _of_bytes(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def read(file: Path) -> bytes:
+def read_content(file: Path) -> bytes:
     """Content of a file. InputError: it cannot be read."""
     try:
         return file.read_bytes()

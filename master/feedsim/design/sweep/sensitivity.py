@@ -152,7 +152,7 @@ def _warnings(sobol: Mapping[str, Indices], parameters: Sequence[str]) -> tuple[
             text += f"; at least {USEFUL_POINTS} make a ranking"
             finding = Finding("sobol-uncertain", "doubt", text, "", f"--runs {USEFUL_POINTS}")
             reported.setdefault(finding, []).append(name)
-        if impossible := [parameters[k] for k in beyond(indices)]:
+        if impossible := [parameters[k] for k in find_impossible_indices(indices)]:
             text = f"Sobol indices of {', '.join(impossible)} lie beyond what is possible by more than their intervals"
             remedy = "take more base points"
             finding = Finding("sobol-impossible", "doubt", f"{text}; {remedy}", "", remedy)
@@ -196,7 +196,7 @@ def sobol_indices(f_A: Array, f_B: Array, f_AB: Array, *, seed: int = 0) -> Indi
     )
 
 
-def beyond(indices: Indices) -> list[int]:
+def find_impossible_indices(indices: Indices) -> list[int]:
     """Parameters of which an interval lies wholly beyond 0 to 1, or the first order wholly above the total."""
     if indices.reason:
         return []

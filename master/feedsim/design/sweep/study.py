@@ -26,7 +26,7 @@ from feedsim.design.sweep.table import RECORD, STEM, Format, Table, chosen, parq
 from feedsim.files.source import json_value
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import FeedsimError, Finding, InputError, OutputError, SimulationError
-from feedsim.foundation.owned import Closing, claimed, held
+from feedsim.foundation.owned import BlockResource, claim_folder, defer_signals
 from feedsim.scenario.study import Study
 from feedsim.simulation.cosim import fmus_directory
 
@@ -45,7 +45,7 @@ FORMAT = 2
 SYNC = 1.0  # seconds after which what was written is on the disk at the latest
 
 
-class Journal(Closing):
+class Journal(BlockResource):
     """The journal of a folder, open for adding; a context manager.
 
     Attributes:
@@ -81,7 +81,7 @@ class Journal(Closing):
         self.failed = 0
         self.damaged: tuple[int, ...] = ()
         self._claim = ExitStack()
-        self._claim.enter_context(claimed(directory))
+        self._claim.enter_context(claim_folder(directory))
         try:
             self._file = self.path.open("ab", buffering=0)
             self._synced = time.monotonic()
@@ -100,7 +100,7 @@ class Journal(Closing):
         with self.path.open("rb") as file:
             first = file.readline()
             own = {"format": FORMAT, **head}
-            if not first.endswith(b"\n") and _encoded(own).startswith(first):  # nothing, or never finished
+            if not first.endswith(b"\n") and _encode_line(own).startswith(first):  # nothing, or never finished
                 self._file.truncate(0)
                 self._write(own)
                 self._extend(None, first_runs)
@@ -151,8 +151,8 @@ class Journal(Closing):
             return False
         figures = None
         if outcome.figures is not None:
-            figures = {name: [_plain(value), unit] for name, (value, unit) in outcome.figures.items()}
-        with held():  # a run that is written is counted, too
+            figures = {name: [_plain_number(value), unit] for name, (value, unit) in outcome.figures.items()}
+        with defer_signals():  # a run that is written is counted, too
             self._write({
                 "run": outcome.run, "figures": figures, "error": outcome.error, "seconds": outcome.seconds,
                 "findings": [asdict(finding) for finding in outcome.warnings],
@@ -165,7 +165,7 @@ class Journal(Closing):
     def outcomes(self) -> Iterator[Outcome]:
         """The runs that are `done`, each once, in the order of the journal."""
         seen: set[int] = set()
-        for outcome in read(self.path, self.runs):
+        for outcome in read_journal(self.path, self.runs):
             if outcome.run in self.done and outcome.run not in seen:
                 seen.add(outcome.run)
                 yield outcome
@@ -191,7 +191,7 @@ class Journal(Closing):
         self.failed += outcome.figures is None
 
     def _write(self, content: Mapping[str, Any]) -> None:
-        line = memoryview(_encoded(content))
+        line = memoryview(_encode_line(content))
         try:
             while line:  # a file that is not buffered may take a part
                 line = line[self._file.write(line) :]
@@ -201,11 +201,11 @@ class Journal(Closing):
             ) from error
 
 
-def _encoded(content: Mapping[str, Any]) -> bytes:
+def _encode_line(content: Mapping[str, Any]) -> bytes:
     return json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace") + b"\n"
 
 
-def read(path: Path, runs: int) -> Iterator[Outcome]:
+def read_journal(path: Path, runs: int) -> Iterator[Outcome]:
     """What a journal's lines show, without those that cannot be read."""
     with path.open("rb") as file:
         file.readline()
@@ -255,7 +255,7 @@ def _outcome(content: Any, runs: int) -> Outcome | None:
     return outcome if type(outcome.run) is int and 0 <= outcome.run < runs else None
 
 
-def _plain(value: float) -> float | str:
+def _plain_number(value: float) -> float | str:
     return float(value) if math.isfinite(value) else repr(float(value))
 
 
@@ -327,7 +327,7 @@ def run(
     folder = fmus or fmus_directory()
     planned = design(study)
     parts = provenance.parts(study, planned, folder)
-    record = provenance.described(study, planned, parts)
+    record = provenance.describe_study(study, planned, parts)
     head = {name: record[name] for name in ("study", "fingerprint", "parts")}
     first = provenance.first_runs(study, planned)
     with Journal(directory, head, planned.runs, restart=restart, first=first) as journal:

@@ -22,10 +22,10 @@ from feedsim.design.sweep.design import Array, Design, Outcome
 from feedsim.files.fields import did_you_mean
 from feedsim.files.source import json_file, json_value
 from feedsim.files.trace import matches
-from feedsim.files.trace.cells import named_columns, twice
+from feedsim.files.trace.cells import duplicate_names, named_columns
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import Finding, InputError, OutputError, no_such_file
-from feedsim.foundation.installation import need
+from feedsim.foundation.installation import require_module
 from feedsim.foundation.outputs import read_rows, write_rows
 from feedsim.scenario.study import Parameter
 
@@ -82,7 +82,7 @@ class Table:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A DataFrame with a row per run; units in ``.attrs["units"]``. Raises InputError where pandas is missing."""
-        table = need("pandas", "a DataFrame").DataFrame(dict(self.columns))
+        table = require_module("pandas", "a DataFrame").DataFrame(dict(self.columns))
         table.attrs["units"] = dict(self.units)
         return table
 
@@ -230,8 +230,8 @@ def record_of(directory: Path) -> dict[str, Any]:
 
 def parquet() -> Any:
     """pyarrow. Raises MissingPackage."""
-    need("pyarrow.parquet", "Parquet (--format csv does without)")
-    return need("pyarrow", "Parquet")
+    require_module("pyarrow.parquet", "Parquet (--format csv does without)")
+    return require_module("pyarrow", "Parquet")
 
 
 def _rows(table: Table) -> Iterator[list[str]]:
@@ -260,7 +260,7 @@ def _read_csv(path: Path) -> Table:
         raise InputError(f"{path}:1: not the table of a study: it has no columns run and status")
     heads = [_head(text) for text in rows[0]]
     names = [name for name, _ in heads]
-    if doubled := twice(names):
+    if doubled := duplicate_names(names):
         raise InputError(f"{path}:1: two columns are called {doubled[0]!r}")
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(heads):
@@ -355,7 +355,7 @@ Rows = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Where:
+class SeparatingParameter:
     """A parameter whose values separate failed runs from those that are done.
 
     Attributes:
@@ -379,7 +379,7 @@ class Failure:
 
     message: str
     runs: tuple[int, ...]
-    where: tuple[Where, ...]
+    where: tuple[SeparatingParameter, ...]
 
 
 def failures(table: Table, design: Design) -> tuple[Failure, ...]:
@@ -394,7 +394,7 @@ def failures(table: Table, design: Design) -> tuple[Failure, ...]:
         here = np.zeros(len(runs), dtype=bool)
         here[rows] = True
         numbers = tuple(int(run) for run in runs[rows])
-        result.append(Failure(messages[rows[0]], numbers, _where(design, runs, here, table.ok)))
+        result.append(Failure(messages[rows[0]], numbers, _find_separating_parameters(design, runs, here, table.ok)))
     return tuple(result)
 
 
@@ -420,14 +420,16 @@ def levels(values: Array, *, worded: bool = False) -> Array:
     return result if worded or few else result[:0]
 
 
-def _where(design: Design, runs: NDArray[np.int64], here: Rows, ok: Rows) -> tuple[Where, ...]:
+def _find_separating_parameters(
+    design: Design, runs: NDArray[np.int64], here: Rows, ok: Rows
+) -> tuple[SeparatingParameter, ...]:
     """The parameters whose values separate the rows `here` from those that are `ok` by more than chance.
 
     Other failures stay out: what they differ in would be laid at the door of these. Bonferroni's correction for the
     number of parameters and tests.
     """
     drawn = np.isin(runs, design.independent)
-    reported: list[tuple[float, str, Where]] = []
+    reported: list[tuple[float, str, SeparatingParameter]] = []
     for place, parameter in enumerate(design.parameters):
         values = design.values[runs, place]
         if parameter.worded or len(levels(values)):
@@ -441,17 +443,17 @@ def _where(design: Design, runs: NDArray[np.int64], here: Rows, ok: Rows) -> tup
     return tuple(value for *_, value in sorted(reported, key=lambda entry: entry[:2]))
 
 
-def _at_levels(place: int, values: Array, here: Rows) -> Where:
+def _at_levels(place: int, values: Array, here: Rows) -> SeparatingParameter:
     met = np.unique(values[here])
-    return Where(place, True, met, int(here.sum()), int(np.isin(values, met).sum()))
+    return SeparatingParameter(place, True, met, int(here.sum()), int(np.isin(values, met).sum()))
 
 
-def _in_range(place: int, values: Array, here: Rows, ok: Rows) -> Where:
+def _in_range(place: int, values: Array, here: Rows, ok: Rows) -> SeparatingParameter:
     low, high = values[here].min(), values[here].max()
     failed, there = int(here.sum()), int(((values >= low) & (values <= high)).sum())
     tendency = 2 * failed < there and ok.any()
     medians = (float(np.median(values[here])), float(np.median(values[ok]))) if tendency else None
-    return Where(place, False, np.array([low, high]), failed, there, medians)
+    return SeparatingParameter(place, False, np.array([low, high]), failed, there, medians)
 
 
 def _chance(values: Array, here: Rows, ok: Rows) -> float:

@@ -19,13 +19,13 @@ from feedsim import analysis
 from feedsim.design.sweep.bundle import Bundle
 from feedsim.design.sweep.design import Design, Outcome
 from feedsim.foundation.errors import Finding, InputError, SimulationError
-from feedsim.foundation.owned import TemporaryFolder, held
+from feedsim.foundation.owned import TemporaryFolder, defer_signals
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import Study
 from feedsim.simulation import judge, nc
 
-ENOUGH = 6  # runs that work, the first of which does not count for the time
-TRIES = 16
+TRIAL_RUN_COUNT = 6  # runs that work, the first of which does not count for the time
+MAX_TRIAL_RUNS = 16
 MAX_TRIAL_TIME = 20.0  # s after which no further run is begun
 
 
@@ -73,11 +73,11 @@ def trial(study: Study, design: Design, fmus: Path | None = None) -> Trial:
     place = Bundle.of(study, fmus).open()
     begun = perf_counter()
     try:
-        for run in islice(spread(design.runs), TRIES):
-            if len(done) == ENOUGH or (done and perf_counter() - begun > MAX_TRIAL_TIME):
+        for run in islice(spread(design.runs), MAX_TRIAL_RUNS):
+            if len(done) == TRIAL_RUN_COUNT or (done and perf_counter() - begun > MAX_TRIAL_TIME):
                 break
             try:
-                _checked(study, design, run)
+                _check_run(study, design, run)
             except InputError as error:
                 failed[run] = str(error)
                 continue
@@ -110,16 +110,16 @@ def check(study: Study, design: Design, fmus: Path | None = None) -> tuple[int, 
         InputError: none of those tried can be made.
     """
     failed: dict[int, str] = {}
-    for run in islice(spread(design.runs), TRIES):
+    for run in islice(spread(design.runs), MAX_TRIAL_RUNS):
         try:
-            subject, program = _checked(study, design, run)
+            subject, program = _check_run(study, design, run)
             return run, tuple(judge.check(subject, program, fmus=fmus)), failed
         except InputError as error:
             failed[run] = str(error)
     raise InputError(_none_works(failed))
 
 
-def _checked(study: Study, design: Design, run: int) -> tuple[Scenario, nc.Program]:
+def _check_run(study: Study, design: Design, run: int) -> tuple[Scenario, nc.Program]:
     subject = study.base.with_changes(design.changes(run))
     program = nc.plan(subject)
     analysis.check(subject, program)
@@ -134,9 +134,11 @@ def _none_works(failed: dict[int, str]) -> str:
 # --- Dask's part of the engine: workers on this machine, or the scheduler of a cluster that the user has --------------
 
 
-ANSWER = 10.0  # s that a scheduler has to answer
-BUSY = 120.0  # s for the processes of this machine to find one another, however busy it is; who is late is lost
-JOIN = 30.0  # s that a scheduler without workers has to get one
+SCHEDULER_ANSWER_TIME = 10.0  # s that a scheduler has to answer
+LOCAL_JOIN_TIME = (
+    120.0  # s for the processes of this machine to find one another, however busy it is; who is late is lost
+)
+WORKER_JOIN_TIME = 30.0  # s that a scheduler without workers has to get one
 
 # Threads of linear algebra would compete with the workers for the cores.
 _ONE_THREAD = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
@@ -151,7 +153,7 @@ _QUIET = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    "distributed.comm.timeouts.connect": f"{BUSY} s",
+    "distributed.comm.timeouts.connect": f"{LOCAL_JOIN_TIME} s",
     "distributed.nanny.pre-spawn-environ": {},  # it would stay in this process's environment
 }
 
@@ -176,12 +178,12 @@ def local(workers: int) -> Iterator[Any]:
     started: Any = distributed.LocalCluster
 
     with ExitStack() as stack:
-        stack.enter_context(_muted())
+        stack.enter_context(_mute_dask())
         folder = str(stack.enter_context(TemporaryFolder()))
         stack.enter_context(dask.config.set({**_QUIET, "temporary-directory": folder}))
         stack.enter_context(_environment(_ONE_THREAD))
         # Processes that are half started are ended by nobody: a signal waits until they can be.
-        with held(), _without_interrupts():
+        with defer_signals(), _without_interrupts():
             try:
                 cluster = started(
                     n_workers=workers,
@@ -220,23 +222,25 @@ def remote(address: str, say: Callable[[str], None] | None = None) -> Iterator[A
     connected: Any = distributed.Client
 
     with ExitStack() as stack:
-        stack.enter_context(_muted())
-        stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": f"{ANSWER} s"}))
+        stack.enter_context(_mute_dask())
+        stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": f"{SCHEDULER_ANSWER_TIME} s"}))
         try:
-            client = connected(address, timeout=ANSWER, set_as_default=False)
+            client = connected(address, timeout=SCHEDULER_ANSWER_TIME, set_as_default=False)
         except Exception as error:
             raise InputError(
-                f"no scheduler answers at {address}: {_cause(error)} (waited {ANSWER:g} s); an address reads "
+                f"no scheduler answers at {address}: {_cause(error)} (waited {SCHEDULER_ANSWER_TIME:g} s); an "
+                f"address reads "
                 "tcp://host:8786"
             ) from None
         stack.callback(client.close, timeout=1)
         try:
             if say is not None and not client.nthreads():
-                say(f"waiting for workers of the scheduler at {address}, up to {JOIN:g} s")
-            client.wait_for_workers(1, timeout=JOIN)
+                say(f"waiting for workers of the scheduler at {address}, up to {WORKER_JOIN_TIME:g} s")
+            client.wait_for_workers(1, timeout=WORKER_JOIN_TIME)
         except TimeoutError:
             raise InputError(
-                f"the scheduler at {address} has no workers (waited {JOIN:g} s); start some: dask worker {address} "
+                f"the scheduler at {address} has no workers (waited {WORKER_JOIN_TIME:g} s); start some: dask "
+                f"worker {address} "
                 "--nthreads 1"
             ) from None
         yield client
@@ -261,7 +265,7 @@ def _end(cluster: Any) -> None:
 
 
 @contextmanager
-def _muted() -> Iterator[None]:
+def _mute_dask() -> Iterator[None]:
     """Dask writes at length of what the engine deals with itself: workers that die, connections that close."""
     loggers = [logging.getLogger(name) for name in ("distributed", "tornado.application", "asyncio")]
     levels = [logger.level for logger in loggers]

@@ -33,7 +33,7 @@ ACCELERATIONS = (0.01, 2.0)
 RADII = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 FEEDS = tuple(feed / 60 for feed in (0.5, 1.0, 2.0, 5.0, 10.0))
 RUN_IN_ANGLE, RUN_OUT_ANGLE = math.radians(60), math.radians(30)  # of an arc, at least
-REST = 0.2  # [s] ahead of a circle
+REST_TIME = 0.2  # [s] ahead of a circle
 INTERVAL = 1e-3  # [s] between the rows that are looked at
 COUNT = 8  # of accelerations that are tuned on
 
@@ -125,7 +125,7 @@ class Circles:
             start = {first: middle[first] + pair.radius, second: middle[second]}
             motions += [
                 Move(to=start, feed=0.9 * min(machine.axes[axis].max_speed for axis in plane)),
-                Dwell(duration=REST),
+                Dwell(duration=REST_TIME),
                 Arc(
                     plane=plane, feed=pair.feed, centre_by={first: -pair.radius, second: 0.0},
                     angle=sweep_of(pair, machine),
@@ -134,7 +134,7 @@ class Circles:
         columns = tuple(f"{axis}.x_a" for axis in plane)
         own = scenario.model_copy(
             update={
-                "motions": (*motions, Dwell(duration=REST)),
+                "motions": (*motions, Dwell(duration=REST_TIME)),
                 "recording": Recording(interval=_interval(machine), variables=columns),
                 "logging": None,
                 "evaluate": (),

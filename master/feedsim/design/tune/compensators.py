@@ -49,7 +49,7 @@ class Trials:
         """With the runs without friction. Raises as :meth:`errors`."""
         free = []
         for k, machine in enumerate(machines):
-            with _named(k, machines):
+            with _name_draw(k, machines):
                 free.append(circles.contours(frictionless(machine, circles.plane), fmus=fmus))
         return cls(circles, machines, free, fmus)
 
@@ -59,12 +59,12 @@ class Trials:
         result = []
         for k, (machine, free) in enumerate(zip(self.machines, self.free, strict=True)):
             own = with_groups(machine, self.machines[0], group, values or {})
-            with _named(k, self.machines):
+            with _name_draw(k, self.machines):
                 result.append(extremes(self.circles.contours(own, fmus=self.fmus), free))
         return np.concatenate(result)
 
 
-def _named(k: int, machines: Sequence[Machine]) -> AbstractContextManager[None]:
+def _name_draw(k: int, machines: Sequence[Machine]) -> AbstractContextManager[None]:
     return draw_named(k - 1, len(machines) - 1, "which the values are found on") if k else nullcontext()
 
 
@@ -87,7 +87,7 @@ TORQUE_STEPS = (0.5, 0.25, 0.12)  # of the friction F_C, by which torques are ch
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundCompensation:
     """A compensation of some axes.
 
     values: axis -> parameter of its drive (or of its group) -> SI. runs: that it took.
@@ -103,7 +103,7 @@ class Found:
         return machine if group is None else with_groups(machine, of, group, self.values)
 
 
-def without(machine: Machine, kind: str, axes: Sequence[str]) -> Machine:
+def remove_compensation(machine: Machine, kind: str, axes: Sequence[str]) -> Machine:
     """The machine without a compensation of that kind on some axes: one that its file has is no part of the search."""
     if (group := GROUP_OF_KIND.get(kind)) is None:
         return machine
@@ -168,8 +168,8 @@ class PulseGrid:
 
         Linear between the points of the grid, over the amplitude and the logarithm of the time constant.
         """
-        i, p = _between(np.array(AMPLITUDE_SHARES), amplitudes / self.scales[axis])
-        j, q = _between(np.log(TIME_CONSTANTS), np.log(time)[:, None])
+        i, p = _grid_position(np.array(AMPLITUDE_SHARES), amplitudes / self.scales[axis])
+        j, q = _grid_position(np.log(TIME_CONSTANTS), np.log(time)[:, None])
         of, pairs = self.errors[..., axis, :], np.arange(amplitudes.shape[1])
         p, q = p[..., None], q[..., None]
         low = (1 - p) * of[i, j, pairs] + p * of[i + 1, j, pairs]
@@ -177,7 +177,7 @@ class PulseGrid:
         return size((1 - q) * low + q * high)
 
 
-def _between(grid: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
+def _grid_position(grid: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
     """Index of the interval of the grid that x lies in, and its share of it; beyond the ends as there."""
     i = np.clip(np.searchsorted(grid, x) - 1, 0, len(grid) - 2)
     return i, np.clip((x - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
@@ -238,7 +238,7 @@ def pulse(
     return values
 
 
-def together(
+def tune_pulses_together(
     trials: Trials, values: Mapping[str, Mapping[str, float | bool]], objective: str, *, before: Array,
     progress: Progress,
 ) -> tuple[dict[str, dict[str, float | bool]], int]:  # fmt: skip
@@ -279,7 +279,7 @@ def instant(machine: Machine, axis: str) -> float:
     return max(0.0, axis_lag(drive) - drive.T_dyn)
 
 
-def table(trials: Trials, objective: str, *, progress: Progress, axes: Sequence[str]) -> Found:
+def table(trials: Trials, objective: str, *, progress: Progress, axes: Sequence[str]) -> FoundCompensation:
     """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs."""
     plane, machine = trials.circles.plane, trials.machines[0]
     level = {axis: machine.friction_of(axis, "tuning of a compensation").F_C for axis in axes}
@@ -305,7 +305,7 @@ def table(trials: Trials, objective: str, *, progress: Progress, axes: Sequence[
         }
 
     best = scores(torques)
-    directions = [np.ones(len(SPEEDS)), *np.eye(len(SPEEDS)), *(_from(i) for i in range(1, len(SPEEDS)))]
+    directions = [np.ones(len(SPEEDS)), *np.eye(len(SPEEDS)), *(_step_from(i) for i in range(1, len(SPEEDS)))]
     total, done = len(TORQUE_STEPS) * len(directions) * 2, 0
     for step in TORQUE_STEPS:
         for direction in directions:
@@ -320,10 +320,10 @@ def table(trials: Trials, objective: str, *, progress: Progress, axes: Sequence[
                     if result[axis] < best[axis]:
                         best[axis], torques[axis] = result[axis], tried[axis]
     progress("torques", total, total)
-    return Found("table", {axis: values_of(axis, torques[axis]) for axis in axes}, runs)
+    return FoundCompensation("table", {axis: values_of(axis, torques[axis]) for axis in axes}, runs)
 
 
-def _from(i: int) -> Array:
+def _step_from(i: int) -> Array:
     return np.concatenate([np.zeros(i), np.ones(len(SPEEDS) - i)])
 
 
@@ -359,7 +359,7 @@ class Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class JudgedCompensation:
     """A compensation and what it does.
 
     Attributes:
@@ -376,7 +376,7 @@ class Judged:
     plane: tuple[str, str]
     axes: tuple[str, ...]
     objective: str
-    found: Found
+    found: FoundCompensation
     tuned: tuple[Pair, ...]
     held_out: tuple[Pair, ...]
     tuned_errors: Errors
@@ -429,14 +429,14 @@ class Judged:
 def tune(
     scenario: Scenario, kind: str, plane: tuple[str, str], axes: Sequence[str], objective: str, *,
     fmus: Path | None, progress: Progress, cloud: Cloud | None = None, count: int = 0,
-) -> Judged:  # fmt: skip
+) -> JudgedCompensation:  # fmt: skip
     """Find a compensation on short circles and judge it on the practical range of radii and feeds.
 
     plane: axes of the circles. axes: those that are compensated, of the plane. cloud: draws of the machine that the
     values are good for; they are found on a few, and judged on `count` other ones. Raises InputError: no circle of the
     practical range fits the travel, a drive or a friction of another maker; SimulationError as a run.
     """
-    machine = without(scenario.machine, kind, axes)
+    machine = remove_compensation(scenario.machine, kind, axes)
     pairs = practical(machine, plane)
     if len(pairs) < 4:
         raise InputError(
@@ -447,10 +447,14 @@ def tune(
     on, off = Circles.of(scenario, plane, tuned), Circles.of(scenario, plane, pairs)
 
     def draws(count: int, seed: int) -> Iterator[Machine]:
-        return (without(draw, kind, axes) for draw in cloud.draws(count, seed)) if cloud is not None else iter(())
+        return (
+            (remove_compensation(draw, kind, axes) for draw in cloud.draws(count, seed))
+            if cloud is not None
+            else iter(())
+        )
 
     machines = [machine, *(draws(SEARCH_DRAWS, SEARCH_SEED) if kind != "model" else ())]
-    result = _found(on, machines, kind, axes, objective, fmus, progress)
+    result = _find_compensation(on, machines, kind, axes, objective, fmus, progress)
 
     def compensated(circles: Circles, own: Machine) -> tuple[Contour, ...]:
         torque = None
@@ -480,13 +484,13 @@ def tune(
         with draw_named(k, count):
             drawn.append(next_one(off, own)[0])
     progress("judging", total, total)
-    return Judged(
+    return JudgedCompensation(
         scenario, plane, tuple(axes), objective, result, tuple(tuned), tuple(pairs), tuned_errors, held_errors,
         size(extremes(free)), changed, drawn or None, cloud,
     )  # fmt: skip
 
 
-def _found(
+def _find_compensation(
     on: Circles,
     machines: Sequence[Machine],
     kind: str,
@@ -494,9 +498,9 @@ def _found(
     objective: str,
     fmus: Path | None,
     progress: Progress,
-) -> Found:
+) -> FoundCompensation:
     if kind == "model":
-        return Found(kind, {axis: {} for axis in axes}, 0)
+        return FoundCompensation(kind, {axis: {} for axis in axes}, 0)
     machine = machines[0]
     trials = Trials.of(on, machines, fmus)
     if kind == "table":
@@ -510,8 +514,8 @@ def _found(
         }
         for axis in axes
     }
-    values, runs = together(trials, values, objective, before=size(grid.errors[0, 0]), progress=progress)
-    return Found(kind, values, runs + len(machines) * int(np.prod(grid.errors.shape[:2])))
+    values, runs = tune_pulses_together(trials, values, objective, before=size(grid.errors[0, 0]), progress=progress)
+    return FoundCompensation(kind, values, runs + len(machines) * int(np.prod(grid.errors.shape[:2])))
 
 
 def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str], fmus: Path | None) -> TorqueFeedforward:

@@ -17,7 +17,7 @@ import numpy as np
 
 from feedsim.analysis.figures import Array
 from feedsim.design.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
-from feedsim.design.tune.knobs import Effect, Knobs, effects_of, matched
+from feedsim.design.tune.knobs import Effect, Knobs, effects_of, match_lag
 from feedsim.design.uncertainty import (
     JUDGE_SEED,
     SEARCH_DRAWS,
@@ -28,7 +28,7 @@ from feedsim.design.uncertainty import (
     typed_drive,
     typed_on,
 )
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.owned import TemporaryFolder
 from feedsim.foundation.units import parameters
 from feedsim.linear.judgement import Candidates, Loop, judge
@@ -45,7 +45,7 @@ from feedsim.structure.modes import with_transmissions, write_modes
 
 
 @dataclass(frozen=True)
-class Changed:
+class ChangedParameter:
     """A parameter of an axis that has another value.
 
     machine: name of the machine. parameter: below the axis in a machine file, such as "drive.K_v". old, new: SI, a
@@ -79,7 +79,7 @@ class Changed:
         return f"{self.key}={self.text}"
 
 
-def changed_values(before: Machine, after: Machine) -> tuple[Changed, ...]:
+def changed_values(before: Machine, after: Machine) -> tuple[ChangedParameter, ...]:
     """Parameters of shipped drives whose values differ, by axis, in the order of the unit's table."""
     table = parameters("controller")
     result = []
@@ -95,13 +95,13 @@ def changed_values(before: Machine, after: Machine) -> tuple[Changed, ...]:
             if name.endswith(".type"):
                 group = name.partition(".")[0]
                 types = (getattr(old, group).type, getattr(new, group).type)
-                result.append(Changed(before.name, axis, f"drive.{name}", *types, ""))
+                result.append(ChangedParameter(before.name, axis, f"drive.{name}", *types, ""))
             else:
-                result.append(Changed(before.name, axis, f"drive.{name}", was.get(name), value, row.unit))
+                result.append(ChangedParameter(before.name, axis, f"drive.{name}", was.get(name), value, row.unit))
     return tuple(result)
 
 
-WORSE = 1.05  # of an error, from where on it counts as worse
+WORSE_ERROR_RATIO = 1.05  # of an error, from where on it counts as worse
 ERROR_FLOOR = 0.05e-6  # [m] of an error: below it nothing counts
 
 
@@ -160,11 +160,11 @@ class Case:
     @property
     def worse(self) -> list[tuple[str, str, float, float]]:
         """Those that got worse by more than 5 %."""
-        return [row for row in self.rows if row[3] > WORSE * row[2] + ERROR_FLOOR]
+        return [row for row in self.rows if row[3] > WORSE_ERROR_RATIO * row[2] + ERROR_FLOOR]
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnMachines:
     """What the drive does on draws of the machine from the intervals of its identified values.
 
     margins: of every draw, over all poses and modes. cases: motions of every draw; none where the drive stays as it is.
@@ -181,7 +181,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, eq=False)
-class Tuned:
+class TunedDrive:
     """A drive and what it does.
 
     machine: with it. before, after: margins. searched: what it was searched on. judged: what it was judged on, as the
@@ -204,10 +204,10 @@ class Tuned:
     kept: str
     poses: tuple[str, ...]
     elastic: bool
-    drawn: Drawn | None = None
+    drawn: DrawnMachines | None = None
 
     @property
-    def changes(self) -> tuple[Changed, ...]:
+    def changes(self) -> tuple[ChangedParameter, ...]:
         """Parameters that differ."""
         return changed_values(self.scenario.machine, self.machine)
 
@@ -222,13 +222,15 @@ def decibels(value: float) -> str:
 
 
 # --- Margins and noise of one axis with other drives: at every pose, with elastic modes changed, on draws of the machin
-# A judge closes the loops of the axis on one structure. `Candidates` keeps what drives have in common; `checked` is
-# the
+# A judge closes the loops of the axis on one structure. `Candidates` keeps what drives have in common; `check_margins`
+# is the
 # judgement that warnings of a run have, and keeps nothing.
 
 
 FREQUENCY_FACTORS = (1.0, 0.9, 1.1)  # factors on the frequencies of elastic modes
-Worst = tuple[tuple[float, str], tuple[float, str]]  # least gain margin [dB] and phase margin [deg], with their loops
+WorstMargins = tuple[
+    tuple[float, str], tuple[float, str]
+]  # least gain margin [dB] and phase margin [deg], with their loops
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,12 +242,12 @@ class Judge:
     machine: Machine
     axis: str
 
-    def least(self, drive: Drive) -> tuple[Worst, float]:
+    def least(self, drive: Drive) -> tuple[WorstMargins, float]:
         """Least margins, and torque of noise [N.m/rad] as the machine itself has it."""
         judged = self.candidates.judge(self._on_draw(drive))
         return _least_of(judged.loops), judged.noise / torque_scale(self.machine, self.draw, self.axis)
 
-    def checked(self, machine: Machine) -> Worst:
+    def checked(self, machine: Machine) -> WorstMargins:
         """Least margins of the axis of a machine with other drives."""
         changed = typed_on(self.draw, self.machine, machine)
         return _least_of([loop for loop in judge(changed, self.candidates.modes) if loop.axis == self.axis])
@@ -265,7 +267,7 @@ def judges_of(
     for pose, modes in poses.items():
         for factor in factors:
             words = ", ".join(filter(None, [name, pose, "" if factor == 1 else percent("modes", factor)]))
-            candidates = Candidates(own, with_transmissions(own, scaled(modes, factor)), axis)
+            candidates = Candidates(own, with_transmissions(own, scale_frequencies(modes, factor)), axis)
             judges[words] = Judge(candidates, own, machine, axis)
     return judges
 
@@ -273,13 +275,15 @@ def judges_of(
 def margins_of(judges: Mapping[str, Judge], drive: Drive) -> Margins:
     """Least margins and largest noise over judges."""
     result = {name: value.least(drive) for name, value in judges.items()}
-    return _over({name: worst for name, (worst, _) in result.items()}, max(noise for _, noise in result.values()))
+    return _margins_over(
+        {name: worst for name, (worst, _) in result.items()}, max(noise for _, noise in result.values())
+    )
 
 
-def checked(judges: Mapping[str, Judge], machine: Machine, axis: str) -> Margins:
+def check_margins(judges: Mapping[str, Judge], machine: Machine, axis: str) -> Margins:
     """Margins of a result, by a second judgement that keeps nothing and knows nothing of the search."""
     noise = margins_of(judges, machine.shipped_drive(axis, "tuning")).noise
-    return _over({name: value.checked(machine) for name, value in judges.items()}, noise)
+    return _margins_over({name: value.checked(machine) for name, value in judges.items()}, noise)
 
 
 def worse_of(one: Margins, two: Margins) -> Margins:
@@ -288,7 +292,7 @@ def worse_of(one: Margins, two: Margins) -> Margins:
     return Margins(gain.gain, phase.phase, gain.gain_of, phase.phase_of, max(one.noise, two.noise))
 
 
-def scaled(modes: Modes, factor: float) -> Modes:
+def scale_frequencies(modes: Modes, factor: float) -> Modes:
     """Modes with other frequencies."""
     return modes if factor == 1 else replace(modes, frequency=modes.frequency * factor)
 
@@ -298,7 +302,7 @@ def percent(what: str, factor: float) -> str:
     return f"{what} {abs(100 * (factor - 1)):.0f} % {'higher' if factor > 1 else 'lower'}"
 
 
-def _least_of(loops: Sequence[Loop]) -> Worst:
+def _least_of(loops: Sequence[Loop]) -> WorstMargins:
     if any(loop.growing for loop in loops):
         return (-math.inf, "unstable"), (-math.inf, "unstable")
     gain = min(loops, key=lambda loop: loop.gain_margin)
@@ -307,7 +311,7 @@ def _least_of(loops: Sequence[Loop]) -> Worst:
     return (size, f"{gain.kind} loop {gain.state}"), (phase.phase_margin, f"{phase.kind} loop {phase.state}")
 
 
-def _over(result: Mapping[str, Worst], noise: float) -> Margins:
+def _margins_over(result: Mapping[str, WorstMargins], noise: float) -> Margins:
     gain = min(result, key=lambda name: result[name][0][0])
     phase = min(result, key=lambda name: result[name][1][0])
     return Margins(
@@ -332,7 +336,7 @@ Rank = tuple[float, float]
 LEAST_STEP = 0.004  # of the box: a search whose steps are shorter has come to its end
 
 
-def least(
+def minimise_rank(
     rank: Callable[[Array], Rank], start: Array, *, step: float, evaluations: int, seed: int, population: int = 0
 ) -> tuple[Array, Rank]:
     """The best point of the unit cube (n,) that is met, and its rank.
@@ -388,19 +392,19 @@ Progress = Callable[[str, int, int], None]
 
 # Moves as distance [m] and feed [m/s], circles as radius [m] and feed [m/s]: to search on, to choose on, to judge on.
 _MM, _MPM = 1e-3, 1 / 60
-SEARCHED = (((1 * _MM, 2 * _MPM), (10 * _MM, 5 * _MPM), (100 * _MM, 10 * _MPM)),
+SEARCHED_MOVES = (((1 * _MM, 2 * _MPM), (10 * _MM, 5 * _MPM), (100 * _MM, 10 * _MPM)),
             ((5 * _MM, 1 * _MPM), (15 * _MM, 3 * _MPM), (50 * _MM, 6 * _MPM)))  # fmt: skip
 CHOSEN = (((2 * _MM, 4 * _MPM), (20 * _MM, 8 * _MPM), (60 * _MM, 3 * _MPM)),
           ((8 * _MM, 2.5 * _MPM), (25 * _MM, 2 * _MPM), (40 * _MM, 8 * _MPM)))  # fmt: skip
-HELD = (((0.5 * _MM, 1 * _MPM), (5 * _MM, 3 * _MPM), (30 * _MM, 10 * _MPM), (100 * _MM, 5 * _MPM)),
+HELD_OUT_MOVES = (((0.5 * _MM, 1 * _MPM), (5 * _MM, 3 * _MPM), (30 * _MM, 10 * _MPM), (100 * _MM, 5 * _MPM)),
         ((10 * _MM, 1.5 * _MPM), (15 * _MM, 3.5 * _MPM), (30 * _MM, 5 * _MPM)))  # fmt: skip
-GAINED = 0.95  # of the errors' mean ratio: what gains less is not worth a change
+MAX_ERROR_RATIO = 0.95  # of the errors' mean ratio: what gains less is not worth a change
 WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
 MARGIN_SHARE = 0.75  # of the margins asked for: candidates from there on run, for the picture
 TORQUE = 0.95  # of the torque limit
 NOISE = 0.02  # of the torque limit: torque that encoder noise may make [1]
 SIMPLEX_STEPS, EVALUATIONS = (0.12, 0.12, 0.05), 130  # of the search's starts; evaluations per start
-BACK = (1.0, 0.8, 0.6, 0.4, 0.2)  # ways back to the present drive that are tried
+RETURN_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)  # ways back to the present drive that are tried
 FINALISTS = 4
 FASTER = {"K_p": 4.0, "T_n": 0.15, "K_v": 2.0, "omega_0": 3.0}  # direction of the closed-form start
 HALVINGS = 5
@@ -420,13 +424,13 @@ class Part:
 def tune_drive(
     scenario: Scenario, axis: str, limits: Limits, poses: Mapping[str, Modes] | None = None, *,
     fmus: Path | None, progress: Progress, evaluations: int = EVALUATIONS, cloud: Cloud | None = None, count: int = 0,
-) -> Tuned:  # fmt: skip
+) -> TunedDrive:  # fmt: skip
     """Find a better drive of an axis and judge it. poses: further ones, name -> modes. cloud: draws of the machine that
     it is good for; it is found on a few, and judged on `count` other ones.
 
     Raises InputError, and as :func:`feedsim.simulation.cosim.run`.
     """
-    with _Search.begun(scenario, axis, limits, poses or {}, fmus, progress, evaluations, cloud) as search:
+    with _Search.begin_search(scenario, axis, limits, poses or {}, fmus, progress, evaluations, cloud) as search:
         tuned = search.tuned()
         return tuned if cloud is None else replace(tuned, drawn=search.drawn(tuned, cloud, count))
 
@@ -459,7 +463,7 @@ class _Search:
 
     @classmethod
     @contextmanager
-    def begun(
+    def begin_search(
         cls, scenario: Scenario, axis: str, limits: Limits, poses: Mapping[str, Modes], fmus: Path | None,
         progress: Progress, evaluations: int, cloud: Cloud | None = None,
     ) -> Iterator[_Search]:  # fmt: skip
@@ -471,7 +475,7 @@ class _Search:
             scaled_files = {1.0: machine.modes}
             for factor in FREQUENCY_FACTORS[1:]:
                 scaled_files[factor] = folder / f"modes_{factor}.csv"
-                write_modes(scaled_files[factor], scaled(own, factor))
+                write_modes(scaled_files[factor], scale_frequencies(own, factor))
             structures = {"pose of the machine file": own, **poses}
             factors = FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]
             judges = judges_of(machine, axis, structures, factors)
@@ -485,7 +489,7 @@ class _Search:
                 scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges, structures, draws,
                 drawn_judges, scaled_files, (), (), margins_of(judges, knobs.drive), [], [], [],
             )  # fmt: skip
-            search.parts = search.of(SEARCHED)
+            search.parts = search.of(SEARCHED_MOVES)
             search.before = search.errors(search.parts, machine)
             yield search
 
@@ -531,7 +535,7 @@ class _Search:
         before = self.scenario.machine
         own = before.axes[self.axis].model_copy(update={"drive": drive})
         changed = before.model_copy(update={"axes": {**before.axes, self.axis: own}})
-        return matched(changed, self.axis, before)
+        return match_lag(changed, self.axis, before)
 
     def rank(self, x: Array) -> Rank:
         """Violation of the limits, and mean ratio of errors, of a candidate at places x."""
@@ -558,7 +562,7 @@ class _Search:
         ratios, ratio = _ratios(self.before, errors)
         torque, before = (max(errors.torque for errors in some) for some in (errors, self.before))
         most = max(TORQUE * drive.M_max, before)
-        violation += max(0.0, torque / most - 1) + float(np.maximum(ratios / WORSE - 1, 0).sum())
+        violation += max(0.0, torque / most - 1) + float(np.maximum(ratios / WORSE_ERROR_RATIO - 1, 0).sum())
         self.points.append(Point(margins, ratio, float(errors[0].peak.max()), violation == 0))
         return violation, ratio
 
@@ -581,12 +585,12 @@ class _Search:
 
     # --- the search -------------------------------------------------------------------------------------------------
 
-    def tuned(self) -> Tuned:
+    def tuned(self) -> TunedDrive:
         """Search, choose, judge."""
         drive, kept = self.chosen(self.searched())
         machine = self.machine_with(drive) if not kept else self.scenario.machine
-        after = checked(self.judges, machine, self.axis) if not kept else self.margins_before
-        return Tuned(
+        after = check_margins(self.judges, machine, self.axis) if not kept else self.margins_before
+        return TunedDrive(
             self.scenario, self.axis, self.partner, self.limits, machine, self.margins_before, after,
             self._searched_case(machine),
             tuple(self.judged(machine)), tuple(self.points), (self.closed, self.runs), kept, tuple(self.structures),
@@ -605,7 +609,7 @@ class _Search:
 
         starts: tuple[Callable[[], Array], ...] = (self.fast_start, self.as_present, self.best_yet)
         for seed, (start, step) in enumerate(zip(starts, SIMPLEX_STEPS, strict=True), start=1):
-            least(counted, start(), step=step, evaluations=self.evaluations, seed=seed)
+            minimise_rank(counted, start(), step=step, evaluations=self.evaluations, seed=seed)
         self.progress("candidates", total, total)
         allowed = sorted((entry for entry in self.tried if entry[0][0] == 0), key=lambda entry: entry[0])
         return [x for _, x in allowed[:FINALISTS]]
@@ -646,8 +650,8 @@ class _Search:
             return present, self.without()
         parts = self.of(CHOSEN)
         before = self.errors(parts, self.scenario.machine)
-        total, done = len(BACK) * len(finalists), 0
-        for share in BACK:
+        total, done = len(RETURN_SHARES) * len(finalists), 0
+        for share in RETURN_SHARES:
             best: tuple[float, Drive] | None = None
             for x in finalists:
                 self.progress("choosing", done, total)
@@ -657,7 +661,7 @@ class _Search:
                     continue
                 ratios, ratio = _ratios(before, self.errors(parts, self.machine_with(drive)))
                 self.runs += 1
-                if ratios.max() <= WORSE and ratio < GAINED and (best is None or ratio < best[0]):
+                if ratios.max() <= WORSE_ERROR_RATIO and ratio < MAX_ERROR_RATIO and (best is None or ratio < best[0]):
                     best = ratio, drive
             if best is not None:
                 self.progress("choosing", total, total)
@@ -677,18 +681,22 @@ class _Search:
                 if math.isfinite(limits.missing(nearest))
                 else "none is stable"
             )
-            return f"none of {self.closed} candidates has {asked}; {has}; ask for less or raise {spelt('evaluations')}"
+            return (
+                f"none of {self.closed} candidates has {asked}; {has}; ask for less or raise "
+                f"{spell_argument('evaluations')}"
+            )
         if all(self.violation(margins) > 0 for margins in within):
             noise = min(margins.noise for margins in within) * limits.encoder_noise
             return (
                 f"the {len(within)} candidates with {asked} turn the encoder's noise into {noise:.3g} N.m of torque or "
-                f"more, {self.most_noise:.3g} N.m are allowed; ask for less or correct {spelt('encoder_noise')}"
+                f"more, {self.most_noise:.3g} N.m are allowed; ask for less or correct "
+                f"{spell_argument('encoder_noise')}"
             )
         return "no candidate within the margins is better on every move"
 
     def judged(self, machine: Machine) -> Iterator[Case]:
         """Moves and circles that nothing was chosen by: as the machine is, modes changed, friction changed."""
-        program = _program(self.scenario, self.axis, self.partner, HELD)
+        program = _program(self.scenario, self.axis, self.partner, HELD_OUT_MOVES)
         cases: dict[str, Callable[[Machine], Machine]] = {"as the machine file has it": lambda own: own}
         if len(self.factors) > 1:
             cases |= {percent("modes", f): partial(self.with_modes, factor=f) for f in FREQUENCY_FACTORS[1:]}
@@ -703,7 +711,7 @@ class _Search:
             yield Case(name, program, before, after)
         self.progress("judging", len(cases), len(cases))
 
-    def drawn(self, tuned: Tuned, cloud: Cloud, count: int) -> Drawn:
+    def drawn(self, tuned: TunedDrive, cloud: Cloud, count: int) -> DrawnMachines:
         """Margins and motions on draws that nothing was chosen by; a drive that stays as it is has margins alone."""
         program, before = tuned.judged[0].program, self.scenario.machine
         margins, cases = [], []
@@ -717,7 +725,7 @@ class _Search:
                     without, with_it = (self.errors_on(draw, program, entry) for entry in (before, tuned.machine))
                     cases.append(Case(name, program, without, with_it))
         self.progress("draws", count, count)
-        return Drawn(cloud, tuple(margins), tuple(cases))
+        return DrawnMachines(cloud, tuple(margins), tuple(cases))
 
     def _searched_case(self, machine: Machine) -> Case:
         circles = self.parts[0].program

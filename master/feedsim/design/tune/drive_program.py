@@ -16,7 +16,7 @@ import numpy as np
 
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.figures import Array, last_outside
-from feedsim.design.tune.circles import REST, RUN_IN_ANGLE, Pair, run_in, sweep_of, turn_of
+from feedsim.design.tune.circles import REST_TIME, RUN_IN_ANGLE, Pair, run_in, sweep_of, turn_of
 from feedsim.design.tune.proposals import axis_lag, check_controlled
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
@@ -30,7 +30,7 @@ from feedsim.simulation.cosim.run import follow
 from feedsim.simulation.nc import Program, plan
 
 BAND = 1e-6  # [m] within which an axis has settled
-ROOM = 0.9  # of the travel on either side of the pose that is used
+USED_TRAVEL_SHARE = 0.9  # of the travel on either side of the pose that is used
 SPEED_SHARE = 0.9  # of the highest speed of an axis, at most
 ACCELERATION = 0.8  # of the highest acceleration, at most, on circles
 RESTS = 20.0  # rest behind a move, in 1/K_v
@@ -110,7 +110,7 @@ class DriveProgram:
         circles = [Pair(circle.radius, slower * circle.feed) for circle in circles]
         approach = APPROACH * slower * machine.axes[axis].max_speed
         rest = max(MIN_PROGRAM_REST, RESTS / machine.shipped_drive(axis, "tuning").K_v)
-        motions: list[Move | Arc | Sine | Dwell] = [Dwell(duration=REST)]
+        motions: list[Move | Arc | Sine | Dwell] = [Dwell(duration=REST_TIME)]
         stopping, turning = [], []
         at = machine.pose[axis]
         for stop in stops:
@@ -122,14 +122,14 @@ class DriveProgram:
             centre = tuple(_centre(machine, name, pair.radius) for name in (axis, partner) if name)
             if partner:
                 start = {axis: centre[0] + pair.radius, partner: centre[1]}
-                motions += [Move(to=start, feed=approach), Dwell(duration=REST)]
+                motions += [Move(to=start, feed=approach), Dwell(duration=REST_TIME)]
                 turning.append(len(motions))
                 motions.append(Arc(
                     plane=(axis, partner), feed=pair.feed, centre_by={axis: -pair.radius, partner: 0.0},
                     angle=sweep_of(pair, machine),
                 ))  # fmt: skip
             else:
-                motions += [Move(to={axis: centre[0]}, feed=approach), Dwell(duration=REST)]
+                motions += [Move(to={axis: centre[0]}, feed=approach), Dwell(duration=REST_TIME)]
                 turning.append(len(motions))
                 sine = SineMove(amplitude=pair.radius, frequency=pair.feed / (2 * math.pi * pair.radius), periods=2)
                 motions.append(Sine(axis=axis, moves=(sine,)))
@@ -137,7 +137,7 @@ class DriveProgram:
         interval = max(1, round(INTERVAL / machine.cycles.T_c)) * machine.cycles.T_c
         own = scenario.model_copy(
             update={
-                "motions": (*motions, Dwell(duration=REST)), "logging": None, "evaluate": (), "loads": (),
+                "motions": (*motions, Dwell(duration=REST_TIME)), "logging": None, "evaluate": (), "loads": (),
                 "recording": Recording(interval=interval, variables=None),
             }
         )  # fmt: skip
@@ -203,7 +203,7 @@ def _stop(
 def _centre(machine: Machine, axis: str, radius: float) -> float:
     """The pose, or as near to it as a circle has room [m]."""
     low, high = machine.axes[axis].travel
-    return min(max(machine.pose[axis], low + radius / ROOM), high - radius / ROOM)
+    return min(max(machine.pose[axis], low + radius / USED_TRAVEL_SHARE), high - radius / USED_TRAVEL_SHARE)
 
 
 def stops_of(machine: Machine, axis: str, shares: Sequence[tuple[float, float]]) -> list[Stop]:
@@ -213,8 +213,12 @@ def stops_of(machine: Machine, axis: str, shares: Sequence[tuple[float, float]])
     sense, room = (1.0, up) if up >= down else (-1.0, down)
     stops, at = [], 0.0
     for distance, feed in shares:
-        size = min(distance, ROOM * room / 2)
-        if not 0 <= at + sense * size <= ROOM * room if sense > 0 else not -ROOM * room <= at + sense * size <= 0:
+        size = min(distance, USED_TRAVEL_SHARE * room / 2)
+        if (
+            not 0 <= at + sense * size <= USED_TRAVEL_SHARE * room
+            if sense > 0
+            else not -USED_TRAVEL_SHARE * room <= at + sense * size <= 0
+        ):
             sense = -sense
         stops.append(Stop(sense * size, min(feed, SPEED_SHARE * machine.axes[axis].max_speed)))
         at += sense * size
@@ -230,7 +234,7 @@ def circles_of(machine: Machine, axis: str, partner: str, wanted: Sequence[tuple
     most = min([machine.path.acceleration, *(machine.axes[name].max_acceleration for name in names)])
     pairs = []
     for radius, feed in wanted:
-        r = min(radius, ROOM * span / 2)
+        r = min(radius, USED_TRAVEL_SHARE * span / 2)
         v = min(feed, SPEED_SHARE * speed, math.sqrt(ACCELERATION * most * r))
         # the limit of the jerk along the path holds for the turn as well: v^3/r^2
         v = min(v, (ACCELERATION * machine.path.jerk * r**2) ** (1 / 3))

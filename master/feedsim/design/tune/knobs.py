@@ -37,8 +37,8 @@ SYMMETRY = 0.25  # of the larger of neutral and present T_sym, either side
 NOTCH = {"f": (0.6, 1.7), "D_num": (0.3, 4.0), "D_den": (0.3, 2.0)}
 LEAST_DAMPING, MOST_DAMPING = 0.02, 1.5
 NEW_NOTCH = (0.05, 0.8)  # its frequency, in shares of half the sampling rate
-UNMEASURED = 1.0  # [dB] by which the gain at resonances may rise that nobody has measured
-SHALLOW = 0.9  # D_num/D_den above which a new band stop is left off
+UNMEASURED_GAIN_RISE = 1.0  # [dB] by which the gain at resonances may rise that nobody has measured
+SHALLOW_DAMPING_RATIO = 0.9  # D_num/D_den above which a new band stop is left off
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,11 @@ class Knobs:
         d = self.drive
         names = ["K_p", *(["T_n"] if d.speed_integrator else []), "K_v"]
         fit = self._fit(d)
-        knobs = [self._ranged(name) for name in names if getattr(d, name)]
+        knobs = [self._knob_with_range(name) for name in names if getattr(d, name)]
         if fit is not None:
-            knobs += [self._ranged("omega_0"), Knob("fit", min(FIT[0], 0.9 * fit), max(FIT[1], 1.1 * fit))]
+            knobs += [self._knob_with_range("omega_0"), Knob("fit", min(FIT[0], 0.9 * fit), max(FIT[1], 1.1 * fit))]
         if d.k_ffw > 0 and math.isfinite(self._neutral(d)):
-            off, width = self._off(d), SYMMETRY * max(self._neutral(d), d.T_sym)
+            off, width = self._lag_difference(d), SYMMETRY * max(self._neutral(d), d.T_sym)
             if width > 0:
                 knobs.append(Knob("off", min(-width, 1.1 * off), max(width, 1.1 * off), log=False))
         if not self.elastic:
@@ -121,29 +121,31 @@ class Knobs:
         d = self.drive
         at = {knob.name: knob.value(float(place)) for knob, place in zip(self.all, x, strict=True)}
         new: dict[str, object] = {
-            name: typed(name, at[name]) for name in ("K_p", "T_n", "K_v", "omega_0") if name in at
+            name: round_value(name, at[name]) for name in ("K_p", "T_n", "K_v", "omega_0") if name in at
         }
         if "fit" in at:
             K_p, omega_0 = (float(new.get(name, getattr(d, name))) for name in ("K_p", "omega_0"))  # type: ignore[arg-type]
-            new["D"] = typed("D", self.J * omega_0 / (2 * K_p) * at["fit"])
+            new["D"] = round_value("D", self.J * omega_0 / (2 * K_p) * at["fit"])
         for name in self._filters if self.elastic else ():
-            own = {part: typed(f"filter_1.{part}", at[f"{name}.{part}"]) for part in NOTCH if f"{name}.{part}" in at}
+            own = {
+                part: round_value(f"filter_1.{part}", at[f"{name}.{part}"]) for part in NOTCH if f"{name}.{part}" in at
+            }
             new[name] = getattr(d, name).model_copy(update=own)
-        if "new.f" in at and at["new.depth"] < SHALLOW:
+        if "new.f" in at and at["new.depth"] < SHALLOW_DAMPING_RATIO:
             shape = {"f": at["new.f"], "D_num": at["new.depth"] * at["new.D_den"], "D_den": at["new.D_den"]}
-            rounded = {part: typed(f"filter_1.{part}", value) for part, value in shape.items()}
+            rounded = {part: round_value(f"filter_1.{part}", value) for part, value in shape.items()}
             new["filter_1"] = Filter(type="band_stop", f=rounded["f"], D_num=rounded["D_num"], D_den=rounded["D_den"])
         changed = d.model_copy(update=new)
         if "off" in at:
             T_sym = max(0.0, self._neutral(changed) + at["off"])
-            changed = changed.model_copy(update={"T_sym": typed("T_sym", T_sym)})
+            changed = changed.model_copy(update={"T_sym": round_value("T_sym", T_sym)})
         return changed
 
     @property
     def _filters(self) -> tuple[str, ...]:
         return tuple(name for name in FILTERS if getattr(self.drive, name).type != "off")
 
-    def _ranged(self, name: str) -> Knob:
+    def _knob_with_range(self, name: str) -> Knob:
         low, high = RANGES[name]
         value = float(getattr(self.drive, name))
         least = min(MIN_RESET_TIME, value) if name == "T_n" else 0.0
@@ -158,14 +160,14 @@ class Knobs:
         assert d.T_n is not None
         omega = d.K_p / self.J
         square = 1 + 1 / (omega * d.T_n) ** 2
-        return 1 / (omega * math.sqrt(10 ** (UNMEASURED / 10) * square - 1))
+        return 1 / (omega * math.sqrt(10 ** (UNMEASURED_GAIN_RISE / 10) * square - 1))
 
     def _values(self, d: Drive) -> dict[str, float]:
         values = {name: float(getattr(d, name)) for name in RANGES if getattr(d, name)}
         fit = self._fit(d)
         if fit is not None:
             values["fit"] = fit
-        values["off"] = self._off(d)
+        values["off"] = self._lag_difference(d)
         for name in self._filters:
             values |= {f"{name}.{part}": float(getattr(getattr(d, name), part) or 0.0) for part in NOTCH}
         if not self._filters:
@@ -180,18 +182,18 @@ class Knobs:
     def _neutral(self, d: Drive) -> float:
         return loop_lag(d, self.cycles, self.J)
 
-    def _off(self, d: Drive) -> float:
+    def _lag_difference(self, d: Drive) -> float:
         return d.T_sym - self._neutral(d)
 
 
-def typed(name: str, value: float) -> float:
+def round_value(name: str, value: float) -> float:
     """A value [SI] of a drive's parameter, rounded to DIGITS in the unit in which it is shown."""
     row = parameters("controller")[name]
     shown = float(f"{convert(value, row.unit, row.display_unit):.{DIGITS}g}")
     return float(f"{convert(shown, row.display_unit, row.unit):.12g}")
 
 
-def matched(machine: Machine, axis: str, before: Machine) -> Machine:
+def match_lag(machine: Machine, axis: str, before: Machine) -> Machine:
     """The machine with T_dyn such that `axis` is as late as the slowest other axis.
 
     before: the machine as it was. Where the axis has become the slowest itself, those axes wait for it that were as
@@ -209,7 +211,7 @@ def matched(machine: Machine, axis: str, before: Machine) -> Machine:
     for name, lag in others.items():
         if abs(lag - was) <= max(NEUTRAL, NEUTRAL_SHARE * was) and target - lag > NEUTRAL:
             changes[name] = machine.shipped_drive(name, "matching").T_dyn + target - lag
-    return with_drives(machine, {name: {"T_dyn": typed("T_dyn", T_dyn)} for name, T_dyn in changes.items()})
+    return with_drives(machine, {name: {"T_dyn": round_value("T_dyn", T_dyn)} for name, T_dyn in changes.items()})
 
 
 def with_drives(machine: Machine, values: Mapping[str, Mapping[str, object]]) -> Machine:
@@ -232,7 +234,7 @@ def with_drives(machine: Machine, values: Mapping[str, Mapping[str, object]]) ->
 # --- A machine whose axes have a group of their drives with other values: a compensation, cogging ---------------------
 
 
-def compensated(machine: Machine, axis: str, group: str, values: Mapping[str, float | bool | int]) -> Machine:
+def set_compensation(machine: Machine, axis: str, group: str, values: Mapping[str, float | bool | int]) -> Machine:
     """A machine whose axis has a group of its drive with other values."""
     own = machine.axes[axis]
     kind = type(own.drive).model_fields[group].annotation
@@ -253,22 +255,22 @@ def with_groups(
     for axis, entry in values.items():
         scale = torque_scale(of, machine, axis)
         own = {name: scale * value if name.startswith("torque_") else value for name, value in entry.items()}
-        machine = compensated(machine, axis, group, own)
+        machine = set_compensation(machine, axis, group, own)
     return machine
 
 
 STRENGTH = 0.2  # of the friction, either way
 NO_FRICTION = 1e-6  # of all torques of a friction law: it has to have some
 GUIDE = 0.5  # share of the friction at the guide
-COGGING = 0.1  # of the Coulomb friction
+COGGING_TORQUE_SHARE = 0.1  # of the Coulomb friction
 ORDER = 10.0  # of the cogging per turn, where the number of pole pairs is not known
-PLAY = 2e-6  # [m]
+PLAY_WIDTH = 2e-6  # [m]
 # Contact that the play of an axis measured directly lies in: the motor against a slide that stands still.
 CONTACT, CONTACT_DAMPING = 300.0, 0.1  # [Hz], [1]
 MOTOR_SHARE_OF_INERTIA = 0.5  # share of the motor in the inertia that answers a torque at once
 # Wear takes preload away and widens the engaging zone; warm grease is half as viscous.
-WORN = {"F_C": 0.7, "F_S": 0.7, "F_log": 0.7, "sigma_0": 0.7, "W": 2.0}
-WARM = {"F_log": 0.5, "sigma_2": 0.5}
+WEAR_FACTORS = {"F_C": 0.7, "F_S": 0.7, "F_log": 0.7, "sigma_0": 0.7, "W": 2.0}
+WARMTH_FACTORS = {"F_log": 0.5, "sigma_2": 0.5}
 
 
 @dataclass(frozen=True)
@@ -296,7 +298,7 @@ def effects_of(machine: Machine, axes: Sequence[str]) -> Iterator[tuple[Effect, 
             yield effect, changed
 
 
-def _with(machine: Machine, axis: str, **changes: object) -> Machine:
+def _change_axis(machine: Machine, axis: str, **changes: object) -> Machine:
     return machine.model_copy(update={"axes": {**machine.axes, axis: machine.axes[axis].model_copy(update=changes)}})
 
 
@@ -307,7 +309,7 @@ def _friction(factors: Mapping[str, float]) -> Callable[[Machine, str], Machine 
             return None
         own = type(friction).model_fields
         values = {name: factor * float(getattr(friction, name)) for name, factor in factors.items() if name in own}
-        return _with(machine, axis, friction=friction.model_copy(update=values))
+        return _change_axis(machine, axis, friction=friction.model_copy(update=values))
 
     return of
 
@@ -316,7 +318,7 @@ def frictionless(machine: Machine, axes: Sequence[str]) -> Machine:
     """The machine with friction of no effect on some axes, motor and guide."""
     for axis in axes:
         machine = _friction(dict.fromkeys(SHARED_WITH_GUIDE, NO_FRICTION))(machine, axis) or machine
-        machine = _with(machine, axis, guide=None)
+        machine = _change_axis(machine, axis, guide=None)
     return machine
 
 
@@ -324,10 +326,10 @@ def _guide(machine: Machine, axis: str) -> Machine | None:
     own = machine.axes[axis]
     if own.guide is not None or not isinstance(own.friction, Friction):
         return None
-    return _with(machine, axis, guide=Guide.model_validate({"share": GUIDE}))
+    return _change_axis(machine, axis, guide=Guide.model_validate({"share": GUIDE}))
 
 
-def _cogging(machine: Machine, axis: str) -> Machine | None:
+def _add_cogging(machine: Machine, axis: str) -> Machine | None:
     drive, friction = machine.axes[axis].drive, machine.axes[axis].friction
     if (
         not isinstance(drive, Drive)
@@ -336,33 +338,35 @@ def _cogging(machine: Machine, axis: str) -> Machine | None:
     ):
         return None
     order = 2.0 * drive.p if drive.p else ORDER
-    return compensated(machine, axis, "cogging_1", {"order": order, "amplitude": COGGING * friction.F_C})
+    return set_compensation(
+        machine, axis, "cogging_1", {"order": order, "amplitude": COGGING_TORQUE_SHARE * friction.F_C}
+    )
 
 
-def _play(machine: Machine, axis: str) -> Machine | None:
+def _add_play(machine: Machine, axis: str) -> Machine | None:
     """Play of an axis measured at the motor shows in its position; measured directly it lies in a contact that the
     motor works against."""
     own = machine.axes[axis]
     if own.play or own.transmission is not None or not isinstance(own.drive, Drive):
         return None
     if own.drive.indirect:
-        return _with(machine, axis, play=PLAY)
+        return _change_axis(machine, axis, play=PLAY_WIDTH)
     if machine.plant is not None:
         return None
     inertia = MOTOR_SHARE_OF_INERTIA * checked_modes(machine).J_inf(axis)
     omega = 2 * math.pi * CONTACT
     stiffness = inertia / own.I_P**2 * omega**2
     values = {"stiffness": stiffness, "damping": 2 * CONTACT_DAMPING * stiffness / omega, "inertia": inertia}
-    return _with(machine, axis, transmission=Transmission.model_validate({**values, "play": PLAY}))
+    return _change_axis(machine, axis, transmission=Transmission.model_validate({**values, "play": PLAY_WIDTH}))
 
 
 _LEVEL = ("F_C", "F_S", "F_log")
 EFFECTS = (
     Effect("friction+", f"the friction {100 * STRENGTH:.0f} % higher", _friction(dict.fromkeys(_LEVEL, 1 + STRENGTH))),
     Effect("friction-", f"the friction {100 * STRENGTH:.0f} % lower", _friction(dict.fromkeys(_LEVEL, 1 - STRENGTH))),
-    Effect("worn", "worn axes: friction and sigma_0 30 % lower, W doubled", _friction(WORN)),
-    Effect("warm", "warm grease: F_log and sigma_2 halved", _friction(WARM)),
+    Effect("worn", "worn axes: friction and sigma_0 30 % lower, W doubled", _friction(WEAR_FACTORS)),
+    Effect("warm", "warm grease: F_log and sigma_2 halved", _friction(WARMTH_FACTORS)),
     Effect("guide", f"{100 * GUIDE:.0f} % of the friction at the guide", _guide),
-    Effect("cogging", f"cogging of {100 * COGGING:.0f} % of F_C, twice per pole pair", _cogging),
-    Effect("play", f"play of {1e6 * PLAY:.0f} um", _play),
+    Effect("cogging", f"cogging of {100 * COGGING_TORQUE_SHARE:.0f} % of F_C, twice per pole pair", _add_cogging),
+    Effect("play", f"play of {1e6 * PLAY_WIDTH:.0f} um", _add_play),
 )

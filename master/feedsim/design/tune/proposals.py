@@ -14,7 +14,7 @@ import numpy as np
 
 from feedsim.analysis import Diagnosis, Figure, PositioningTask, tasks
 from feedsim.analysis.circle import Term
-from feedsim.analysis.circle import name as name_of_term
+from feedsim.analysis.circle import term_name as name_of_term
 from feedsim.analysis.circle.words import worth_telling
 from feedsim.foundation.errors import FeedsimError, InputError
 from feedsim.foundation.units import convert, parameters
@@ -93,7 +93,7 @@ def torque_response(drive: Drive) -> float:
 # Off the neutral value by less than this share of it, or this time, a T_sym is neutral: rounding of what was typed.
 NEUTRAL_SHARE, NEUTRAL = 0.02, 20e-6
 # Off the value of the reference model by less than this share, a K_p fits it: an inertia is not known better.
-FITS = 0.1
+FIT_TOLERANCE = 0.1
 # Margins that a proposed gain keeps.
 GAIN_MARGIN, PHASE_MARGIN = 8.0, 40.0  # [dB], [deg]
 SHORTEST_REASON, SHORT_REASON = "shortest with", "as short as"  # how reasons begin that hold for any drive
@@ -108,7 +108,7 @@ PARAMETER_WORDS = {
     COMPENSATION: "friction compensation", "path.jerk": "jerk of the path",
     "drive.backlash_compensation.value": "backlash compensation",
 }  # fmt: skip
-WRITTEN = {"m": "um"}  # SI unit -> the unit that a value without a row in the table of the drive is written in
+WRITTEN_UNITS = {"m": "um"}  # SI unit -> the unit that a value without a row in the table of the drive is written in
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class Proposal:
     def shown(self, value: float, digits: int = 3, *, kept: bool = False) -> str:
         """A value of the parameter with its unit, as it is typed. kept: with zeros at its end."""
         own = parameters("controller").get(self.parameter.removeprefix("drive."))
-        unit = own.display_unit if own is not None else WRITTEN.get(self.unit, self.unit)
+        unit = own.display_unit if own is not None else WRITTEN_UNITS.get(self.unit, self.unit)
         number = f"{convert(value, self.unit, unit):{'#' * kept}.{digits}g}".rstrip(".")
         return f"{number}{'' if unit == '1' else f' {unit}'}"
 
@@ -171,13 +171,15 @@ def of_circle(
     terms = list(worth_telling(diagnosis))
     if terms and machine is not None and modes is not None:
         for axis in diagnosis.circle.axes:  # a model that is off makes more than one cause, and is named for the first
-            for proposal in _modelled(machine, modes, axis, name_of_term(terms[0])):
+            for proposal in _propose_reference_model(machine, modes, axis, name_of_term(terms[0])):
                 result[proposal.key] = replace(proposal, of=(terms[0].key, terms[0].axis))
         terms = _by_gain(terms, machine, modes)
     for term in terms:
-        proposals = _unknown(diagnosis, term) if machine is None or modes is None else _of(
-            diagnosis, term, machine, modes, searched
-        )  # fmt: skip
+        proposals = (
+            _propose_without_machine(diagnosis, term)
+            if machine is None or modes is None
+            else _propose_for_term(diagnosis, term, machine, modes, searched)
+        )
         for proposal in proposals:
             result.setdefault(proposal.key, replace(proposal, of=(term.key, term.axis)))
     # Of all peaks a value of the file that is off comes first, then compensations, then what any drive could do.
@@ -186,13 +188,17 @@ def of_circle(
     return [result[next(ordered) if key in places else key] for key in result]
 
 
-def _modelled(machine: Machine, modes: Modes, axis: str, cause: str) -> Iterator[Proposal]:
+def _propose_reference_model(machine: Machine, modes: Modes, axis: str, cause: str) -> Iterator[Proposal]:
     """The parameter of an axis's reference model that is off, if one is."""
     drive = machine.axes[axis].drive if axis in machine.axes else None
     if isinstance(drive, Drive):
         J = modes.J_tot(axis)
         K_p = model_gain(drive, J)
-        proposal = None if K_p is None or abs(drive.K_p / K_p - 1) <= FITS else _model(machine, axis, drive, J, cause)
+        proposal = (
+            None
+            if K_p is None or abs(drive.K_p / K_p - 1) <= FIT_TOLERANCE
+            else _fit_reference_model(machine, axis, drive, J, cause)
+        )
         yield from [] if proposal is None else [proposal]
 
 
@@ -207,10 +213,13 @@ def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -
     proposals = []
     for axis in axes:
         drive = machine.axes[axis].drive
-        if own := [*_modelled(machine, modes, axis, cause)]:
+        if own := [*_propose_reference_model(machine, modes, axis, cause)]:
             proposals += own
         elif isinstance(drive, Drive):
-            proposals += [*_neutral(machine, modes, axis, drive, cause), *_fitting(machine, modes, axis, drive, cause)]
+            proposals += [
+                *_propose_neutral_lag(machine, modes, axis, drive, cause),
+                *_propose_fitting_gain(machine, modes, axis, drive, cause),
+            ]
     return proposals
 
 
@@ -242,17 +251,17 @@ def of_run(
         if isinstance(task, PositioningTask):
             axis = task.approach.axis
             own = of_drives(machine, modes, [axis], f"stops of {axis}")
-            for proposal in own or _calmer(run, task, figures or {}):
+            for proposal in own or _propose_jerk(run, task, figures or {}):
                 proposals.setdefault(proposal.key, proposal)
     return list(proposals.values())
 
 
-def rings(settling_time: float, frequency: float) -> bool:
+def waits_for_ringing(settling_time: float, frequency: float) -> bool:
     """Whether ringing [Hz] is what an axis waits for until it has settled [s]: it lasts a period of it or more."""
     return math.isfinite(settling_time * frequency) and settling_time * frequency >= 1
 
 
-def _calmer(run: Run, task: PositioningTask, figures: Mapping[str, Figure]) -> Iterator[Proposal]:
+def _propose_jerk(run: Run, task: PositioningTask, figures: Mapping[str, Figure]) -> Iterator[Proposal]:
     """A jerk whose phases last a period of the ringing, of a stop that waits for it.
 
     A phase of constant jerk acts on a mode as its mean over that time, which is nothing over whole periods: the zeros
@@ -260,7 +269,7 @@ def _calmer(run: Run, task: PositioningTask, figures: Mapping[str, Figure]) -> I
     """
     path, axis = run.scenario.machine.path, task.approach.axis
     settling, ringing = (figures.get(f"{task.prefix}.{name}") for name in ("settling_time", "ringing_frequency"))
-    if settling is None or ringing is None or not rings(settling.value * 1e-3, ringing.value):
+    if settling is None or ringing is None or not waits_for_ringing(settling.value * 1e-3, ringing.value):
         return
     f = ringing.value
     own = run.scenario.machine.axes[axis]
@@ -272,7 +281,7 @@ def _calmer(run: Run, task: PositioningTask, figures: Mapping[str, Figure]) -> I
         yield Proposal(f"stops of {axis}", "", "path.jerk", path.jerk, jerk, "m/s^3", reason, "lower")
 
 
-def changed(machine: Machine, axis: str, values: Mapping[str, float]) -> Machine:
+def change_drive(machine: Machine, axis: str, values: Mapping[str, float]) -> Machine:
     """A machine with other values of an axis's drive, name -> SI."""
     own = machine.axes[axis]
     return machine.model_copy(
@@ -295,14 +304,16 @@ def least_margins(loops: Sequence[Loop], axis: str) -> tuple[float, float]:
     return min(20 * math.log10(loop.gain_margin) for loop in own), min(loop.phase_margin for loop in own)
 
 
-def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, searched: bool) -> Iterator[Proposal]:
+def _propose_for_term(
+    diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, searched: bool
+) -> Iterator[Proposal]:
     axes = diagnosis.circle.axes
     drives = {axis: machine.axes[axis].drive for axis in axes if axis in machine.axes}
     if len(drives) < 2 or not all(isinstance(drive, Drive) for drive in drives.values()):
         return
     match term.key:
         case "servo":
-            yield from _servo(axes, term.value, machine, modes)
+            yield from _propose_for_servo_mismatch(axes, term.value, machine, modes)
         case "radius" | "scale":
             cause = "mean radius" if term.key == "radius" else "unlike amplitudes"
             yield from of_drives(machine, modes, axes, cause)
@@ -311,7 +322,7 @@ def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, search
             drive = machine.axes[term.axis].drive
             assert isinstance(drive, Drive)
             cause = f"reversal peaks of {term.axis}"
-            for proposal in _fitting(machine, modes, term.axis, drive, cause):
+            for proposal in _propose_fitting_gain(machine, modes, term.axis, drive, cause):
                 # A lower gain answers friction later: it makes a peak larger, though the model would fit.
                 if term.value < 0 or proposal.direction == "higher":
                     yield proposal
@@ -319,9 +330,9 @@ def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, search
                 yield from _out_of_line(machine, modes, term.axis, drive, cause)
                 reason = "feedsim tune compensation finds its values"
                 yield Proposal(cause, term.axis, COMPENSATION, None, None, "1", reason, "on")
-                yield from _shorter(machine, modes, term.axis, drive, cause, searched)
+                yield from _propose_shorter_T_n(machine, modes, term.axis, drive, cause, searched)
         case "lost_motion":
-            yield from _backlash(machine, term)
+            yield from _propose_backlash(machine, term)
 
 
 def _by_gain(terms: Sequence[Term], machine: Machine, modes: Modes) -> list[Term]:
@@ -339,7 +350,7 @@ def _by_gain(terms: Sequence[Term], machine: Machine, modes: Modes) -> list[Term
         if not 0 < present < math.inf:
             return 0.0
         fitting = model_gain(drive, J)
-        K_p = drive.K_p if fitting is None or 1 - drive.K_p / fitting <= FITS else fitting
+        K_p = drive.K_p if fitting is None or 1 - drive.K_p / fitting <= FIT_TOLERANCE else fitting
         T_n = drive.T_n
         if drive.speed_integrator and T_n is not None:
             T_n = min(T_n, max(USUAL_RESET_RATIO * J / K_p, MIN_RESET_TIME))
@@ -349,7 +360,9 @@ def _by_gain(terms: Sequence[Term], machine: Machine, modes: Modes) -> list[Term
     return [next(ordered) if term.key == "peaks" else term for term in terms]
 
 
-def _servo(axes: tuple[str, str], value: float, machine: Machine, modes: Modes) -> Iterator[Proposal]:
+def _propose_for_servo_mismatch(
+    axes: tuple[str, str], value: float, machine: Machine, modes: Modes
+) -> Iterator[Proposal]:
     """Of a servo mismatch: the parameter that makes most of it, and T_dyn of the early axis, which hides all of it."""
     late, early = axes if value > 0 else axes[::-1]
     cause = f"servo mismatch: {late} is {abs(value) * 1e3:.3g} ms later than {early}"
@@ -360,24 +373,26 @@ def _servo(axes: tuple[str, str], value: float, machine: Machine, modes: Modes) 
     parts: list[tuple[float, Proposal]] = []
     missing = feedforward_lag(L) - feedforward_lag(E)
     if missing > 0:
-        parts.append((missing, _feedforward(machine, modes, late, early, L, E, cause)))
+        parts.append((missing, _propose_feedforward(machine, modes, late, early, L, E, cause)))
     off = {axis: drive.T_sym - neutral[axis] for axis, drive in ((late, L), (early, E))}
     worst = max(off, key=lambda axis: abs(off[axis]))
     if off[late] - off[early] > NEUTRAL:
-        parts.append((off[late] - off[early], _symmetry(worst, machine.axes[worst].drive, neutral[worst], cause)))  # type: ignore[arg-type]
+        parts.append((off[late] - off[early], _propose_T_sym(worst, machine.axes[worst].drive, neutral[worst], cause)))  # type: ignore[arg-type]
     loops = L.T_dyn + neutral[late] - E.T_dyn - neutral[early]
     if loops > NEUTRAL and L.T_dyn >= loops - NEUTRAL:
         reason = f"{early} then waits as long as {late}"
         less = Proposal(cause, late, "drive.T_dyn", L.T_dyn, max(L.T_dyn - loops, 0.0), "s", reason, "lower")
         parts.append((loops, less))
     elif loops > NEUTRAL:
-        parts.append((loops, _matching(early, E, E.T_dyn + loops, late, cause)))
+        parts.append((loops, _propose_T_dyn(early, E, E.T_dyn + loops, late, cause)))
     yield from (proposal for _, proposal in sorted(parts, key=lambda part: -part[0]))
     if axis_lag(L) - axis_lag(E) < 0.5 * abs(value):  # the drives as the file has them do not explain it
-        yield _matching(early, E, E.T_dyn + abs(value), late, cause)
+        yield _propose_T_dyn(early, E, E.T_dyn + abs(value), late, cause)
 
 
-def _feedforward(machine: Machine, modes: Modes, late: str, early: str, L: Drive, E: Drive, cause: str) -> Proposal:
+def _propose_feedforward(
+    machine: Machine, modes: Modes, late: str, early: str, L: Drive, E: Drive, cause: str
+) -> Proposal:
     if L.k_ffw != E.k_ffw or E.k_ffw >= 1:
         k = max(E.k_ffw, L.k_ffw) if L.k_ffw != E.k_ffw else 1.0
         return Proposal(
@@ -386,56 +401,60 @@ def _feedforward(machine: Machine, modes: Modes, late: str, early: str, L: Drive
         )  # fmt: skip
     K_v = (1 - L.k_ffw) / feedforward_lag(E)
     before, after = (
-        least_margins(judge(entry, modes), late) for entry in (machine, changed(machine, late, {"K_v": K_v}))
+        least_margins(judge(entry, modes), late) for entry in (machine, change_drive(machine, late, {"K_v": K_v}))
     )
     reason = f"without feedforward an axis is 1/K_v late: as much as {early} is"
     if after[0] < GAIN_MARGIN or after[1] < PHASE_MARGIN:
         K_v = (1 - E.k_ffw) / feedforward_lag(L)
         before, after = (
-            least_margins(judge(entry, modes), early) for entry in (machine, changed(machine, early, {"K_v": K_v}))
+            least_margins(judge(entry, modes), early) for entry in (machine, change_drive(machine, early, {"K_v": K_v}))
         )
         reason = f"{late} has no margin for a higher K_v, so {early} is made as slow"
         return Proposal(cause, early, "drive.K_v", E.K_v, K_v, "1/s", reason, "lower", (before, after))
     return Proposal(cause, late, "drive.K_v", L.K_v, K_v, "1/s", reason, "higher", (before, after))
 
 
-def _symmetry(axis: str, drive: Drive, neutral: float, cause: str) -> Proposal:
+def _propose_T_sym(axis: str, drive: Drive, neutral: float, cause: str) -> Proposal:
     return Proposal(
         cause, axis, "drive.T_sym", drive.T_sym, neutral, "s", "the lag of its speed loop: with it the following error "
         "of slow motions is 0", "higher" if neutral > drive.T_sym else "lower",
     )  # fmt: skip
 
 
-def _matching(axis: str, drive: Drive | None, proposed: float, late: str, cause: str) -> Proposal:
+def _propose_T_dyn(axis: str, drive: Drive | None, proposed: float, late: str, cause: str) -> Proposal:
     present = drive.T_dyn if drive is not None else None
     return Proposal(
         cause, axis, "drive.T_dyn", present, proposed, "s", f"dynamic matching: {axis} then waits for {late}", "higher"
     )
 
 
-def _neutral(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
+def _propose_neutral_lag(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
     neutral = loop_lag(drive, machine.cycles, modes.J_tot(axis))
     if (
         drive.k_ffw > 0
         and 0 < neutral < math.inf
         and abs(drive.T_sym - neutral) > max(NEUTRAL, NEUTRAL_SHARE * neutral)
     ):
-        yield _symmetry(axis, drive, neutral, cause)
+        yield _propose_T_sym(axis, drive, neutral, cause)
 
 
-def _fitting(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
+def _propose_fitting_gain(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
     K_p = model_gain(drive, modes.J_tot(axis))
-    if K_p is None or abs(drive.K_p / K_p - 1) <= FITS or [*_modelled(machine, modes, axis, cause)]:
+    if (
+        K_p is None
+        or abs(drive.K_p / K_p - 1) <= FIT_TOLERANCE
+        or [*_propose_reference_model(machine, modes, axis, cause)]
+    ):
         return
     before, after = (
-        least_margins(judge(entry, modes), axis) for entry in (machine, changed(machine, axis, {"K_p": K_p}))
+        least_margins(judge(entry, modes), axis) for entry in (machine, change_drive(machine, axis, {"K_p": K_p}))
     )
     reason = "J omega_0/(2 D), which the reference model stands for"
     direction = "higher" if K_p > drive.K_p else "lower"
     yield Proposal(cause, axis, "drive.K_p", drive.K_p, K_p, "N.m.s/rad", reason, direction, (before, after))
 
 
-def _model(machine: Machine, axis: str, drive: Drive, J: float, cause: str) -> Proposal | None:
+def _fit_reference_model(machine: Machine, axis: str, drive: Drive, J: float, cause: str) -> Proposal | None:
     """The parameter of the reference model with which both K_p and T_sym fit it; None where none is."""
     assert drive.omega_0 is not None
     assert drive.D is not None
@@ -450,8 +469,8 @@ def _model(machine: Machine, axis: str, drive: Drive, J: float, cause: str) -> P
     # D/omega_0 alone counts: damping that the other axes do not have is what is off.
     if (
         usual
-        and not any(abs(drive.D / D - 1) <= FITS for D in usual)
-        and abs(drive.D / factor / usual[0] - 1) <= 2 * FITS
+        and not any(abs(drive.D / D - 1) <= FIT_TOLERANCE for D in usual)
+        and abs(drive.D / factor / usual[0] - 1) <= 2 * FIT_TOLERANCE
     ):
         direction = "lower" if factor > 1 else "higher"
         return Proposal(cause, axis, "drive.D", drive.D, drive.D / factor, "1", reason, direction)
@@ -467,7 +486,7 @@ def _out_of_line(machine: Machine, modes: Modes, axis: str, drive: Drive, cause:
 
     def ratio(name: str, own: Drive) -> float:
         J = modes.J_tot(name)
-        K_p = None if [*_modelled(machine, modes, name, "")] else model_gain(own, J)
+        K_p = None if [*_propose_reference_model(machine, modes, name, "")] else model_gain(own, J)
         return own.T_n * (K_p or own.K_p) / J if own.speed_integrator and own.T_n else math.inf
 
     others = [
@@ -495,7 +514,7 @@ def _out_of_line(machine: Machine, modes: Modes, axis: str, drive: Drive, cause:
 
     for proposal in sorted(proposals, key=response):
         value = {proposal.parameter.removeprefix("drive."): proposal.proposed}
-        after = least_margins(judge(changed(machine, axis, value), modes), axis)  # type: ignore[arg-type]
+        after = least_margins(judge(change_drive(machine, axis, value), modes), axis)  # type: ignore[arg-type]
         if after[0] >= GAIN_MARGIN and after[1] >= PHASE_MARGIN:
             yield replace(proposal, margins=(before, after))
 
@@ -508,7 +527,9 @@ def _without_feedforward(machine: Machine, axes: Sequence[str], cause: str) -> I
             yield Proposal(cause, axis, "drive.k_ffw", drive.k_ffw, 1.0, "1", reason, "higher")
 
 
-def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str, searched: bool) -> Iterator[Proposal]:
+def _propose_shorter_T_n(
+    machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str, searched: bool
+) -> Iterator[Proposal]:
     """A shorter T_n: the integral part answers friction sooner, as far as margins allow."""
     if not drive.speed_integrator or drive.T_n is None or drive.T_n <= MIN_RESET_TIME:
         return
@@ -522,7 +543,7 @@ def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
     low, high, after = math.log(MIN_RESET_TIME), math.log(drive.T_n), before
     for _ in range(RESET_HALVINGS):
         middle = 0.5 * (low + high)
-        there = least_margins(judge(changed(machine, axis, {"T_n": math.exp(middle)}), modes), axis)
+        there = least_margins(judge(change_drive(machine, axis, {"T_n": math.exp(middle)}), modes), axis)
         if there[0] >= GAIN_MARGIN and there[1] >= PHASE_MARGIN:
             high, after = middle, there
         else:
@@ -532,7 +553,7 @@ def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
         yield Proposal(cause, axis, "drive.T_n", drive.T_n, T_n, "s", reason, "lower", (before, after))
 
 
-def _backlash(machine: Machine, term: Term) -> Iterator[Proposal]:
+def _propose_backlash(machine: Machine, term: Term) -> Iterator[Proposal]:
     drive = machine.axes[term.axis].drive
     if not isinstance(drive, Drive):
         return
@@ -545,7 +566,7 @@ def _backlash(machine: Machine, term: Term) -> Iterator[Proposal]:
     )  # fmt: skip
 
 
-def _unknown(diagnosis: Diagnosis, term: Term) -> Iterator[Proposal]:
+def _propose_without_machine(diagnosis: Diagnosis, term: Term) -> Iterator[Proposal]:
     """What a circle alone shows: directions, and amounts that need no machine."""
     first, second = diagnosis.circle.axes
     if term.key == "servo":

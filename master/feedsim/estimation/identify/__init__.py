@@ -5,13 +5,27 @@ Start with stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (out
 """
 
 from feedsim.estimation.identify.axis_limits import AxisLimits, identify_axis_limits
-from feedsim.estimation.identify.friction_file import Identified
-from feedsim.estimation.identify.read import Provenance, Recorded, named_apart, read_records, read_traces
+from feedsim.estimation.identify.friction_file import IdentifiedFriction
+from feedsim.estimation.identify.read import Provenance, RecordedAxis, named_apart, read_records, read_traces
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Estimate, Identification
-from feedsim.estimation.identify.stages import STAGES, Asked, Options, Progress, identify
+from feedsim.estimation.identify.stages import STAGES, AxisRequest, Options, Progress, identify
 
 __all__ = [
-    "STAGES", "Asked", "AxisLimits", "Estimate", "Identification", "Identified", "Options", "Progress", "Provenance",
-    "Record", "Recorded", "identify", "identify_axis_limits", "named_apart", "read_records", "read_traces",
+    "STAGES",
+    "AxisLimits",
+    "AxisRequest",
+    "Estimate",
+    "Identification",
+    "IdentifiedFriction",
+    "Options",
+    "Progress",
+    "Provenance",
+    "Record",
+    "RecordedAxis",
+    "identify",
+    "identify_axis_limits",
+    "named_apart",
+    "read_records",
+    "read_traces",
 ]  # fmt: skip

@@ -90,23 +90,23 @@ def identify_axis_limits(t: ArrayLike, position: ArrayLike) -> AxisLimits:
     at, x = np.asarray(t, dtype=np.float64), np.asarray(position, dtype=np.float64)
     if at.ndim != 1 or at.shape != x.shape or not np.all(np.isfinite(x)) or not np.all(np.diff(at) > 0):
         raise InputError("limits of an axis need ascending instants and a finite position at each of them")
-    fitted_moves = [move for begin, end in _moves(x) if (move := _fit(at[begin:end], x[begin:end])) is not None]
+    fitted_moves = [move for begin, end in _find_moves(x) if (move := _fit(at[begin:end], x[begin:end])) is not None]
     if not fitted_moves:
         raise InputError(
             "no move from rest to rest with phases of constant jerk is in the record: acceleration and jerk of the "
             "axis stay unknown"
         )
-    jerk = _largest([move.jerk for move in fitted_moves])
+    jerk = _mean_of_largest([move.jerk for move in fitted_moves])
     assert jerk is not None
     return AxisLimits(
-        _largest([move.acceleration for move in fitted_moves]),
+        _mean_of_largest([move.acceleration for move in fitted_moves]),
         jerk,
-        _largest([move.speed for move in fitted_moves]),
+        _mean_of_largest([move.speed for move in fitted_moves]),
         tuple(fitted_moves),
     )
 
 
-def _moves(x: Floats) -> list[tuple[int, int]]:
+def _find_moves(x: Floats) -> list[tuple[int, int]]:
     """First and last row (+1) of what runs one way from rest to rest, some rows of rest on either side."""
     steps = np.diff(x)
     rounding = 1e-7 * np.abs(steps).max(initial=0)  # of what was converted to and fro
@@ -159,7 +159,7 @@ def _fit(t: Floats, x: Floats) -> Move | None:
     )  # fmt: skip
 
 
-def _largest(values: list[float | None]) -> float | None:
+def _mean_of_largest(values: list[float | None]) -> float | None:
     """Mean of the values that are alike with the largest one."""
     known = np.array([value for value in values if value is not None])
     return float(known[known >= known.max() * (1 - _MAX_DIFFERENCE)].mean()) if len(known) else None

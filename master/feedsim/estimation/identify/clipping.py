@@ -35,7 +35,7 @@ MOST_SHOWN = 3  # stretches of time that the message names
 
 
 @dataclass(frozen=True)
-class _Heap:
+class _TorqueLimit:
     """Where the torque is largest on a side (1 or -1): that times the side, what it scatters by [N.m]; rows (N,)."""
 
     side: float
@@ -43,13 +43,13 @@ class _Heap:
     reach: float
     rows: NDArray[np.bool_]
 
-    def like(self, other: _Heap) -> bool:
+    def equals_limit(self, other: _TorqueLimit) -> bool:
         """Whether both end at the same limit: a range is as wide to either side."""
         return abs(self.limit - other.limit) <= self.reach + other.reach
 
 
 @dataclass(frozen=True)
-class _Needed:
+class _NeededTorque:
     """Torque that the motion of a record needs, and its standard deviation (N,) [N.m]; nan where it is not known."""
 
     torque: Array
@@ -68,18 +68,18 @@ def without_clipped(
     left_out: what the caller does with such rows.
     simulated: (N,) of each record: torque [N.m] of a machine on this motion, in place of inertia and simple friction.
     """
-    heaps = [tuple(_heap(record, side) for side in (1.0, -1.0)) for record in records]
+    heaps = [tuple(_find_torque_limit(record, side) for side in (1.0, -1.0)) for record in records]
     trial = [
         replace(record, clipped=np.any([heap.rows for heap in both], axis=0))
         for record, both in zip(records, heaps, strict=True)
     ]
     left = 0.0
-    models: list[list[_Needed]] = []
+    models: list[list[_NeededTorque]] = []
     if simulated is not None:  # another machine than that of the record needs another torque everywhere
         off = [(torque - each.torque)[~each.clipped] for each, torque in zip(trial, simulated, strict=True)]  # type: ignore[operator]
         # Where no row is beside the limits, nothing says how well the machine's torque is that of the record.
         left = float(np.sqrt(np.mean(rest**2))) if len(rest := np.concatenate(off)) else np.inf
-        models.append([_Needed(torque, np.zeros(len(torque))) for torque in simulated])
+        models.append([_NeededTorque(torque, np.zeros(len(torque))) for torque in simulated])
     else:
         slow = REST_SPEED_SHARE * max((float(np.max(np.abs(smooth_speed(record)))) for record in records), default=0.0)
         with suppress(InputError):
@@ -98,7 +98,7 @@ def without_clipped(
     result, said = [], list[Finding]()
     for k, (record, both) in enumerate(zip(records, heaps, strict=True)):
         # What one record shows of a limit holds for all that end at it.
-        kept = [heap for heap in both if any(heap.like(other) for other in proven)]
+        kept = [heap for heap in both if any(heap.equals_limit(other) for other in proven)]
         if not kept:
             result.append(record)
             continue
@@ -131,7 +131,7 @@ def limit_shown(record: Record) -> float | None:
     if not record.driven:
         return None
     side = 1.0 if np.max(record.torque) >= -np.min(record.torque) else -1.0
-    heap = _heap(record, side)
+    heap = _find_torque_limit(record, side)
     return heap.limit if np.count_nonzero(heap.rows) > LIMIT_ROWS_SHARE * len(record) else None
 
 
@@ -146,14 +146,14 @@ def _reach(record: Record) -> float:
     return float(max(CLIPPING_SIGMAS * white(record.torque) / np.sqrt(MEAN), resolution(record.torque)))
 
 
-def _heap(record: Record, side: float) -> _Heap:
+def _find_torque_limit(record: Record, side: float) -> _TorqueLimit:
     """Rows about the largest torque on a side: those within a mean's length of one whose mean lies there."""
     mean, torque, reach = side * _smooth(record), side * record.torque, _reach(record)
     # Of a peak the rows beside it may lie below every mean.
     limit = min(float(np.median(torque[mean >= np.max(mean) - 2 * reach])), float(np.max(mean)))
     wide = np.convolve((mean >= limit - reach).astype(np.float64), np.ones(MEAN), "same") > 0.5
     wide &= not np.all(wide)  # a torque that never changes ends at no limit
-    return _Heap(side, limit, reach, wide)
+    return _TorqueLimit(side, limit, reach, wide)
 
 
 def _ways(record: Record, slow: float) -> dict[float, NDArray[np.bool_]]:
@@ -162,7 +162,7 @@ def _ways(record: Record, slow: float) -> dict[float, NDArray[np.bool_]]:
     return {way: way * speed > slow for way in (1.0, -1.0)}
 
 
-def _of_line(record: Record, rigid: Inertia, slow: float) -> _Needed:
+def _of_line(record: Record, rigid: Inertia, slow: float) -> _NeededTorque:
     """By a rigid axis with simple friction.
 
     Rows in one direction determine constant load and friction as one sum, which is no torque of the other direction.
@@ -174,13 +174,13 @@ def _of_line(record: Record, rigid: Inertia, slow: float) -> _Needed:
     torque = X @ np.array([rigid.estimates[name].value for name in names])
     seen = np.unique(np.sign(rigid.speeds))
     known = np.any([rows for way, rows in _ways(record, slow).items() if way in seen], axis=0)
-    return _Needed(
+    return _NeededTorque(
         np.where(known, torque if record.load is None else torque + record.load, np.nan),
         np.sqrt(np.einsum("ij,jk,ik->i", X, rigid.covariance, X)),
     )
 
 
-def _of_inertia(record: Record, J: float, slow: float) -> _Needed:
+def _of_inertia(record: Record, J: float, slow: float) -> _NeededTorque:
     """By an inertia that is known, with the friction and load of either direction as its rows beside the heaps have
     them. record: with its heaps marked."""
     assert record.clipped is not None
@@ -194,19 +194,21 @@ def _of_inertia(record: Record, J: float, slow: float) -> _Needed:
             off = (_smooth(record) - accelerating)[free]
             torque[way] = accelerating[way] + float(np.median(off))
             sigma[way] = float(np.std(off)) * np.sqrt(MEAN / len(off))  # neighbours share their means
-    return _Needed(torque, sigma)
+    return _NeededTorque(torque, sigma)
 
 
-def _proven(record: Record, both: Sequence[_Heap], needed: _Needed, margin: float, shortest: int) -> Sequence[_Heap]:
+def _proven(
+    record: Record, both: Sequence[_TorqueLimit], needed: _NeededTorque, margin: float, shortest: int
+) -> Sequence[_TorqueLimit]:
     """The heaps of a record at which its torque is cut off.
 
     A range is as wide to either side: where both were cut off, at unlike limits, what is needed is wrong.
     """
-    proven = [heap for heap in both if _beyond(heap, record, needed, margin, shortest)]
-    return proven if len(proven) < 2 or proven[0].like(proven[1]) else []
+    proven = [heap for heap in both if _needs_more_torque(heap, record, needed, margin, shortest)]
+    return proven if len(proven) < 2 or proven[0].equals_limit(proven[1]) else []
 
 
-def _beyond(heap: _Heap, record: Record, needed: _Needed, margin: float, shortest: int) -> bool:
+def _needs_more_torque(heap: _TorqueLimit, record: Record, needed: _NeededTorque, margin: float, shortest: int) -> bool:
     """Whether the motion needs clearly more than the limit, and than the torque there, over some run of the heap, of so
     many means at least."""
     limit, side = heap.limit, heap.side
@@ -221,7 +223,7 @@ def _beyond(heap: _Heap, record: Record, needed: _Needed, margin: float, shortes
     return max(beyond(), default=-np.inf) > max(CLIPPED_EXCESS * abs(limit), margin)
 
 
-def _words(record: Record, heaps: Sequence[_Heap], models: Sequence[_Needed], left_out: str) -> Finding:
+def _words(record: Record, heaps: Sequence[_TorqueLimit], models: Sequence[_NeededTorque], left_out: str) -> Finding:
     assert record.clipped is not None
     limits = " and ".join(f"{heap.side * heap.limit:+.4g} N.m" for heap in heaps)
     parts = runs(record.clipped)

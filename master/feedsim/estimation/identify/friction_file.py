@@ -32,7 +32,7 @@ FRICTION_FILE = "friction.yaml"
 # Relative 5e-8 at most: what is calculated from the file is that of the fit to 1e-6, and a person can still read it.
 DIGITS = 8
 FILE_COLUMNS = 118
-EXACT = 8  # significant digits of the other values of a group `identified`
+EXACT_DIGITS = 8  # significant digits of the other values of a group `identified`
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class IdentifiedFriction:
     """An identification with what it rests on.
 
     Attributes:
@@ -87,7 +87,7 @@ class Identified:
         return [note for note in dict.fromkeys(notes) if note]
 
 
-def friction_yaml(identified: Identified, software: Mapping[str, str]) -> str:
+def friction_yaml(identified: IdentifiedFriction, software: Mapping[str, str]) -> str:
     """Text of friction.yaml. software: versions, of feedsim and what it calculates with.
 
     Raises OutputError where the values make no friction, e.g. one beyond its range.
@@ -252,7 +252,7 @@ def _line(estimate: Estimate) -> Line:
     return Line(estimate.value, "; ".join(part for part in (spread, remark_text(estimate)) if part))
 
 
-def _head(identified: Identified, version: str) -> Sequence[str]:
+def _head(identified: IdentifiedFriction, version: str) -> Sequence[str]:
     axis = identified.found.axis
     machine = f" of {identified.subject.machine.name}" if identified.subject is not None else ""
     lines = [
@@ -266,7 +266,7 @@ def _head(identified: Identified, version: str) -> Sequence[str]:
     return [*lines, f"The {hint}"] if hint else lines
 
 
-def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, Any]:
+def _origin(identified: IdentifiedFriction, software: Mapping[str, str]) -> dict[str, Any]:
     """The group `identified`: where the values come from, for people and programs."""
     identification, subject = identified.found, identified.subject
     sources = zip(identified.traces, identified.sources, strict=True)
@@ -314,7 +314,7 @@ def _interval(estimate: Estimate) -> Mapping[str, Any]:
 
 
 def _quantity(value: float, unit: str) -> str | float:
-    return float(f"{value:.{EXACT}g}") if unit == units.DIMENSIONLESS else f"{value:.{EXACT}g} {unit}"
+    return float(f"{value:.{EXACT_DIGITS}g}") if unit == units.DIMENSIONLESS else f"{value:.{EXACT_DIGITS}g} {unit}"
 
 
 def friction_text(
@@ -352,7 +352,7 @@ def friction_text(
         remark = " ".join(parameters[key].remark.split())
         lines.append(f"{entry:<{column}}# {remark}" if remark else entry)
     if identified:
-        content = {"identified": _plain(identified)}
+        content = {"identified": _plain_value(identified)}
         group: str = yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=FILE_COLUMNS)
         lines += ["", "# Where the values come from: kept and shown, not calculated with.", group.rstrip("\n")]
     return "\n".join(lines) + "\n"
@@ -391,12 +391,12 @@ def _number(value: float) -> str:
     return repr(value)
 
 
-def _plain(value: Any) -> Any:
+def _plain_value(value: Any) -> Any:
     """Values as YAML has them: numbers of Python, no tuples; what is not finite is left open."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
+        return {str(key): _plain_value(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(inner) for inner in value]
+        return [_plain_value(inner) for inner in value]
     if isinstance(value, bool) or value is None or isinstance(value, (str, int)):
         return value
     number = float(value)

@@ -206,7 +206,7 @@ def parts(record: Record, motion: Motion) -> tuple[Part, ...]:
     the setpoint was recorded, it says when the axis is asked to move; else the speed does.
     """
     speed = motion.coarse()
-    moving = _moving(record, motion, speed)
+    moving = _find_moving_rows(record, motion, speed)
     angle = np.asarray(motion.speed.antiderivative()(motion.time), dtype=np.float64)
     result = [
         _part(motion, speed, angle, first, last) for first, last in runs(moving) if last - first >= MIN_STRETCH_ROWS
@@ -214,7 +214,7 @@ def parts(record: Record, motion: Motion) -> tuple[Part, ...]:
     return tuple(result)
 
 
-def _moving(record: Record, motion: Motion, speed: Array) -> NDArray[np.bool_]:
+def _find_moving_rows(record: Record, motion: Motion, speed: Array) -> NDArray[np.bool_]:
     """(N,) whether the axis moves within half a pause about each row."""
     asked = np.abs(speed) > max(REST_SHARE * float(np.max(np.abs(speed))), NOISES * motion.noise)
     if record.setpoint is not None:
@@ -387,13 +387,13 @@ class RecordTorque:
         if step > QUANTISATION_SHARE * noise:
             first = rng.uniform(0, step)
             seen = np.round((seen + first) / step) * step - first
-        return self._by(motion(replace(self.record, **{source: seen}), source))
+        return self._with_motion(motion(replace(self.record, **{source: seen}), source))
 
     def smoother(self, factor: float) -> RecordTorque:
         """The same rows with the motion smoothed by a low-pass whose cut-off is lower by the factor."""
-        return self._by(motion(self.record, self.motion.source, smoother=factor))
+        return self._with_motion(motion(self.record, self.motion.source, smoother=factor))
 
-    def _by(self, other: Motion) -> RecordTorque:
+    def _with_motion(self, other: Motion) -> RecordTorque:
         moved = copy(self)
         moved.motion = other
         moved._law, moved._moved = {}, {}

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 # --- A rigid axis with friction that moves under a recorded torque, and what the record lacks of that motion ----------
-# The recorded motion gives its first angle and speed only. Start reading at reached().
+# The recorded motion gives its first angle and speed only. Start reading at simulate_angle().
 
 
 # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
@@ -52,7 +52,7 @@ OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may li
 BLOCKS = 10  # stretches of a record whose torque residual may be turned
 
 
-def reached(record: Record, law: FrictionLaw, values: Mapping[str, float]) -> Array:
+def simulate_angle(record: Record, law: FrictionLaw, values: Mapping[str, float]) -> Array:
     """(N,) angle [rad] that a rigid axis reaches under the record's torque, from the recorded angle and speed on.
 
     J dn/dt = M_a(t + delay) - M_0 - M_fr - load; the axis goes on by itself, whatever was recorded.
@@ -105,7 +105,7 @@ class OpenLoop:
     def residual(self, values: Mapping[str, float], push: Array | float = 0.0) -> Array:
         """(N,) recorded less reached angle [rad]. push: (N - 1,) added to the torque [N.m]."""
         h = self.record.interval
-        drifts = values[self.change] * self._elapsed(self.record.time[:-1] + h / 2)
+        drifts = values[self.change] * self._elapsed_share(self.record.time[:-1] + h / 2)
         torque = self.torque(values["delay"]) - drifts + push
         parameters = {name: values[name] for name in self.model.law.names}
         z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
@@ -120,18 +120,18 @@ class OpenLoop:
         load = values["M_0"] - values[self.change] / 2
         z = first_deflection(values, self.n, float(self.torque(values["delay"])[0]) - load)
         share = min(max(z / deflection(values), -1.0), 1.0)
-        return self.model.residual(values, share, 0.0) + values[self.change] * self._elapsed(
+        return self.model.residual(values, share, 0.0) + values[self.change] * self._elapsed_share(
             self.record.time[self.model.rows]
         )
 
-    def _elapsed(self, time: Array) -> Array:
+    def _elapsed_share(self, time: Array) -> Array:
         """Time since the middle of the record, as a share of its duration."""
         return np.asarray((time - self.record.time[0]) / self.duration - 0.5, dtype=np.float64)
 
     def slope(self, values: Mapping[str, float]) -> float:
         """Change of the load over the record by a regression of the torque residual [N.m]."""
         known = {**values, self.change: 0.0}
-        elapsed, speed = self._elapsed(self.record.time[self.model.rows]), self.model.moved(values["delay"])[1]
+        elapsed, speed = self._elapsed_share(self.record.time[self.model.rows]), self.model.moved(values["delay"])[1]
         columns = np.column_stack([elapsed, np.ones_like(elapsed), np.sign(speed), speed])
         return -float(np.linalg.lstsq(columns, self.torque_residual(known), rcond=None)[0][0])
 
@@ -198,7 +198,7 @@ def substeps(values: Mapping[str, float], h: float) -> int:
 
 
 MIN_RECORD_TIME = 3.0  # [s]: in less the drift of a wrong torque hardly shows beside the error of the first speed
-SLIDING = 20.0  # times the way of pre-sliding (bristles and engaging zone) that a move must be long
+SLIDING_TRAVEL_FACTOR = 20.0  # times the way of pre-sliding (bristles and engaging zone) that a move must be long
 LEAST_GAIN = 0.02  # of the position's rms that must be won
 FRICTION_MOVES = 0.2  # of F_C, and
 LOAD_MOVES = 1.0  # of F_C: changes of F_C and M_0 beyond which something else is wrong
@@ -210,7 +210,7 @@ SINES = "sines; the open loop needs general motion"
 NO_DRIFT = "its interval includes 0: the load is taken as constant"
 
 
-def balanced(
+def balance_loads(
     records: Sequence[Record], law: FrictionLaw, estimates: Mapping[str, Estimate], *, hold: Collection[str] = ()
 ) -> Balance:
     """F_C and M_0 from the position in open loop.
@@ -241,7 +241,7 @@ def balanced(
     directions: set[float] = set()
     for record in records:
         model = None if record.angle is None else _model(record, law)
-        why = _unfit(record, model, values)
+        why = _explain_unfit_record(record, model, values)
         if why:
             whys.append((record.name, why))
         elif model is not None:
@@ -282,7 +282,7 @@ def balanced(
         start = [axis.residual(values) for axis in axes]
         results = _Solver(residuals, values, "F_S" in hold).solve([*free, *drifting])
         loads = _load_rates(residuals, axes, values, moved(results), [*free, *drifting]) if drifting else {}
-        if drifting and not any(map(_determined, loads.values())):
+        if drifting and not any(map(_is_significant, loads.values())):
             # What a record does not determine predicts nothing: the load is constant then.
             values |= dict.fromkeys(drifting, 0.0)
             start = [axis.residual(values) for axis in axes]
@@ -296,15 +296,17 @@ def balanced(
     torque = _torque_rms(axes, values), _torque_rms(axes, new)
     changes = {name: (values[name], new[name]) for name in ("F_C", "F_S", "M_0")}
     drifts = tuple(axis.drift(*both) for axis, *both in zip(axes, start, end, strict=True))
-    why = _doubt(values, new, position, torque)
+    why = _explain_rejection(values, new, position, torque)
     if why:
         return refused(why, position=position, torque=torque, changes=changes, drifts=drifts, load_rates=loads)
-    changed = {name: _changed(estimates[name], after) for name, (before, after) in changes.items() if after != before}
+    changed = {
+        name: _replace_value(estimates[name], after) for name, (before, after) in changes.items() if after != before
+    }
     names = tuple(axis.record.name for axis in axes)
     return Balance({**estimates, **changed}, True, "", names, position, torque, changes, drifts, loads)
 
 
-def _determined(rate: Estimate) -> bool:
+def _is_significant(rate: Estimate) -> bool:
     """Whether the interval of a drift leaves out 0."""
     low, high = rate.interval
     return low > 0 or high < 0
@@ -346,7 +348,7 @@ def _model(record: Record, law: FrictionLaw) -> RecordTorque | None:
         return None
 
 
-def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, float]) -> str:
+def _explain_unfit_record(record: Record, model: RecordTorque | None, values: Mapping[str, float]) -> str:
     """Why a record determines nothing in open loop."""
     duration = record.interval * (len(record) - 1)
     if record.angle is None:
@@ -359,9 +361,9 @@ def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, floa
         return "nothing moves"
     if any(part.kind == "sine" for part in model.parts):
         return SINES
-    way = SLIDING * max(deflection(values), values.get("W", 0.0))
+    way = SLIDING_TRAVEL_FACTOR * max(deflection(values), values.get("W", 0.0))
     if max(2 * part.amplitude for part in model.parts) < way:
-        return f"no move is longer than {SLIDING:g} times the way of pre-sliding"
+        return f"no move is longer than {SLIDING_TRAVEL_FACTOR:g} times the way of pre-sliding"
     return ""
 
 
@@ -390,7 +392,7 @@ class _Solver:
         begin = started or values
         return fit(
             lambda values: self._residuals({**fixed, **values}),
-            [Parameter(n, begin[n], *_room(n, values, self._below), scale=values["F_C"]) for n in names],
+            [Parameter(n, begin[n], *_parameter_bounds(n, values, self._below), scale=values["F_C"]) for n in names],
             normalised=False,
             difference=1e-4,  # small against what a change is worth, large against rounding over the record
             tolerance=tolerance,
@@ -405,7 +407,7 @@ class _Solver:
         load = [name for name in free if name != "F_C"]
         if "F_C" in free:
             result: list[tuple[float, dict[str, float]]] = []
-            low, high = _room("F_C", values, self._below)
+            low, high = _parameter_bounds("F_C", values, self._below)
             for side in (1, -1):
                 now = dict(begin)
                 for k in range(ROW + 1):
@@ -417,7 +419,7 @@ class _Solver:
         return self.best(free, begin, tolerance=1e-8).mapping()
 
 
-def _room(name: str, values: Mapping[str, float], below_static: bool) -> tuple[float, float]:
+def _parameter_bounds(name: str, values: Mapping[str, float], below_static: bool) -> tuple[float, float]:
     """Bounds: enough to see a change that is too large."""
     F_C = values["F_C"]
     if name != "F_C":  # M_0, and what it changes by
@@ -431,7 +433,7 @@ def _torque_rms(axes: Sequence[OpenLoop], values: Mapping[str, float]) -> float:
     return _rms(np.concatenate([axis.torque_residual(values) for axis in axes]))
 
 
-def _doubt(
+def _explain_rejection(
     old: Mapping[str, float], new: Mapping[str, float], position: tuple[float, float], torque: tuple[float, float]
 ) -> str:
     """Why a result is not taken; empty where it is."""
@@ -450,7 +452,7 @@ def _doubt(
     return ""
 
 
-def _changed(before: Estimate, value: float) -> Estimate:
+def _replace_value(before: Estimate, value: float) -> Estimate:
     least = abs(value - before.value) / NORMAL_95
     return replace(before, value=value, sigma=max(before.sigma, least) if isfinite(before.sigma) else before.sigma)
 

@@ -14,7 +14,7 @@ from feedsim.estimation.identify.inertia import REST_SPEED_SHARE
 from feedsim.estimation.identify.motion import RecordTorque, deflection, models, noise_of
 from feedsim.estimation.identify.parameters import (
     DEFAULT_SHAPES,
-    FIXED,
+    FIXED_PARAMETERS,
     NO_EFFECT,
     PARAMETER_KINDS,
     PRE_SLIDING,
@@ -24,7 +24,15 @@ from feedsim.estimation.identify.parameters import (
 )
 from feedsim.estimation.identify.record import Array, Record
 from feedsim.estimation.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
-from feedsim.estimation.identify.search import FOLLOWED, Search, Solution, grid, sliding, spread, with_excess
+from feedsim.estimation.identify.search import (
+    FOLLOWED_STARTS,
+    Search,
+    Solution,
+    fit_sliding_friction,
+    grid,
+    spread,
+    with_excess,
+)
 from feedsim.estimation.identify.uncertainty import (
     GOES_WITH,
     LEAST_EXPLAINED,
@@ -33,9 +41,7 @@ from feedsim.estimation.identify.uncertainty import (
     MODEL_ACCURACY,
     Uncertainty,
     Verdict,
-    doubts,
-    explained,
-    extrapolated,
+    explained_share,
     has_sines,
     limits,
     no_delay,
@@ -43,6 +49,8 @@ from feedsim.estimation.identify.uncertainty import (
     turnover_rows,
     uncertainty,
     verdict,
+    warn_extrapolation,
+    warn_undetermined,
 )
 from feedsim.estimation.parameter import Prior
 from feedsim.foundation.errors import InputError
@@ -107,7 +115,7 @@ def advice(
     for name, least, share in (("W", LEAST_W, DEFLECTIONS_W), ("gamma", LEAST_GAMMA, DEFLECTIONS_GAMMA)):
         needed = least / I_P if I_P else share * deflection
         estimate = estimates.get(name)
-        if estimate is None or not (verb := _wanted(estimate)):
+        if estimate is None or not (verb := _wanted_moves(estimate)):
             continue
         largest = max((s.amplitude for s in reversing), default=0.0)
         if largest < TOLERANCE * needed:
@@ -117,7 +125,7 @@ def advice(
                 + _bound(estimate)
             )
     sigma_1 = estimates.get("sigma_1")
-    if sigma_1 is not None and (verb := _wanted(sigma_1)):
+    if sigma_1 is not None and (verb := _wanted_moves(sigma_1)):
         small = [s.frequency for s in reversing if s.amplitude < 4 * deflection]
         highest = max(small, default=0.0)
         if highest < TOLERANCE * LEAST_FREQUENCY:
@@ -146,7 +154,7 @@ def advice(
     return tuple(sentences)
 
 
-def _wanted(estimate: Estimate) -> str:
+def _wanted_moves(estimate: Estimate) -> str:
     """How much a parameter asks for moves that show it; empty: not at all, it is determined well or not sought."""
     if estimate.status in ("held", "given"):
         return ""
@@ -175,7 +183,7 @@ MIN_GAIN_PER_PARAMETER = 12.0
 # where the records determine them, also where the usual value happens to be the best one.
 WITHOUT_NEUTRAL = frozenset({"spread", "skew", "C"})
 # Free from the start it follows small sines of an axis of another law, and leaves three times as much of a circle.
-LATE = frozenset({"C"})
+LATE_PARAMETERS = frozenset({"C"})
 # In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
 # Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
 REFINEMENTS = (
@@ -200,7 +208,7 @@ LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant
 
 
 @dataclass(frozen=True, eq=False)
-class _Known:
+class _KnownValues:
     """What is known before the fit: start values, which parameters the prior determines, which are held or given.
 
     drift: the part of stage 1's covariance that the prior has not; None: no stage 1.
@@ -210,7 +218,7 @@ class _Known:
 
     values: dict[str, float]
     prior: Prior
-    told: tuple[str, ...]
+    determined_names: tuple[str, ...]
     held: dict[str, tuple[Status, str]]
     drift: Prior | None = None
     open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
@@ -261,7 +269,7 @@ def dynamic(
     fine = models(records, law, without=without)
     if not fine:
         raise InputError("stage 2: nothing moves in " + ", ".join(record.name for record in records))
-    known = _known(fine, prior, J, delay, hold or {}, free, fleet)
+    known = _known_values(fine, prior, J, delay, hold or {}, free, fleet)
     weights = [_first_weights(model) for model in fine]
     base = _base(known, law.names, prior is not None or fleet is not None, delay is None)
     tell("start values", 0.1)
@@ -273,25 +281,27 @@ def dynamic(
     results = search.best(starts, states, base)
     search = Search(fine, known.prior, _weights(fine, results, weights))
     fixed = dict(known.held)
-    results, base = _told(search, results, base, known, fixed)
+    results, base = _drop_undetermined(search, results, base, known, fixed)
     groups = [group for group in REFINEMENTS if set(group) <= set(law.names)]
     if WITHOUT_NEUTRAL & set(law.names):
         groups.append(("sigma_1",))  # once more: beside the usual spread it may not have shown
     if prior is not None or fleet is not None:
-        groups = [group for group in groups if LATE & set(group)]
+        groups = [group for group in groups if LATE_PARAMETERS & set(group)]
     for k, group in enumerate(groups):
         tell("refinements", 0.4 + 0.48 * k / len(groups))
-        results, base = _refined(search, coarse, results, base, group, known, fixed)
+        results, base = _add_group(search, coarse, results, base, group, known, fixed)
         search = Search(fine, known.prior, _weights(fine, results, weights))
     tell("final fit", 0.9)
     results = search.solve(results.values, results.states, base, tolerance=FINAL, limit=40)
-    results, base = _told(search, results, base, known, fixed)
-    results = search.around(results, base)
+    results, base = _drop_undetermined(search, results, base, known, fixed)
+    results = search.search_around(results, base)
     honest = uncertainty(search, results, known.open.values(), known.drift)
     # The delay first: without it damping is determined that both together leave open.
-    while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
-        results, base = _without(search, results, base, judged, known, fixed)
-        results = search.around(results, base)
+    while (
+        judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.determined_names)
+    ) is not None:
+        results, base = _drop_parameters(search, results, base, judged, known, fixed)
+        results = search.search_around(results, base)
         honest = uncertainty(search, results, known.open.values(), known.drift)
     if prior is None and has_sines(fine):
         fixed |= _left_with(known, base)
@@ -300,7 +310,7 @@ def dynamic(
     return result
 
 
-def _known(
+def _known_values(
     fine: Sequence[RecordTorque],
     prior: Stationary | None,
     J: Estimate | None,
@@ -308,7 +318,7 @@ def _known(
     hold: Mapping[str, float],
     free: Collection[str],
     fleet: Prior | None,
-) -> _Known:
+) -> _KnownValues:
     values = {**NO_EFFECT, "J": 0.0, "delay": delay if delay is not None else 0.0}
     fixed: dict[str, tuple[Status, str]] = {
         name: ("held", "usual value, records of friction hardly determine it")
@@ -354,11 +364,11 @@ def _known(
     elif (turns := reversals(fine)) < LEAST_REVERSALS:
         fixed["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} determine it"
     values |= hold
-    fixed |= {name: ("held", "no stage determines it") if name in FIXED else ("given", "") for name in hold}
-    values |= sliding(fine, values, unknown - set(hold))
+    fixed |= {name: ("held", "no stage determines it") if name in FIXED_PARAMETERS else ("given", "") for name in hold}
+    values |= fit_sliding_friction(fine, values, unknown - set(hold))
     if prior is None:
         values["F_S"] = max(hold.get("F_S", values["F_C"]), values["F_C"])
-        sliding_speed = np.abs(_sliding(fine))
+        sliding_speed = np.abs(_sliding_speeds(fine))
         values["v_s"] = hold.get("v_s", 0.02 * float(np.max(sliding_speed)))
         typical = float(np.median(sliding_speed))
         if "v_log" not in hold and "v_log" not in free and typical > FAR_ABOVE * DEFAULT_SHAPES["v_log"]:
@@ -366,35 +376,35 @@ def _known(
             fixed["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     if fleet is not None:
         known = prior.correlation.names if prior is not None else ()
-        fleet = fleet.restricted([name for name in fleet.names if name not in known and name not in fixed])
+        fleet = fleet.restrict([name for name in fleet.names if name not in known and name not in fixed])
         starts = dict(zip(fleet.names, map(float, fleet.values), strict=True))
         values |= {name: value for name, value in starts.items() if name not in ("F_C", "sigma_2")}
         values["F_S"] = max(values["F_S"], values["F_C"])
         priors.append(fleet)
     values.setdefault("sigma_0", 0.0)
     reported = tuple(name for one in priors for name in one.names)
-    return _Known(values, Prior.joined(priors), reported, fixed, drift)
+    return _KnownValues(values, Prior.join(priors), reported, fixed, drift)
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
     # A slow way back counts as well as a fast one there: it is friction that both separate from the load.
-    fast = _sliding(fine, REST_SPEED_SHARE)
+    fast = _sliding_speeds(fine, REST_SPEED_SHARE)
     return LEAST_SHARE < float(np.mean(fast > 0)) < 1 - LEAST_SHARE
 
 
-def _sliding(fine: Sequence[RecordTorque], share: float = 0.05) -> Array:
+def _sliding_speeds(fine: Sequence[RecordTorque], share: float = 0.05) -> Array:
     """Speeds [rad/s] at the rows that are not near a reversal: above a share of the highest."""
     speed = np.concatenate([model.moved(0.0)[1] for model in fine])
     return np.asarray(speed[np.abs(speed) > share * np.max(np.abs(speed))])
 
 
-def _base(known: _Known, names: Collection[str], with_prior: bool, with_delay: bool) -> list[str]:
+def _base(known: _KnownValues, names: Collection[str], with_prior: bool, with_delay: bool) -> list[str]:
     """What is free at first."""
     wanted = ["sigma_0", "J", *(["delay"] if with_delay else [])]
     if with_prior:
-        own = (name for name in PRE_SLIDING if name not in wanted and name in names and name not in LATE)
+        own = (name for name in PRE_SLIDING if name not in wanted and name in names and name not in LATE_PARAMETERS)
         wanted += [*own, *STATIONARY]
-        wanted += [name for name in DEFAULT_SHAPES if name in known.told]
+        wanted += [name for name in DEFAULT_SHAPES if name in known.determined_names]
     else:
         wanted += ["F_C", "sigma_2", "M_0", *(name for name in DEFAULT_SHAPES if name not in known.held)]
     return [name for name in wanted if name not in known.held]
@@ -416,21 +426,21 @@ def _weights(fine: Sequence[RecordTorque], solution: Solution, before: Sequence[
     return made
 
 
-def _told(
-    search: Search, solution: Solution, base: list[str], known: _Known, fixed: dict[str, tuple[Status, str]]
+def _drop_undetermined(
+    search: Search, solution: Solution, base: list[str], known: _KnownValues, fixed: dict[str, tuple[Status, str]]
 ) -> tuple[Solution, list[str]]:
     """Without what the data do not determine, one after the other."""
-    while (judged := verdict(solution, base, known.told)) is not None:
-        solution, base = _without(search, solution, base, judged, known, fixed)
+    while (judged := verdict(solution, base, known.determined_names)) is not None:
+        solution, base = _drop_parameters(search, solution, base, judged, known, fixed)
     return solution, base
 
 
-def _without(
+def _drop_parameters(
     search: Search,
     solution: Solution,
     base: list[str],
     judged: Verdict,
-    known: _Known,
+    known: _KnownValues,
     fixed: dict[str, tuple[Status, str]],
 ) -> tuple[Solution, list[str]]:
     fixed |= {name: ("undetermined", reason) for name, reason in judged.reasons.items()}
@@ -443,13 +453,13 @@ def _without(
     return without, remaining
 
 
-def _refined(
+def _add_group(
     search: Search,
     coarse: Sequence[RecordTorque],
     solution: Solution,
     base: list[str],
     group: tuple[str, ...],
-    known: _Known,
+    known: _KnownValues,
     fixed: dict[str, tuple[Status, str]],
 ) -> tuple[Solution, list[str]]:
     """With a group of parameters more, if the data ask for them and determine them."""
@@ -477,10 +487,12 @@ def _refined(
         values["F_log"] = 0.05 * values["F_C"]
     starts = [values]
     if {"W", "gamma"} <= set(added):
-        starts = [start for start in grid(coarse, values, ["W", "gamma", "sigma_0"])[:FOLLOWED] if start["W"] > 0][:2]
+        starts = [
+            start for start in grid(coarse, values, ["W", "gamma", "sigma_0"])[:FOLLOWED_STARTS] if start["W"] > 0
+        ][:2]
     elif {"spread", "skew"} <= set(added):
         own = [name for name in ("sigma_0", "sigma_1") if name in base]
-        starts = [values, *grid(coarse, values, [*added, *own])[: FOLLOWED - 1]]
+        starts = [values, *grid(coarse, values, [*added, *own])[: FOLLOWED_STARTS - 1]]
     elif "C" in added:
         starts = [{**values, "C": values["C"] * factor} for factor in (1.0, 0.2, 5.0)]
     tried = search.best(starts, solution.states, [*base, *added])
@@ -489,7 +501,7 @@ def _refined(
     tried = search.solve(tried.values, tried.states, [*base, *added], tolerance=1e-6, limit=30)
     judged = verdict(tried, added)
     gain = search.cost(solution) - search.cost(tried)
-    share = explained(search.models, solution, tried) if general else 1.0
+    share = explained_share(search.models, solution, tried) if general else 1.0
     needed = -inf if not general and set(added) <= WITHOUT_NEUTRAL else MIN_GAIN_PER_PARAMETER * len(added)
     if judged is None and gain >= needed and share >= LEAST_EXPLAINED:
         for name in added:
@@ -510,7 +522,7 @@ def _refined(
     return solution, base
 
 
-def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
+def _left_with(known: _KnownValues, base: list[str]) -> dict[str, tuple[Status, str]]:
     """Friction over speed where sines alone leave a part of it open: that part is in all others, which are taken out of
     what is determined. Their values stay, as together they are what the sines show."""
     missing = [name for name in CURVE if any(name in names for names in known.open)]
@@ -559,7 +571,7 @@ def _result(
         rms,
         without,
         advice(pieces, estimates, without, deflection(result.values), I_P),
-        (*doubts(fixed, prior), *limits(honest, names, fine), *extrapolated(fine, prior, I_P)),
+        (*warn_undetermined(fixed, prior), *limits(honest, names, fine), *warn_extrapolation(fine, prior, I_P)),
     )
 
 

@@ -39,7 +39,7 @@ STATIONARY = tuple(
     name for name in CONSTANT_SPEED if name not in DEFAULT_SHAPES
 )  # all of stage 1 that stage 2 takes over
 # no stage determines them
-FIXED = tuple(name for name in _TABLE if name not in (*PRE_SLIDING, *CONSTANT_SPEED))
+FIXED_PARAMETERS = tuple(name for name in _TABLE if name not in (*PRE_SLIDING, *CONSTANT_SPEED))
 # Where a parameter has no effect: what machine files mean that do not give it; v_s where F_S is F_C.
 NO_EFFECT: Mapping[str, float] = {
     **{"sigma_1": 0.0, "sigma_2": 0.0, "M_0": 0.0, "v_s": float(_TABLE["v_s"].start)},
@@ -90,7 +90,7 @@ def _kind(name: str) -> Kind:
 PARAMETER_KINDS = {
     **{name: _kind(name) for name in (*PRE_SLIDING, *CONSTANT_SPEED) if name in _TABLE},
     "M_0": Kind("N.m", "constant load against the motor torque"),
-    **{name: _kind(name) for name in FIXED},
+    **{name: _kind(name) for name in FIXED_PARAMETERS},
     "J": Kind("kg.m2", "inertia", above=0.0),
     # Wide against the offsets between the channels of one log; what is beyond is a wrong unit, or two logs.
     "delay": Kind("s", "delay of the torque channel against the motion", -20e-3, 20e-3),
@@ -118,12 +118,12 @@ def check_fixed(hold: Mapping[str, float]) -> None:
 # --- the search ------------------------------------------------------------------------------------------------------
 
 
-def inner(name: str) -> str:
+def solver_name(name: str) -> str:
     """Name under which the solver moves a parameter."""
     return EXCESS if name == "F_S" else name
 
 
-def outer(name: str) -> str:
+def parameter_name(name: str) -> str:
     """The parameter's own name."""
     return "F_S" if name == EXCESS else name
 
@@ -132,7 +132,7 @@ def inner_to_outer(moved: Sequence[str], wanted: Sequence[str]) -> Array:
     """(wanted, moved) matrix that turns what the solver moves into parameters: F_S = F_C + excess."""
     turn = np.zeros((len(wanted), len(moved)))
     for row, name in enumerate(wanted):
-        turn[row, moved.index(inner(name))] = 1.0
+        turn[row, moved.index(solver_name(name))] = 1.0
         if name == "F_S" and "F_C" in moved:
             turn[row, moved.index("F_C")] = 1.0
     return turn
@@ -153,7 +153,7 @@ PRIOR_DEVIATIONS: Mapping[str, float] = {EXCESS: 0.3, "F_log": 0.3, "sigma_2": 0
 UNSEEN_SPEED_RATIO = 2.0
 
 
-def hidden(name: str, friction: float, fast: float) -> float:
+def hidden_deviation(name: str, friction: float, fast: float) -> float:
     """Standard deviation that a parameter may have which no plateau determines: friction [N.m], highest speed
     [rad/s]."""
     return PRIOR_DEVIATIONS[name] * (1.0 if name == "asymmetry" else friction / fast if name == "sigma_2" else friction)

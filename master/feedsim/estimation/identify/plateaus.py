@@ -100,7 +100,7 @@ QUIETER = 1.5  # times less noise in the speed that the angle determines, for th
 LONGER = (1, 4, 16)  # times the block, one after the other as far as noise asks for it
 # share of a speed that the noise of a block may have (PLATEAU_SIGMAS of its standard deviations)
 BLOCK_NOISE_SHARE = 0.2
-SLOWEST = 1e-5  # of the highest speed: what is slower counts as rest
+REST_SPEED_SHARE = 1e-5  # of the highest speed: what is slower counts as rest
 MAX_GAP_BLOCKS = 5  # blocks that an interruption lasts at most
 SPEED_TOLERANCE = 0.1  # relative difference of speed on both sides of an interruption
 DWELL = 0.1  # of its own duration that a stretch in coarse steps of speed may have in the next step on both sides
@@ -124,7 +124,7 @@ def plateaus(record: Record, J: float) -> tuple[Plateau, ...]:
             if (result := _plateau(record, motion, first, last, J)) is not None:
                 taken.append(result)
         highest = lowest
-        if lowest <= SLOWEST * float(np.max(np.abs(motion.blocks))):
+        if lowest <= REST_SPEED_SHARE * float(np.max(np.abs(motion.blocks))):
             break
     return tuple(sorted(taken, key=lambda plateau: plateau.begin))
 
@@ -183,15 +183,15 @@ def _candidates(motion: _Motion) -> list[tuple[int, int]]:
     # Blocks that adjoin at each row.
     ahead, behind = np.roll(blocks, -half - 1), np.roll(blocks, half + 1)
     quiet = np.abs(ahead - behind) <= BLOCK_SPEED_CHANGE * np.abs(blocks) + PLATEAU_SIGMAS * np.sqrt(2) * noise
-    moving = np.abs(blocks) > max(PLATEAU_SIGMAS * noise, SLOWEST * float(np.max(np.abs(blocks))))
+    moving = np.abs(blocks) > max(PLATEAU_SIGMAS * noise, REST_SPEED_SHARE * float(np.max(np.abs(blocks))))
     inside = quiet & moving
     inside[: half + 1] = inside[len(inside) - half - 1 :] = False
     # A change of sign parts two stretches even if noise hides what lies between.
     inside[1:] &= np.sign(blocks[1:]) == np.sign(blocks[:-1])
-    return _joined(runs(inside), blocks, rows)
+    return _join_parts(runs(inside), blocks, rows)
 
 
-def _joined(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tuple[int, int]]:
+def _join_parts(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tuple[int, int]]:
     """Neighbours at nearly one speed as one stretch: an axis that breaks loose interrupts it, and what comes before is
     its settling."""
     whole: list[tuple[int, int]] = []
@@ -221,15 +221,15 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float) -
     if len(near) < 0.5 * (last - first):
         return None
     begin, end = first + int(near[0]), first + int(near[-1]) + 1
-    if not _steady(motion, begin, end) or _crest(motion, begin, end):
+    if not _is_steady(motion, begin, end) or _is_crest(motion, begin, end):
         return None
     end -= ceil(MARGIN / interval)
-    earliest = begin + max(ceil(SETTLE_TIME / interval), _travelled(motion, begin, end))
+    earliest = begin + max(ceil(SETTLE_TIME / interval), _rows_of_settling_travel(motion, begin, end))
     if end - earliest < least:
         return None
     torque = record.torque if record.load is None else record.torque - record.load
     step = resolution(record.torque)
-    start, drift = _settled(torque, earliest, begin + int(MOST_DROPPED * (end - begin)), end, least, step)
+    start, drift = _find_settled_row(torque, earliest, begin + int(MOST_DROPPED * (end - begin)), end, least, step)
     if record.clipped is not None and np.any(record.clipped[start:end]):
         return None
     weights = _weights(end - start, TAPER, interval)
@@ -258,7 +258,7 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float) -
     )
 
 
-def _steady(motion: _Motion, begin: int, end: int) -> bool:
+def _is_steady(motion: _Motion, begin: int, end: int) -> bool:
     """Whether the speed of the later part keeps its value over four quarters (the start may still ring)."""
     begin += (end - begin) // 5
     bounds = np.linspace(begin, end, 5).astype(int)
@@ -290,7 +290,7 @@ def _bend(motion: _Motion, begin: int, end: int) -> float:
     return scale * (float(np.ptp(legendre.legval(place, shape))) - noise)
 
 
-def _crest(motion: _Motion, begin: int, end: int) -> bool:
+def _is_crest(motion: _Motion, begin: int, end: int) -> bool:
     """Whether a speed in steps coarser than what may change seems constant only: a crest, parabola over time, spends at
     least 0.2 times as long in the next step on either side of it; a plateau is left at once."""
     if not motion.direct:
@@ -304,7 +304,7 @@ def _crest(motion: _Motion, begin: int, end: int) -> bool:
     return bool(min(spent) > DWELL * rows)
 
 
-def _travelled(motion: _Motion, begin: int, end: int) -> int:
+def _rows_of_settling_travel(motion: _Motion, begin: int, end: int) -> int:
     """Rows until the settling travel is behind."""
     travel = np.abs(motion.travel[begin:end] - motion.travel[begin])
     needed = min(SETTLE_TRAVEL, SETTLE_SHARE * float(travel[-1]))
@@ -316,7 +316,9 @@ def _weights(rows: int, taper: float, interval: float) -> Array:
     return window(rows, min(ceil(taper / interval), rows // 5))
 
 
-def _settled(torque: Array, earliest: int, latest: int, end: int, least: int, step: float) -> tuple[int, float]:
+def _find_settled_row(
+    torque: Array, earliest: int, latest: int, end: int, least: int, step: float
+) -> tuple[int, float]:
     """Row from which on the torque has settled, and how much it still drifts (0: not beyond noise and `DRIFT`).
 
     Where it never settles (torque that depends on position) the earliest row stays: leaving more out gains nothing.

@@ -225,7 +225,7 @@ def _window(
     # Widest windows first: where one of them holds the whole interpolation, the residual falls to the rounding.
     width = min(MAX_TAPS, longest + 1)
     for first in range(longest - width + 2):
-        remaining = _solved(records, targets, others, first, width, longest, gain)[1]
+        remaining = _solve_window(records, targets, others, first, width, longest, gain)[1]
         if best is None or remaining < best[0]:
             best = remaining, first, width
     assert best is not None
@@ -237,14 +237,14 @@ def _window(
     chosen = begin, width
     for narrow in range(1, width):
         result = min(
-            (_solved(records, targets, others, first, narrow, longest, gain)[1], first)
+            (_solve_window(records, targets, others, first, narrow, longest, gain)[1], first)
             for first in range(begin, begin + width - narrow + 1)
         )
         grown = log((result[0] ** 2 + rounding) / (floor**2 + rounding))
         if grown <= max(BY_CHANCE * (width - narrow) / rows, 2 * GROWS if floor < digits else 0.0):
             chosen = result[1], narrow
             break
-    coefficients, remaining, largest, covariance = _solved(records, targets, others, *chosen, longest, gain)
+    coefficients, remaining, largest, covariance = _solve_window(records, targets, others, *chosen, longest, gain)
     first, width = chosen
     weights, further = coefficients[:width], coefficients[width:]
     total = 1.0 if gain is None else float(further[gain])
@@ -255,7 +255,7 @@ def _window(
     return taps, further, covariance
 
 
-def _solved(
+def _solve_window(
     records: Sequence[Record],
     targets: Sequence[Array],
     others: Sequence[Sequence[Array]],

@@ -16,7 +16,7 @@ from feedsim.estimation.identify.result import Estimate
 from feedsim.estimation.identify.signals import Channel, Chosen, choose, column
 from feedsim.files.columns import Columns, Signal
 from feedsim.files.fields import no_axis
-from feedsim.files.source import digest
+from feedsim.files.source import content_digest
 from feedsim.files.trace import Recording, read_recording
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Drive, Machine
@@ -32,17 +32,17 @@ MIN_INTERVAL, MAX_INTERVAL = 10e-6, 0.1
 # Steps of at most 0.5 ms that friction is calculated over: beyond them, memory and time are no longer those of a trace.
 MAX_ROWS, MAX_FRICTION_STEPS, FRICTION_STEP = 2_000_000, 8_000_000, 0.5e-3
 MAX_SLIDE_SPEED, MAX_SLIDE_ACCELERATION = 20.0, 200.0  # of the slide [m/s], [m/s2]
-BRIEF = 0.01  # share of the rows that single wrong rows may be
+WRONG_ROWS_SHARE = 0.01  # share of the rows that single wrong rows may be
 # [s] over which an acceleration is taken
 # At the slide: lowest and highest plausible value, and its unit.
-PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
+PLAUSIBLE_RANGES: Mapping[str, tuple[float, float, str]] = {
     "deflection": (0.1e-6, 0.5e-3, "m"),
     "v_s": (10e-6, 1.0, "m/s"),
     "mass": (0.01, 1e6, "kg"),
     "braking": (1e-3, 100.0, "m/s2"),
     "friction": (0.02, 1e5, "N"),
 }
-KNOWN = 0.3  # relative standard deviation up to which a value is a witness
+MAX_WITNESS_DEVIATION = 0.3  # relative standard deviation up to which a value is a witness
 INERTIA = 10.0  # factor between an inertia that is given and that of accelerating parts
 
 
@@ -64,7 +64,7 @@ def check_slide(path: Path, records: Sequence[Record], pitch: float | None) -> N
     motions = [motion for record in records if (motion := _motion(record)) is not None]
     if pitch is None or not motions:
         return
-    speed, acceleration = (pitch / (2 * pi) * _largest([motion[k] for motion in motions]) for k in (0, 1))
+    speed, acceleration = (pitch / (2 * pi) * _robust_maximum([motion[k] for motion in motions]) for k in (0, 1))
     for what, value, limit, unit in (
         ("moves at", speed, MAX_SLIDE_SPEED, "m/s"),
         ("accelerates with", acceleration, MAX_SLIDE_ACCELERATION, "m/s2"),
@@ -92,7 +92,7 @@ def check_size(records: Sequence[Record], where: str = "the traces") -> None:
 def check_estimates(estimates: Mapping[str, Estimate], I_P: float) -> None:
     """Raises InputError: what was estimated, of the rigid axis or in all, is nothing that a feed axis has."""
     for name, value, words in _slide(estimates, I_P):
-        low, high, unit = PLAUSIBLE[name]
+        low, high, unit = PLAUSIBLE_RANGES[name]
         if not low <= value <= high:
             raise InputError(
                 f"{words} {value:.3g} {unit} at the slide; plausible: {low:g} to {high:g} {unit}. A unit of the traces "
@@ -103,7 +103,7 @@ def check_estimates(estimates: Mapping[str, Estimate], I_P: float) -> None:
 
 def check_inertia(given: Estimate, rigid: Estimate) -> None:
     """Raises InputError: the given inertia and that of the accelerating parts are of different magnitude."""
-    if not _known(rigid):
+    if not _is_witness(rigid):
         return
     factor = rigid.value / given.value
     if not 1 / INERTIA < factor < INERTIA:
@@ -116,7 +116,7 @@ def check_inertia(given: Estimate, rigid: Estimate) -> None:
 
 def _slide(estimates: Mapping[str, Estimate], I_P: float) -> Iterator[tuple[str, float, str]]:
     """Name of PLAUSIBLE, value at the slide in its unit, and words, of all that is known well."""
-    known = {name: estimate for name, estimate in estimates.items() if _known(estimate)}
+    known = {name: estimate for name, estimate in estimates.items() if _is_witness(estimate)}
     reported = {name: f"{name} comes out as {estimate.value:.4g} {estimate.unit}:" for name, estimate in known.items()}
     if "F_C" in known:
         yield "friction", known["F_C"].value / I_P, reported["F_C"]
@@ -136,8 +136,8 @@ def _slide(estimates: Mapping[str, Estimate], I_P: float) -> Iterator[tuple[str,
             yield "braking", known["F_C"].value / J * I_P, f"{reported['J']} friction alone would brake with"
 
 
-def _known(estimate: Estimate) -> bool:
-    return estimate.status == "estimated" and estimate.sigma < KNOWN * abs(estimate.value)
+def _is_witness(estimate: Estimate) -> bool:
+    return estimate.status == "estimated" and estimate.sigma < MAX_WITNESS_DEVIATION * abs(estimate.value)
 
 
 def _motion(record: Record) -> tuple[Array, Array] | None:
@@ -153,9 +153,9 @@ def _motion(record: Record) -> tuple[Array, Array] | None:
     return np.abs(speed), np.abs(speed[count:] - speed[:-count]) / span
 
 
-def _largest(values: Sequence[Array]) -> float:
+def _robust_maximum(values: Sequence[Array]) -> float:
     """But for rows that may be wrong."""
-    return float(np.quantile(np.concatenate(values), 1 - BRIEF))
+    return float(np.quantile(np.concatenate(values), 1 - WRONG_ROWS_SHARE))
 
 
 # --- Recorded drive traces -> records of one axis, motor side and SI --------------------------------------------------
@@ -182,27 +182,27 @@ UNIT_ERRORS = (
 LENGTHS = ("mm", "radians", "degrees")  # of these, those that a position may have, too
 # Power of the torque over the product of the rms values below which the torque brakes. Friction makes it positive;
 # noise and delays of channels at small motions spread it around 0.
-AGAINST = 0.1
+OPPOSING_POWER_SHARE = 0.1
 # The same in either direction, beyond doubt: a constant load drives in one direction only.
 CLEARLY_AGAINST = 0.3
 # Share of the kinetic energy that a record may lose from its first to its last row to be asked that question.
-BRAKED = 0.1
+BRAKED_ENERGY_SHARE = 0.1
 # Of the highest speed: what counts as motion. Of the whole travel: what counts as a direction.
 MOVING, DIRECTION = 0.05, 0.05
 SPAN = 10e-3  # [s] that the speed is averaged over where only a position was recorded
 
 
-def checked(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[Finding]:
+def check_records(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[Finding]:
     """What is worth a warning. Raises InputError where a sign or a unit is wrong beyond doubt.
 
     axis: its name; empty where nothing determines it.
     """
     where = f"{path}, axis {axis}" if axis else f"{path}"
-    yield from _speed(where, records)
+    yield from _check_speed(where, records)
     yield from _power(where, records)
 
 
-def _speed(where: str, records: Sequence[Record]) -> Iterator[Finding]:
+def _check_speed(where: str, records: Sequence[Record]) -> Iterator[Finding]:
     a, b, c = np.sum([_slope(record) for record in records if len(record) > 2] or [(0.0, 0.0, 0.0)], axis=0)
     if not b > 0:
         return
@@ -210,13 +210,13 @@ def _speed(where: str, records: Sequence[Record]) -> Iterator[Finding]:
     said = f"{where}: the recorded speed is {ratio:.4g} times the slope of the position"
     wrong = not 1 / WRONG_SLOPE <= ratio <= WRONG_SLOPE
     if wrong and abs(a) >= SCALE_CORRELATION * np.sqrt(b * c):
-        raise InputError(f"{said} (allowed: {1 / WRONG_SLOPE:.2g} to {WRONG_SLOPE:g}); {_likely(ratio)}")
+        raise InputError(f"{said} (allowed: {1 / WRONG_SLOPE:.2g} to {WRONG_SLOPE:g}); {_likely_error(ratio)}")
     if abs(ratio - 1) > SLOPE:
         text = f"{said}; the sign, unit, pitch or gear of one of the two is wrong"
         yield Finding("speed-contradicts-position", "doubt", text, where)
 
 
-def _likely(ratio: float) -> str:
+def _likely_error(ratio: float) -> str:
     """The error of sign and unit that makes the speed `ratio` times too large."""
     turned = ["the sign of one of the two"] if ratio < 0 else []
     size = abs(ratio)
@@ -247,7 +247,7 @@ def _slope(record: Record) -> tuple[float, float, float]:
 
 def _power(where: str, records: Sequence[Record]) -> Iterator[Finding]:
     """By the mean power torque * speed of what moves, in all and in either direction."""
-    parts = [part for record in records if (part := _moving(record)) is not None]
+    parts = [part for record in records if (part := _moving_torque(record)) is not None]
     if not parts:
         return
     net, speed = (np.concatenate(values) for values in zip(*parts, strict=True))
@@ -263,7 +263,7 @@ def _power(where: str, records: Sequence[Record]) -> Iterator[Finding]:
             f"{backward:.3g} W in the negative one), which friction cannot be; turn the sign: in the mapping, {role}: "
             f"{{column: {column}, sign: -1}}, or that of the motion"
         )
-    if _share(net, speed) < -AGAINST:
+    if _share(net, speed) < -OPPOSING_POWER_SHARE:
         yield Finding(
             "torque-against-motion", "doubt",
             f"{where}: the torque is against the motion on average (mean power {float(np.mean(net * speed)):.3g} W); "
@@ -272,7 +272,7 @@ def _power(where: str, records: Sequence[Record]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _moving(record: Record) -> tuple[Array, Array] | None:
+def _moving_torque(record: Record) -> tuple[Array, Array] | None:
     """Torque less known load and speed at the rows that move; None for a motion that is cut off while it is braked."""
     net = record.torque if record.load is None else record.torque - record.load
     speed = record.speed
@@ -284,7 +284,7 @@ def _moving(record: Record) -> tuple[Array, Array] | None:
         speed = (record.angle[2 * half :] - record.angle[: -2 * half]) / (2 * half * record.interval)
         net = net[half:-half]
     energy = speed**2
-    if energy[-1] < energy[0] - BRAKED * np.max(energy):
+    if energy[-1] < energy[0] - BRAKED_ENERGY_SHARE * np.max(energy):
         return None
     rows = np.abs(speed) > MOVING * np.max(np.abs(speed))
     return (net[rows], speed[rows]) if np.any(rows) else None
@@ -344,7 +344,7 @@ class Provenance:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class RecordedAxis:
     """Records of a file, one per stretch without a gap, and where they come from."""
 
     records: tuple[Record, ...]
@@ -367,7 +367,7 @@ def read_records(
     machine: Machine | None = None,
     *,
     driven: bool = True,
-) -> Recorded:
+) -> RecordedAxis:
     """Read a CSV or MAT file, or take what :func:`feedsim.files.trace.read_recording` has read of one.
 
     mapping: which columns are what; None: by their names (feedsim's own, else those of docs/traces.md).
@@ -414,11 +414,11 @@ def read_records(
     signs: Iterable[Finding] = ()
     unread: Iterable[Finding] = ()
     if records[0].driven:
-        signs = checked(path, records, chosen.axis)
+        signs = check_records(path, records, chosen.axis)
         unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
     warnings = (*recording.notes, *chosen.notes, *unread, *drive.warnings, *gaps, *signs)
     source = _provenance(path, mapping, chosen, columns, drive, warnings, recording.day)
-    return Recorded(records, replace(source, temperature=_temperature(recording)))
+    return RecordedAxis(records, replace(source, temperature=_temperature(recording)))
 
 
 def read_traces(
@@ -427,7 +427,7 @@ def read_traces(
     axis: str | None = None,
     machine: Machine | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
-) -> list[Recorded]:
+) -> list[RecordedAxis]:
     """Read several files, each as :func:`read_records` does. progress: what is being done, how much of it, of what."""
     recorded = []
     for k, path in enumerate(paths):
@@ -488,12 +488,12 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
         if pitch is None and channel.target in ("m", "m/s", "N"):
             raise InputError(
                 f"{recording.header}: {role} {channel.column!r} counts on the slide; its pitch is needed: pitch: 20 mm "
-                "in the mapping, or a machine with that axis" + _which(chosen, machine) + _why(chosen)
+                "in the mapping, or a machine with that axis" + _ask_for_axis(chosen, machine) + _explain_choice(chosen)
             )
         if role == "current" and constant is None:
             raise InputError(
                 f"{recording.header}: {channel.column!r} is a current; its torque constant is needed: "
-                "torque_constant: 2 N.m/A in the mapping, or a machine with that axis" + _which(chosen, machine)
+                "torque_constant: 2 N.m/A in the mapping, or a machine with that axis" + _ask_for_axis(chosen, machine)
             )
         if channel.rms and (mapping is None or mapping.torque_constant is None):
             warnings.append(Finding(
@@ -507,11 +507,11 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
     return _Drive(pitch, constant, tuple(warnings))
 
 
-def _why(chosen: Chosen) -> str:
+def _explain_choice(chosen: Chosen) -> str:
     return f". The record itself does not give it: {chosen.why}" if chosen.why else ""
 
 
-def _which(chosen: Chosen, machine: Machine | None) -> str:
+def _ask_for_axis(chosen: Chosen, machine: Machine | None) -> str:
     if machine is not None and not chosen.axis:
         return f"; which axis of {machine.name} is it: {', '.join(machine.axes)}?"
     return ""
@@ -590,7 +590,7 @@ def _provenance(
         inertia = mapping.mass * (drive.pitch / (2 * pi)) ** 2
     return Provenance(
         file=path,
-        sha256=digest(path),
+        sha256=content_digest(path),
         axis=chosen.axis,
         columns=columns,
         mapping=mapping.file if mapping is not None else None,
@@ -640,7 +640,7 @@ def distinct(files: Sequence[Path]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def named_apart(recorded: Sequence[Recorded]) -> tuple[Record, ...]:
+def named_apart(recorded: Sequence[RecordedAxis]) -> tuple[Record, ...]:
     """The records of all files, under names that separate the files."""
     names = distinct([entry.provenance.file for entry in recorded])
     return tuple(

@@ -141,20 +141,20 @@ def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ..
     usual = float(np.median(steps))
     breaks = [int(i) for i in np.flatnonzero(steps > GAP_RATIO * usual)]
     if len(breaks) > max(MOST_GAPS, SHARE_OF_GAPS * len(steps)):
-        raise _uneven(time, breaks[0] + 1, usual, float(time[-1] - time[0]) / len(steps), row)
+        raise _explain_uneven_time(time, breaks[0] + 1, usual, float(time[-1] - time[0]) / len(steps), row)
     edges = [0, *(i + 1 for i in breaks), len(time)]
     pieces, dropped = [], []
     for first, last in pairwise(edges):
         if breaks and last - first < MIN_ROWS_BETWEEN_GAPS:
             dropped.append(last - first)
             continue
-        pieces.append(_even(time, first, last, row))
+        pieces.append(_even_piece(time, first, last, row))
     if not pieces:
         raise InputError(f"{row(0)}: no {MIN_ROWS_BETWEEN_GAPS} rows follow one another without a gap")
     return tuple(pieces), tuple(_gaps(time, breaks, usual, dropped, row))
 
 
-def _even(time: Array, first: int, last: int, row: Callable[[int], str]) -> Piece:
+def _even_piece(time: Array, first: int, last: int, row: Callable[[int], str]) -> Piece:
     own = time[first:last]
     grid = np.linspace(own[0], own[-1], len(own))
     step = float(grid[-1] - grid[0]) / (len(own) - 1)
@@ -162,11 +162,11 @@ def _even(time: Array, first: int, last: int, row: Callable[[int], str]) -> Piec
     if np.max(off) > GRID_TOLERANCE * step:
         steps = np.diff(own)
         at = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
-        raise _uneven(time, first + at, float(np.median(steps)), step, row)
+        raise _explain_uneven_time(time, first + at, float(np.median(steps)), step, row)
     return Piece(first, last, grid)
 
 
-def _uneven(time: Array, at: int, usual: float, mean: float, row: Callable[[int], str]) -> InputError:
+def _explain_uneven_time(time: Array, at: int, usual: float, mean: float, row: Callable[[int], str]) -> InputError:
     step = float(time[at] - time[at - 1])
     return InputError(
         f"{row(at)}: the time is not even: {time[at]:.9g} s comes {1e3 * step:.6g} ms after the row before, the usual "

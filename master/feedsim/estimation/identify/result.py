@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from feedsim.estimation.identify.record import Array
-from feedsim.estimation.least_squares import ANY_VALUE, determined, half_width, reason
+from feedsim.estimation.least_squares import ANY_VALUE, half_width, is_determined, reason
 from feedsim.foundation.errors import Finding
 
 Status = Literal["estimated", "held", "given", "undetermined"]
@@ -44,7 +44,7 @@ class Estimate:
     def judged(self) -> Estimate:
         """The same, undetermined where its interval is too wide; its value stays, as it fits together with the rest."""
         half = half_width(self.sigma)
-        if self.status != "estimated" or self.name in ANY_VALUE or determined(self.value, half):
+        if self.status != "estimated" or self.name in ANY_VALUE or is_determined(self.value, half):
             return self
         return replace(self, status="undetermined", reason=reason(self.value, half))
 

@@ -10,18 +10,20 @@ import numpy as np
 from feedsim.estimation.fit import Fit, fit
 from feedsim.estimation.identify.inertia import REST_SPEED_SHARE
 from feedsim.estimation.identify.motion import START_PRIOR, STARTS, RecordTorque
-from feedsim.estimation.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
+from feedsim.estimation.identify.parameters import EXCESS, inner_to_outer, reversal_ranges, solver_name
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.least_squares import correlation_length
 from feedsim.estimation.parameter import Parameter, Prior
 
 REACH = {"z": 1.0, "c": 0.5}
 VALLEYS, REACHED = 6, 1.5  # tried beside a solution, drawn within so many standard deviations of it
-FARTHEST = 3.0  # of the logarithm, where a standard deviation is larger
+MAX_LOG_DEVIATION = 3.0  # of the logarithm, where a standard deviation is larger
 VALLEY_TOLERANCE = 1e-6  # of cost and step there
 START_TOLERANCE = 1e-3  # tolerance of cost and step to compare starts
-FOLLOWED = 3  # of the starts; as many again where none of them explains the torque
-EXPLAINED = 2.0  # mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
+FOLLOWED_STARTS = 3  # of the starts; as many again where none of them explains the torque
+MAX_NOISE_RESIDUAL = (
+    2.0  # mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
+)
 
 
 def with_excess(prior: Prior) -> Prior:
@@ -30,7 +32,7 @@ def with_excess(prior: Prior) -> Prior:
         return prior
     turn = np.eye(len(prior.names))
     turn[prior.names.index("F_S"), prior.names.index("F_C")] = -1
-    names = tuple(inner(name) for name in prior.names)
+    names = tuple(solver_name(name) for name in prior.names)
     return Prior(names, turn @ prior.values, turn @ prior.covariance @ turn.T)
 
 
@@ -80,15 +82,15 @@ class Search:
     def best(self, starts: Sequence[Mapping[str, float]], states: Array, free: Sequence[str]) -> Solution:
         """Where the best of the starts arrives, the likeliest of which come first."""
         solutions: list[Solution] = []
-        for first in range(0, min(len(starts), 2 * FOLLOWED), FOLLOWED):
-            followed = starts[first : first + FOLLOWED]
+        for first in range(0, min(len(starts), 2 * FOLLOWED_STARTS), FOLLOWED_STARTS):
+            followed = starts[first : first + FOLLOWED_STARTS]
             solutions += [self.solve(start, states, free, tolerance=START_TOLERANCE, limit=12) for start in followed]
             best = min(solutions, key=lambda one: one.fit.cost)
-            if 2 * best.fit.cost <= EXPLAINED * len(best.fit.residuals):
+            if 2 * best.fit.cost <= MAX_NOISE_RESIDUAL * len(best.fit.residuals):
                 break
         return best
 
-    def around(self, solution: Solution, free: Sequence[str]) -> Solution:
+    def search_around(self, solution: Solution, free: Sequence[str]) -> Solution:
         """The best of the valleys beside a solution; what is about as likely as it is in its covariance.
 
         Where an element hardly begins to slip, or hardly does not, its torque jumps with the parameters: the sum of
@@ -109,9 +111,11 @@ class Search:
                 )
             )
             point = {**best.values, EXCESS: best.values["F_S"] - best.values["F_C"]}
-            for name in map(inner, free):
+            for name in map(solver_name, free):
                 if name in logarithmic:
-                    point[name] *= float(np.exp(np.clip(moves[name] / point[name], -FARTHEST, FARTHEST)))
+                    point[name] *= float(
+                        np.exp(np.clip(moves[name] / point[name], -MAX_LOG_DEVIATION, MAX_LOG_DEVIATION))
+                    )
                 else:
                     point[name] += moves[name]
             point["F_S"] = point["F_C"] + max(point.pop(EXCESS), 0.0)
@@ -128,7 +132,9 @@ class Search:
         """Best values of `free` from `values` on."""
         begin = {**values, EXCESS: max(values["F_S"] - values["F_C"], 0.0)}
         ranges = reversal_ranges(begin)
-        parameters = [Parameter(inner(name), begin[inner(name)], **ranges[inner(name)]) for name in free]
+        parameters = [
+            Parameter(solver_name(name), begin[solver_name(name)], **ranges[solver_name(name)]) for name in free
+        ]
         starts = [(k, name) for k in range(len(self.models)) for name in STARTS]
         parameters += [
             Parameter(f"{name}_{k}", float(states[k, STARTS.index(name)]), -REACH[name], REACH[name], scale=REACH[name])
@@ -156,7 +162,7 @@ class Search:
         result = fit(
             residuals,
             parameters,
-            prior=Prior.joined([self.prior, loose]),
+            prior=Prior.join([self.prior, loose]),
             difference=1e-3 if self.jumps else 1e-5,
             jumps=self.jumps,
             tolerance=tolerance,
@@ -184,7 +190,7 @@ def spread(residual: Array) -> float:
     return float(np.sqrt(np.mean(cut**2) * correlation_length(cut)))
 
 
-SLIDING = 0.1  # of the highest speed: above, the friction is taken as Coulomb plus viscous
+SLIDING_SPEED_SHARE = 0.1  # of the highest speed: above, the friction is taken as Coulomb plus viscous
 AFTER_REVERSAL = 3  # rows: what the stiffest bristle that a record can show deflects in
 PER_DECADE = 3  # starts of the stiffness
 MOST_STIFFNESSES = 10
@@ -194,7 +200,9 @@ PURE = (0.0, 1.0)  # W and gamma of pure LuGre
 SPREADS, SKEWS = (5.0, 10.0, 20.0, 40.0, 80.0), (-0.4, 0.0, 0.4, 0.8)  # of the elements of Maxwell slip
 
 
-def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown: Collection[str]) -> dict[str, float]:
+def fit_sliding_friction(
+    models: Sequence[RecordTorque], values: Mapping[str, float], unknown: Collection[str]
+) -> dict[str, float]:
     """J, sigma_2, F_C and M_0, as far as they are `unknown`, by linear least squares where the axis slides.
 
     Moves that hardly slide leave F_C: the largest friction torques (95 % of them lie below) stand for it.
@@ -203,7 +211,7 @@ def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown
     speed = np.concatenate([row[1] for row in rows])
     acceleration = np.concatenate([row[2] for row in rows])
     torque = np.concatenate([model.measured - row[3] for model, row in zip(models, rows, strict=True)])
-    fast = np.abs(speed) > SLIDING * np.max(np.abs(speed))
+    fast = np.abs(speed) > SLIDING_SPEED_SHARE * np.max(np.abs(speed))
     # fast in one direction only: what is slow in the other one determines the load
     if np.ptp(np.sign(speed[fast])) == 0:
         fast = np.abs(speed) > REST_SPEED_SHARE * np.max(np.abs(speed))
@@ -276,7 +284,7 @@ def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Coll
                 trial |= {"W": shape[0] * values["F_C"] / float(sigma_0), "gamma": shape[1]}
             elif shape is not None:
                 trial |= {"spread": shape[0], "skew": shape[1]}
-            cost = _damped(models, trial, "sigma_1" in free)
+            cost = _fit_damping(models, trial, "sigma_1" in free)
             if best is None or cost < best[0]:
                 best = cost, trial
         assert best is not None
@@ -285,7 +293,7 @@ def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Coll
     return [trial for _, trial in result]
 
 
-def _damped(models: Sequence[RecordTorque], trial: dict[str, float], free: bool) -> float:
+def _fit_damping(models: Sequence[RecordTorque], trial: dict[str, float], free: bool) -> float:
     """Sum of squares over the stretches' torque power, with the best sigma_1 put into the trial."""
     ends = []
     for sigma_1 in (0.0, 1.0) if free else (trial["sigma_1"],):

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from feedsim.files.columns import DIMENSIONS, DRIVING, Columns, Signal, resulting, target_of
+from feedsim.files.columns import DIMENSIONS, DRIVING_SIGNALS, Columns, Signal, resulting_unit, target_of
 from feedsim.files.trace import Recording
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
@@ -155,7 +155,7 @@ FEEDSIM_COLUMNS = {"x_a": "position", "n_a": "speed", "M_a": "torque", "i_q": "c
        "x_e": "deviation", "n_s": "speed_setpoint", "n_ffw": "feedforward"}  # fmt: skip
 # What a control shows of its position loop: no identification of friction needs it.
 OF_CONTROL = ("deviation", "speed_setpoint", "feedforward")
-_OWN = re.compile(rf"([A-Za-z][A-Za-z0-9_]*)\.({'|'.join(FEEDSIM_COLUMNS)})")
+_FEEDSIM_COLUMN = re.compile(rf"([A-Za-z][A-Za-z0-9_]*)\.({'|'.join(FEEDSIM_COLUMNS)})")
 _EXAMPLE = {"time": "ms", "position": "mm", "speed": "rpm", "torque": "N.m", "current": "A", "setpoint": "mm",
             "deviation": "mm", "speed_setpoint": "rpm", "feedforward": "rpm"}  # fmt: skip
 
@@ -205,15 +205,16 @@ def choose(
     dimension.
     """
     if mapping is not None:
-        return _mapped(recording, mapping, axis, driven)
+        return _choose_mapped(recording, mapping, axis, driven)
     return _by_name(recording, axis, tuple(axes), driven)
 
 
-def _mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> Chosen:
+def _choose_mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> Chosen:
     faults: list[str] = []
-    if driven and all(mapping.signal(role) is None for role in DRIVING):
+    if driven and all(mapping.signal(role) is None for role in DRIVING_SIGNALS):
         faults.append(
-            f"{mapping.where()}missing: one of {', '.join(DRIVING)}, for example current: {{column: i_q, unit: A}}"
+            f"{mapping.where()}missing: one of {', '.join(DRIVING_SIGNALS)}, for example current: "
+            f"{{column: i_q, unit: A}}"
         )
     channels: dict[str, Channel] = {}
     for role in DIMENSIONS:
@@ -249,7 +250,7 @@ def _time(recording: Recording, mapping: Columns) -> Signal | None:
 def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: bool) -> Chosen:
     own: dict[str, dict[str, str]] = {}
     for name in recording.names:
-        if match := _OWN.fullmatch(name):
+        if match := _FEEDSIM_COLUMN.fullmatch(name):
             own.setdefault(match[1], {})[FEEDSIM_COLUMNS[match[2]]] = name
     if own and not axis:
         if len(own) > 1:
@@ -265,7 +266,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
         names = dict(own[axis])
     else:
         names = _aliases(recording, axis, axes)
-    driving = [role for role in DRIVING if role in names]
+    driving = [role for role in DRIVING_SIGNALS if role in names]
     for role in driving[1:]:
         unused = names.pop(role)
         text = f"{recording.path}: {unused!r} is not used; the {driving[0]} {names[driving[0]]!r} is"
@@ -285,12 +286,12 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
     for role, name in names.items():
         try:
             unit = "s" if role == "time" and not recording.units[name] else None
-            against = role in DRIVING and len(recording.axes) == 1 and recording.axes[0].sign < 0
+            against = role in DRIVING_SIGNALS and len(recording.axes) == 1 and recording.axes[0].sign < 0
             sign: Literal[1, -1] = -1 if against else 1
             channels[role] = column(recording, role, Signal(column=name, unit=unit, sign=sign))
         except InputError as error:
             problem = f"{recording.header}: {error}; mapping: {_line(role, recording, name)}"
-            if role in DRIVING and len(recording.axes) == 1 and recording.axes[0].why:
+            if role in DRIVING_SIGNALS and len(recording.axes) == 1 and recording.axes[0].why:
                 problem = f"{recording.header}: {recording.axes[0].why}"
             if role in OF_CONTROL:
                 notes.append(Finding("column-not-read", "doubt", f"{problem}; it is not read", recording.header))
@@ -376,7 +377,7 @@ def column(recording: Recording, role: str, signal: Signal) -> Channel:
     """Unit, factor and sign of a column. InputError: no unit, a wrong one, or one that contradicts the header."""
     column, header, factor = signal.column, recording.units[signal.column], signal.factor
     known = header if header and known_unit(header) else ""
-    if signal.unit and known and resulting(signal.unit, "1").factor != resulting(known, "1").factor:
+    if signal.unit and known and resulting_unit(signal.unit, "1").factor != resulting_unit(known, "1").factor:
         raise InputError(f"column {column!r} is in {header} by its header, in {signal.unit} by the mapping")
     unit = signal.unit or known
     if not unit and factor is None:
@@ -389,7 +390,7 @@ def column(recording: Recording, role: str, signal: Signal) -> Channel:
         if scale == 0:
             raise InputError(f"the factor {factor.variable!r} is 0")
     try:
-        given = resulting(unit or "1", factor.unit if factor else "1")
+        given = resulting_unit(unit or "1", factor.unit if factor else "1")
         target = target_of(role, given)
     except InputError as error:
         times = f" times a factor in {factor.unit}" if factor else ""

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from feedsim.estimation.identify.clipping import without_clipped
 from feedsim.estimation.identify.inertia import Inertia, contradiction, inertia
 from feedsim.estimation.identify.motion import Part, motion, parts
-from feedsim.estimation.identify.open_loop import balanced
+from feedsim.estimation.identify.open_loop import balance_loads
 from feedsim.estimation.identify.output_error import dynamic
 from feedsim.estimation.identify.parameters import (
     CONSTANT_SPEED,
     DEFAULT_SHAPES,
-    FIXED,
+    FIXED_PARAMETERS,
     NO_EFFECT,
     PARAMETER_KINDS,
     PRE_SLIDING,
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 STAGES = (1, 2)
-LEAD = Kind("m/rad", "lead", above=0.0)
+LEAD_KIND = Kind("m/rad", "lead", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Options:
                 raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")
             if name in self.hold and name in self.free:
                 raise InputError(f"{name} cannot be held and free at once")
-        LEAD.check("the lead I_P is given as", self.I_P)
+        LEAD_KIND.check("the lead I_P is given as", self.I_P)
         if self.J is not None:
             PARAMETER_KINDS["J"].check("the inertia is given as", self.J.value)
         if self.delay is not None:
@@ -106,7 +106,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Asked:
+class AxisRequest:
     """What someone says of an axis, ahead of its traces.
 
     Attributes:
@@ -268,7 +268,7 @@ USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
 INERTIA_MISMATCH, INERTIA_SIGMAS = 0.1, 4.0
 NOTHING_TOLD = Correlation((), np.zeros((0, 0)))
 FLEET_SHARE = 0.9  # of the fleet's standard deviation, from which on a value is the fleet's rather than the records'
-SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
+SLIDING_AMPLITUDE = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
 
 
 def identify(
@@ -312,32 +312,32 @@ class _Run:
 
     def result(self) -> Identification:
         options = self.options
-        with self._timed("inertia"):
+        with self._measure_time("inertia"):
             rigid = self._rigid(self.records)
             J = options.J or (rigid.J if rigid is not None else None)
             self._compare(rigid)
             if rigid is not None:
                 check_estimates(rigid.estimates, options.I_P)
-        with self._timed("plateaus"):
+        with self._measure_time("plateaus"):
             # J dn/dt hardly matters at constant speed.
             results = self._plateaus(J.value if J is not None else 0.0) if 1 in options.stages else ()
-        with self._timed("stage 1"):
+        with self._measure_time("stage 1"):
             first = self._stationary(results)
-        with self._timed("stage 2"):
+        with self._measure_time("stage 2"):
             second = self._dynamic(first)
         if first is None and second is None:
             raise InputError(
                 "the records determine no friction: " + "; ".join(self.reasons[stage] for stage in sorted(self.reasons))
             )
-        with self._timed("open loop"):
-            estimates: Mapping[str, Estimate] = self._merged(first, second, J)
+        with self._measure_time("open loop"):
+            estimates: Mapping[str, Estimate] = self._merge_estimates(first, second, J)
             balance = None
             if second is not None and not (first is not None and self.prior):  # the curve is determined by its plateaus
                 self.progress("open loop", 0, 1)
-                balance = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
+                balance = balance_loads(transitions(self.records), self.law, estimates, hold=options.hold)
                 estimates = balance.estimates
                 self.progress("open loop", 1, 1)
-        estimates, believed = self._believed(estimates, rigid)
+        estimates, believed = self._check_against_rigid(estimates, rigid)
         check_estimates(estimates, options.I_P)
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
@@ -366,7 +366,7 @@ class _Run:
             prior=prior,
         )
 
-    def _believed(
+    def _check_against_rigid(
         self, estimates: Mapping[str, Estimate], rigid: Inertia | None
     ) -> tuple[Mapping[str, Estimate], bool]:
         """The estimates, unless they contradict the rigid axis beyond doubt: then nothing of them is offered, and the
@@ -396,11 +396,11 @@ class _Run:
         """Whether anything moves by more than small sines: else the rigid axis's simple friction does not hold, whose
         pre-sliding passes for less inertia."""
         every = (part for record in self.records for part in _parts(record))
-        return any(part.kind != "sine" or part.amplitude > SLIDING for part in every)
+        return any(part.kind != "sine" or part.amplitude > SLIDING_AMPLITUDE for part in every)
 
     def _plateaus(self, J: float) -> tuple[Plateau, ...]:
         result: list[Plateau] = []
-        for k, (record, begun) in enumerate(zip(self.records, begins(self.records), strict=True)):
+        for k, (record, begun) in enumerate(zip(self.records, record_starts(self.records), strict=True)):
             self.progress("plateaus", k, len(self.records))
             result += [replace(plateau, elapsed=begun + plateau.elapsed) for plateau in plateaus(record, J)]
         self.progress("plateaus", len(self.records), len(self.records))
@@ -418,7 +418,7 @@ class _Run:
             )
             return None
         self.progress("stage 1: Stribeck curve", 0, 1)
-        hold, free = self._held(CONSTANT_SPEED)
+        hold, free = self._held_values(CONSTANT_SPEED)
         try:
             stage = stationary(result, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
             return stage if self.options.fleet is None else with_fleet(stage, self.options.fleet)
@@ -447,7 +447,7 @@ class _Run:
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
             self.prior = len(Points.of(first.plateaus).speeds) >= FEW_SPEEDS
-        hold, free = self._held((*self.law.names, "M_0"))
+        hold, free = self._held_values((*self.law.names, "M_0"))
         rigid = self._rigid(others) if others and self.options.J is None else None
         try:
             return dynamic(
@@ -503,13 +503,19 @@ class _Run:
                 "J", remedy,
             ))  # fmt: skip
 
-    def _held(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
+    def _held_values(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
         """What of `names` is held at which value, besides the usual ones, and what is freed."""
-        constant = {name: self.options.fallback.get(name, NO_EFFECT[name]) for name in FIXED if name in self.law.names}
+        constant = {
+            name: self.options.fallback.get(name, NO_EFFECT[name])
+            for name in FIXED_PARAMETERS
+            if name in self.law.names
+        }
         fixed = {name: value for name, value in (constant | dict(self.options.hold)).items() if name in names}
         return fixed, tuple(name for name in self.options.free if name in names)
 
-    def _merged(self, first: Stationary | None, second: Dynamic | None, J: Estimate | None) -> dict[str, Estimate]:
+    def _merge_estimates(
+        self, first: Stationary | None, second: Dynamic | None, J: Estimate | None
+    ) -> dict[str, Estimate]:
         """One estimate per parameter: stage 2's, which knows stage 1, else stage 1's, else what is held, and why.
 
         Where stage 2 stands alone its whole set is taken: values of two fits do not make one friction.
@@ -528,7 +534,7 @@ class _Run:
             result["delay"] = estimate("delay", self.options.delay, status="given", reason=reason)
         for name in self.law.names:
             if name not in result:
-                result[name] = self._absent(name, result)
+                result[name] = self._undetermined_estimate(name, result)
         if self.options.fleet is not None:
             result |= _of_fleet(self.options.fleet, result)
         if result["F_S"].value < result["F_C"].value:
@@ -538,7 +544,7 @@ class _Run:
             )
         return {name: result[name] for name in (*self.law.names, "M_0", "J", "delay") if name in result}
 
-    def _absent(self, name: str, estimates: Mapping[str, Estimate]) -> Estimate:
+    def _undetermined_estimate(self, name: str, estimates: Mapping[str, Estimate]) -> Estimate:
         """A parameter that no stage determines."""
         options, reason = self.options, self.reasons.get(2 if name in PRE_SLIDING else 1, "")
 
@@ -567,7 +573,7 @@ class _Run:
         return held(NO_EFFECT[name], "no effect")
 
     @contextmanager
-    def _timed(self, step: str) -> Iterator[None]:
+    def _measure_time(self, step: str) -> Iterator[None]:
         """Adds the time that a block takes."""
         begin = perf_counter()
         yield
@@ -580,7 +586,7 @@ def with_fleet(stage: Stationary, fleet: Prior) -> Stationary:
     What may have drifted is in the intervals, not in the weights, as in stage 2: the fleet takes nothing off it.
     """
     names = stage.correlation.names
-    own = fleet.restricted(names)
+    own = fleet.restrict(names)
     if not own.names:
         return stage
     at = [names.index(name) for name in own.names]
@@ -614,7 +620,7 @@ def _of_fleet(fleet: Prior, estimates: Mapping[str, Estimate]) -> dict[str, Esti
     }
 
 
-def begins(records: Sequence[Record]) -> list[float]:
+def record_starts(records: Sequence[Record]) -> list[float]:
     """When each record began [s], one after the other: pieces of a trace as its time says, files without a gap."""
     values = [0.0]
     for before, after in pairwise(records):

@@ -21,12 +21,12 @@ from feedsim.estimation.identify.parameters import (
     check_fixed,
     curve,
     estimate,
-    hidden,
-    inner,
+    hidden_deviation,
     inner_to_outer,
     level,
-    outer,
+    parameter_name,
     plateau_ranges,
+    solver_name,
     torque,
 )
 from feedsim.estimation.identify.record import Array
@@ -44,8 +44,8 @@ SLOW_ENOUGH = 50e-3 / 60  # m/s: a lowest speed above leaves the Stribeck range 
 # Relative standard deviation of v_s that asks whether there is a Stribeck effect at all, and for a warning.
 V_S_WARNED = 0.3
 FALL_SIGMAS = 2.0  # standard deviations that a fall of torque over speed must have
-LIKE = 0.99  # correlation above which two parameters are one
-VARIED = 0.05  # range of the level over its mean that separates an asymmetry from a constant load
+SAME_PARAMETER_CORRELATION = 0.99  # correlation above which two parameters are one
+SEPARATING_LEVEL_RANGE = 0.05  # range of the level over its mean that separates an asymmetry from a constant load
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Points:
         return np.array(means), np.array(sigmas)
 
 
-def falls(points: Points) -> bool:
+def shows_stribeck_effect(points: Points) -> bool:
     """Whether the torque falls with speed somewhere: the Stribeck effect shows."""
     torque, sigma = points.friction()
     for slow in range(len(torque)):
@@ -104,7 +104,7 @@ def too_few(points: Points, free: Sequence[str]) -> dict[str, str]:
     count = len(points.speeds)
     result: dict[str, str] = {}
     ranks = ["F_C", EXCESS, "sigma_2", "F_log", "v_s", "v_log", "beta"]
-    if not falls(points) and count < 6:
+    if not shows_stribeck_effect(points) and count < 6:
         reason = f"the torque does not fall with speed at any of {count} speed(s): no Stribeck effect shows"
         result |= {name: reason for name in (EXCESS, "v_s", "beta") if name in free}
     wanted = [name for name in ranks if name in free and name not in result]
@@ -121,14 +121,14 @@ def too_few(points: Points, free: Sequence[str]) -> dict[str, str]:
     return result | {name: f"{len(points.speed)} plateaus do not determine more" for name in wanted[room:]}
 
 
-def unseparated(points: Points) -> dict[str, str]:
+def unseparated_parameters(points: Points) -> dict[str, str]:
     """M_0 and asymmetry where one direction is missing."""
     if points.both:
         return {}
     return {name: "plateaus in one direction only do not separate it from friction" for name in ("M_0", "asymmetry")}
 
 
-def unanswered(points: Points, fit: Fit, values: dict[str, float]) -> dict[str, str]:
+def undetermined_parameters(points: Points, fit: Fit, values: dict[str, float]) -> dict[str, str]:
     """Free parameters that the fit shows to be untold: they are held then, name -> reason."""
     reported: dict[str, str] = {}
     free = set(fit.names)
@@ -149,7 +149,7 @@ def unanswered(points: Points, fit: Fit, values: dict[str, float]) -> dict[str, 
             "sigma_2"
         }
     if "asymmetry" in free:
-        if np.ptp(reach) < VARIED * np.mean(reach):
+        if np.ptp(reach) < SEPARATING_LEVEL_RANGE * np.mean(reach):
             return {
                 "asymmetry": f"the level of friction varies by {100 * np.ptp(reach) / np.mean(reach):.1f} % over the "
                 "speeds only: that does not separate it from the constant load M_0"
@@ -189,7 +189,7 @@ def warnings(points: Points, fit: Fit, matrix: Array, names: Sequence[str], I_P:
         ))  # fmt: skip
     sigma = fit.sigma
     if "v_s" in sigma and sigma["v_s"] > V_S_WARNED * fit["v_s"]:
-        remedy = f"add plateaus about {_speed(fit['v_s'], I_P)}, or make them longer"
+        remedy = f"add plateaus about {_speed_text(fit['v_s'], I_P)}, or make them longer"
         text = f"v_s is known to {100 * sigma['v_s'] / fit['v_s']:.0f} % only: {remedy}"
         said.append(Finding("parameter-uncertain", "doubt", text, "v_s", remedy))
     if "F_log" in sigma and sigma["F_log"] > max(0.3 * fit["F_log"], 0.02 * float(np.max(np.abs(points.torque)))):
@@ -207,7 +207,7 @@ def warnings(points: Points, fit: Fit, matrix: Array, names: Sequence[str], I_P:
         for column in range(row):
             pair = {first, names[column]}
             # M_0 and asymmetry go together by their definition; whether they are separated is looked at on its own.
-            if abs(matrix[row, column]) > LIKE and pair != {"M_0", "asymmetry"}:
+            if abs(matrix[row, column]) > SAME_PARAMETER_CORRELATION and pair != {"M_0", "asymmetry"}:
                 said.append(Finding(
                     "parameters-correlated", "doubt",
                     f"{names[column]} and {first} are correlated by {matrix[row, column]:+.3f}: the data determine "
@@ -218,7 +218,7 @@ def warnings(points: Points, fit: Fit, matrix: Array, names: Sequence[str], I_P:
     return said
 
 
-def _speed(value: float, I_P: float | None) -> str:
+def _speed_text(value: float, I_P: float | None) -> str:
     return f"{value:.3g} rad/s" if I_P is None else f"{value:.3g} rad/s ({value * I_P * 60e3:.3g} mm/min)"
 
 
@@ -232,11 +232,11 @@ SAME_SPEED_SHARE = 0.02  # relative difference up to which a speed counts as rep
 DRIFT_SIGMAS, LEAST_DRIFT = 4.0, 2e-3  # standard deviations, and share of the friction, that a drift must have
 # Standard deviation of the relative change of viscous friction from the first plateau to the last one: grease and oil
 # lose a third and more of it while a cold axis warms up.
-WARMS = 0.25
+WARMING_DEVIATION = 0.25
 WORTH_A_WORD = 0.05  # of sigma_2: standard deviation by warming that is worth a warning
 
 
-def warming(age: Array) -> Array:
+def warming_covariance(age: Array) -> Array:
     """(K, K) covariance of the relative change of viscous friction since the first plateau, in WARMS^2.
 
     age: (K,) time of the plateaus, from the first one at 0 to the last one at 1. Nobody knows the course: a change at
@@ -246,7 +246,7 @@ def warming(age: Array) -> Array:
     return np.asarray((np.outer(later, later) + np.outer(age, age) + np.minimum(age[:, None], age[None, :])) / 3)
 
 
-def hides(drifts: float, sigma_2: float) -> tuple[Finding, ...]:
+def warn_hidden_warming(drifts: float, sigma_2: float) -> tuple[Finding, ...]:
     """A warning where warming that the speeds do not show leaves sigma_2 open.
 
     drifts: the part of its standard deviation [N.m.s/rad] by warming. The interval itself is that of all records
@@ -279,7 +279,7 @@ def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
     return result
 
 
-def repeated(
+def repetition_variance(
     plateaus: Sequence[Plateau], values: Mapping[str, float], names: Sequence[str]
 ) -> tuple[Array, tuple[Finding, ...]]:
     """(P,) variance of `names` by friction that was another when a speed came back, and a finding about it."""
@@ -312,13 +312,18 @@ def repeated(
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
-DOUBTFUL = 0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
+DOUBTFUL_PROBABILITY = (
+    0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
+)
 STRIBECK_PROBABILITY = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
 HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
-SHAPED: Mapping[str, str] = {"beta": "v_s", "v_log": "F_log"}  # held by default -> without which it has no effect
+SHAPE_PARAMETERS: Mapping[str, str] = {
+    "beta": "v_s",
+    "v_log": "F_log",
+}  # held by default -> without which it has no effect
 
 # The fit moves F_C and F_S - F_C >= 0 in place of F_S.
-MOVED_ORDER = tuple(inner(name) for name in CONSTANT_SPEED)
+MOVED_ORDER = tuple(solver_name(name) for name in CONSTANT_SPEED)
 
 
 def stationary(
@@ -359,7 +364,7 @@ def stationary(
     problem = _Problem(points, fixed, seed)
     result, reasons, extra = problem.solve()
     usual = [name for name in DEFAULT_SHAPES if name in fixed and name not in asked]
-    better = _better(problem, result, reasons, usual) if extra > 0 else ("", "")
+    better = _describe_better_fit(problem, result, reasons, usual) if extra > 0 else ("", "")
     return _conclude(tuple(plateaus), points, problem, result, reasons, extra, better, I_P)
 
 
@@ -372,8 +377,8 @@ class _Problem:
 
     def solve(self) -> tuple[Fit, dict[str, str], float]:
         """The fit that stands, why what is held, and the share of the torque that plateaus scatter by besides noise."""
-        free = [name for name in MOVED_ORDER if outer(name) not in self.given]
-        reasons = unseparated(self.points) | too_few(self.points, free)
+        free = [name for name in MOVED_ORDER if parameter_name(name) not in self.given]
+        reasons = unseparated_parameters(self.points) | too_few(self.points, free)
         reasons = {name: reason for name, reason in reasons.items() if name in free}
         while True:
             remaining = [name for name in free if name not in reasons]
@@ -381,7 +386,7 @@ class _Problem:
                 raise InputError("every parameter of stationary friction is held: nothing is left to estimate")
             result, extra = self.weighted(remaining, reasons)
             more = self.needless(result, reasons, extra)
-            more = more or unanswered(self.points, result, self.inner(result.mapping(), reasons))
+            more = more or undetermined_parameters(self.points, result, self.inner(result.mapping(), reasons))
             more = {name: reason for name, reason in more.items() if name in remaining}
             if not more or len(more) == len(remaining):
                 return result, reasons, extra
@@ -423,7 +428,7 @@ class _Problem:
         """Fit with the plateaus' own noise; where that does not explain the scatter, with a share of torque added."""
         result = self.fit(remaining, reasons, 0.0, STARTS)
         freedom = len(self.points.speed) - len(remaining)
-        if freedom < 1 or 2 * result.cost <= chi2.ppf(DOUBTFUL, freedom):
+        if freedom < 1 or 2 * result.cost <= chi2.ppf(DOUBTFUL_PROBABILITY, freedom):
             return result, 0.0
         low, high = 0.0, 1.0
         for _ in range(12):
@@ -457,7 +462,7 @@ class _Problem:
         suits them best. So does the course of viscous friction over time.
         """
         without, moved = self._hidden(result, reasons, extra, 0.0)
-        within, warmed = self._hidden(result, reasons, extra, WARMS)
+        within, warmed = self._hidden(result, reasons, extra, WARMING_DEVIATION)
         known = np.isfinite(within) & np.isfinite(without)
         part = np.where(known, within - np.where(known, without, 0.0), 0.0) + np.outer(warmed - moved, warmed - moved)
         # With nothing hidden what was found is the best there is, at a bound too.
@@ -473,7 +478,7 @@ class _Problem:
         weight = 1.0 / np.hypot(points.sigma, extra * np.abs(points.torque))
         columns = [result.jacobian]
         for name in names:
-            size = hidden(name, float(np.mean(points.friction()[0])), float(points.speeds[-1]))
+            size = hidden_deviation(name, float(np.mean(points.friction()[0])), float(points.speeds[-1]))
             ends = ({**values, name: values[name] + side * size} for side in (0.5, -0.5))
             up, down = (torque({**end, "F_S": end["F_C"] + end[EXCESS]}, points.speed) for end in ends)
             columns.append(((down - up) * weight)[:, None])
@@ -481,7 +486,7 @@ class _Problem:
         # In units of what may be: a row of unit variance for each that is hidden.
         usual = np.eye(len(names), count + len(names), count)
         lost = warms * values["sigma_2"] * points.speed * weight
-        noise = np.eye(len(lost)) + warming(points.age) * np.outer(lost, lost)
+        noise = np.eye(len(lost)) + warming_covariance(points.age) * np.outer(lost, lost)
         root = np.linalg.cholesky(noise)
         whole = np.vstack([solve_triangular(root, np.hstack(columns), lower=True), usual])
         away = np.concatenate([solve_triangular(root, result.residuals, lower=True), np.zeros(len(names))])
@@ -524,7 +529,9 @@ def _guess(points: Points) -> dict[str, float]:
     }
 
 
-def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: Sequence[str]) -> tuple[str, str]:
+def _describe_better_fit(
+    problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: Sequence[str]
+) -> tuple[str, str]:
     """What estimating one of the values held by default would gain, for the warning of scatter, and the option for it;
     "": nothing clear.
 
@@ -538,14 +545,14 @@ def _better(problem: _Problem, result: Fit, reasons: Mapping[str, str], usual: S
     before = 2 * problem.fit(moved, reasons, 0.0, STARTS, result).cost
     gains: list[tuple[float, str, str]] = []
     for name in usual:
-        if SHAPED[name] not in moved:
+        if SHAPE_PARAMETERS[name] not in moved:
             continue
         given = {key: value for key, value in problem.given.items() if key != name}
         trial = _Problem(problem.points, given, problem.seed)
         free = [key for key in MOVED_ORDER if key in (*moved, name)]
         freed = trial.fit(free, reasons, 0.0, STARTS, result)
         after = 2 * freed.cost
-        fits = after <= chi2.ppf(DOUBTFUL, freedom)
+        fits = after <= chi2.ppf(DOUBTFUL_PROBABILITY, freedom)
         clear = before - after > f.ppf(STRIBECK_PROBABILITY, 1, freedom) * after / freedom
         if name in freed.at_bound or not clear or not (fits or after < HALF * before):
             continue
@@ -570,14 +577,14 @@ def _conclude(
 ) -> Stationary:
     """Everything that is reported."""
     values = problem.inner(result.mapping(), reasons)
-    names = tuple(map(outer, result.names))
+    names = tuple(map(parameter_name, result.names))
     turn = inner_to_outer(result.names, names)
     whole, warmed = problem.marginal(result, reasons, extra)
-    drifted, drifts = repeated(plateaus, values, names)
+    drifted, drifts = repetition_variance(plateaus, values, names)
     covariance, warmed = turn @ whole @ turn.T + np.diag(drifted), turn @ warmed @ turn.T
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
-    reported = {outer(name): reason for name, reason in reasons.items()}
+    reported = {parameter_name(name): reason for name, reason in reasons.items()}
     estimates = {}
     for name in CONSTANT_SPEED:
         status: Status = "estimated" if name in names else "undetermined" if name in reported else "held"
@@ -590,7 +597,7 @@ def _conclude(
     said += drifts
     if "sigma_2" in sigma:
         at = names.index("sigma_2")
-        said += hides(float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
+        said += warn_hidden_warming(float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
     if extra > 0:
         said.append(Finding(
             "plateaus-scatter", "doubt",

@@ -9,11 +9,11 @@ import numpy as np
 
 from feedsim.estimation.fit import Fit
 from feedsim.estimation.identify.motion import RecordTorque, deflection
-from feedsim.estimation.identify.parameters import NO_EFFECT, PARAMETER_KINDS, PRE_SLIDING, inner, outer
+from feedsim.estimation.identify.parameters import NO_EFFECT, PARAMETER_KINDS, PRE_SLIDING, parameter_name, solver_name
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.identify.result import Stationary, Status
 from feedsim.estimation.identify.search import Search, Solution
-from feedsim.estimation.least_squares import ANY_VALUE, determined, half_width, reason, shows
+from feedsim.estimation.least_squares import ANY_VALUE, half_width, is_determined, is_significant, reason
 from feedsim.estimation.parameter import Prior
 from feedsim.foundation.errors import Finding
 
@@ -64,7 +64,7 @@ def uncertainty(
     if "J" in fit.names:
         covariance[fit.names.index("J"), fit.names.index("J")] += (MODEL_ACCURACY * solution.values["J"]) ** 2
     variance = np.diag(covariance)
-    wanted = (*left_open, _least(search.models, solution.values))
+    wanted = (*left_open, _least_variances(search.models, solution.values))
     most = [max(float(v), *(values.get(n, 0.0) for values in wanted)) for n, v in zip(fit.names, variance, strict=True)]
     usable = np.isfinite(variance) & (variance > 0)
     wider = np.sqrt(np.where(usable, most, 1.0) / np.where(usable, variance, 1.0))
@@ -73,7 +73,7 @@ def uncertainty(
     return Uncertainty(replace(solution, fit=replace(fit, covariance=covariance)), fit.sigma, *by_name)
 
 
-def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
+def _least_variances(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
     """Variances that no records determine a parameter better than, by inner name."""
     apart = INSTANT * max(model.record.interval for model in models)
     least = {"delay": apart, "sigma_1": apart * values["sigma_0"]}
@@ -83,30 +83,30 @@ def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[
 def drift_covariance(prior: Prior, fit: Fit, drift: Prior | None) -> Array:
     """(P, P) covariance of the fit's parameters by what stage 1 may be off by, besides the prior that the fit had: as
     far as the fit followed that prior."""
-    own = prior.restricted(fit.names)
-    names = () if drift is None else drift.restricted(own.names).names
+    own = prior.restrict(fit.names)
+    names = () if drift is None else drift.restrict(own.names).names
     if drift is None or not names:
         return np.zeros_like(fit.covariance)
     moved = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)[:, [fit.names.index(n) for n in own.names]]
     rows = own.rows()
     follows = (moved @ rows.T @ rows)[:, [own.names.index(name) for name in names]]
-    return np.asarray(follows @ drift.restricted(own.names).covariance @ follows.T, dtype=np.float64)
+    return np.asarray(follows @ drift.restrict(own.names).covariance @ follows.T, dtype=np.float64)
 
 
-def _matters(honest: Uncertainty, name: str) -> bool:
+def _is_noteworthy(honest: Uncertainty, name: str) -> bool:
     """Whether a parameter's deviation is worth a word."""
     value = LEAST_DELAY if name == "delay" else WORTH_A_WORD * abs(honest.solution.values[name])
-    return honest.solution.sigma(inner(name)) > value
+    return honest.solution.sigma(solver_name(name)) > value
 
 
 def limits(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[Finding, ...]:
     """What of the records, other than the noise of the torque, limits what is determined: a warning each."""
-    return (*_rough(honest, names, fine), *_at_odds(honest, names))
+    return (*_warn_rough_motion(honest, names, fine), *_at_odds(honest, names))
 
 
-def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[Finding, ...]:
+def _warn_rough_motion(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[Finding, ...]:
     """A warning where the recorded motion, not the torque, limits what is determined."""
-    reported = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
+    reported = [name for name in names if name in (*PRE_SLIDING, "delay") and _is_noteworthy(honest, name)]
     rough = [name for name in reported if np.hypot(1, honest.motion[name] / honest.torque[name]) > MOTION_NOISE_RATIO]
     if not rough:
         return ()
@@ -122,7 +122,7 @@ def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorqu
 
 def _at_odds(honest: Uncertainty, names: Sequence[str]) -> tuple[Finding, ...]:
     """A warning where parts of the records ask for different values."""
-    odd = [name for name in names if honest.at_odds[inner(name)] > AT_ODDS and _matters(honest, name)]
+    odd = [name for name in names if honest.at_odds[solver_name(name)] > AT_ODDS and _is_noteworthy(honest, name)]
     if not odd:
         return ()
     return (Finding(
@@ -225,7 +225,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
     for name in free:
         # Those without a scale of their own are determined with any bound, large or small.
         lenient = name in kept or name in ANY_VALUE
-        key = inner(name)
+        key = solver_name(name)
         if lenient and np.isfinite(solution.sigma(key)) and key not in solution.fit.at_bound:
             continue
         judged = _judge(solution, name)
@@ -245,7 +245,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
 
 def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
     """How vague a parameter is and the verdict on it; None: it is determined well enough."""
-    key = inner(name)
+    key = solver_name(name)
     value = solution.fit[key]
     sigma = solution.sigma(key)
     if name == "gamma" and value > 1 - SIGNIFICANT * min(sigma, 0.25):
@@ -257,11 +257,11 @@ def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
     if not np.isfinite(sigma):
         return np.inf, Verdict({name: value}, name, "the record does not answer to it")
     if key in solution.fit.at_bound:
-        why = f"the fit ends at the end of its range ({value:.3g} {PARAMETER_KINDS[outer(key)].unit})"
+        why = f"the fit ends at the end of its range ({value:.3g} {PARAMETER_KINDS[parameter_name(key)].unit})"
         return np.inf, Verdict({name: value}, name, why)
     half = half_width(sigma)
     # A Stribeck peak that is not determined is an artefact of what happens within a few rows of the reversals.
-    if not (determined(value, half) if name in ("F_S", "v_s") else shows(value, half)):
+    if not (is_determined(value, half) if name in ("F_S", "v_s") else is_significant(value, half)):
         why = reason(value, half, "F_S - F_C" if name == "F_S" else "")
         return half / max(abs(value), 1e-300), Verdict({name: value}, name, why)
     return None
@@ -302,7 +302,7 @@ LEAST_EXPLAINED = 0.01  # of the torque's rms: interpolation, ripple and held co
 # of the log from a reversal until the bristles have turned over, to determine damping or engaging zone
 MIN_TURNOVER_ROWS = 5.0
 LEAST_REVERSALS = 4  # to determine the delay of the torque: at each it could also be the bristles'
-FAST = 0.05  # of the top speed: what a direction of motion must reach to count
+FAST_SPEED_SHARE = 0.05  # of the top speed: what a direction of motion must reach to count
 
 
 def has_sines(models: Sequence[RecordTorque]) -> bool:
@@ -310,7 +310,7 @@ def has_sines(models: Sequence[RecordTorque]) -> bool:
     return any(part.kind == "sine" for model in models for part in model.parts)
 
 
-def explained(models: Sequence[RecordTorque], solution: Solution, tried: Solution) -> float:
+def explained_share(models: Sequence[RecordTorque], solution: Solution, tried: Solution) -> float:
     """How much the residual falls from one solution to the other, in squares, as a share of the torque's rms [1]."""
     squares = torque = 0.0
     for k, model in enumerate(models):
@@ -343,7 +343,7 @@ def reversals(models: Sequence[RecordTorque]) -> int:
 def _reversals(model: RecordTorque) -> list[int]:
     """Rows at which the speed changes its sign between two directions that are both driven at speed."""
     n = model.motion.coarse()
-    fast = np.flatnonzero(np.abs(n) > FAST * np.max(np.abs(n)))
+    fast = np.flatnonzero(np.abs(n) > FAST_SPEED_SHARE * np.max(np.abs(n)))
     sides = np.sign(n[fast])
     turns = np.flatnonzero(sides[1:] != sides[:-1])
     indexes = []
@@ -353,7 +353,9 @@ def _reversals(model: RecordTorque) -> list[int]:
     return indexes
 
 
-def extrapolated(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[Finding, ...]:
+def warn_extrapolation(
+    fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None
+) -> tuple[Finding, ...]:
     """A warning where sines alone determine the friction over speed."""
     if prior is not None or not has_sines(fine):
         return ()
@@ -367,7 +369,7 @@ def extrapolated(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: fl
     ),)  # fmt: skip
 
 
-def doubts(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[Finding, ...]:
+def warn_undetermined(fixed: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[Finding, ...]:
     """What is undetermined and why, a finding per reason; what stage 1 hands on it has said itself."""
     names: dict[str, list[str]] = {}
     for name, (status, why) in fixed.items():

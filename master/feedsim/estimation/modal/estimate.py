@@ -18,7 +18,7 @@ from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import InputError
 
 LEAST_PERIODS = 3
-REPEATS = 0.1  # share of the input's variance by which one period may differ from the next
+PERIOD_TOLERANCE = 0.1  # share of the input's variance by which one period may differ from the next
 # Of the largest line of the input, and of the median of what is above that: less is no excitation, but what the input
 # answers with (harmonics).
 EXCITED, MEDIAN_SHARE = 0.1, 0.4
@@ -28,7 +28,7 @@ COHERENT = 0.5  # least coherence of a line that is used
 
 
 @dataclass(frozen=True, eq=False)
-class Estimated:
+class EstimatedResponses:
     """Responses over common lines.
 
     Attributes:
@@ -44,14 +44,14 @@ class Estimated:
     notes: Sequence[str] = field(default_factory=tuple)
 
 
-def estimated(
+def estimate_responses(
     inputs: Sequence[Array],
     outputs: Mapping[str, Sequence[Array]],
     interval: float,
     *,
     period: int | None = None,
     orders: Mapping[str, int] | None = None,
-) -> Estimated:
+) -> EstimatedResponses:
     """Responses of outputs to an input.
 
     Args:
@@ -88,20 +88,20 @@ def period_of(values: Array) -> int | None:
     if longest < 17 or not correlation[0] > 0:
         return None
     inner = correlation[16 : longest + 1] / correlation[0]
-    high = np.flatnonzero(inner > (1 - REPEATS) * np.max(inner)) + 16
+    high = np.flatnonzero(inner > (1 - PERIOD_TOLERANCE) * np.max(inner)) + 16
     for lag in map(int, high):
         window = correlation[max(lag - 1, 0) : lag + 2]
         if correlation[lag] < np.max(window):
             continue
         off = centred[lag:] - centred[:-lag]
-        if float(np.mean(off**2)) <= 2 * REPEATS * correlation[0]:
+        if float(np.mean(off**2)) <= 2 * PERIOD_TOLERANCE * correlation[0]:
             return lag
     return None
 
 
 def _by_periods(
     inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]], interval: float, period: int
-) -> Estimated:
+) -> EstimatedResponses:
     """The first period of a run is its transient, and left out where there are others; so is half of the second and of
     the last one, about which there is no period that shows a drift."""
 
@@ -134,7 +134,7 @@ def _by_periods(
                 (np.sqrt(remaining / 2) / (size * np.abs(G)))[excited] if count > 1 else np.zeros(len(G))[excited]
             )
     runs = f"{count} periods of {period} samples" if count > 1 else f"one period of {period} samples"
-    return Estimated(frequency[excited], values, relative, f"mean and scatter over {runs}")
+    return EstimatedResponses(frequency[excited], values, relative, f"mean and scatter over {runs}")
 
 
 def _without_drift(run: Array, period: int) -> Array:
@@ -154,7 +154,7 @@ def _without_drift(run: Array, period: int) -> Array:
 
 def _by_segments(
     inputs: Sequence[Array], outputs: Mapping[str, Sequence[Array]], interval: float, orders: Mapping[str, int]
-) -> Estimated:
+) -> EstimatedResponses:
     """Outputs are differenced ahead, and the response divided by that of the differences: an angle's spectrum is so
     steep that the lowest lines leak into the others."""
     total = sum(map(len, inputs))
@@ -182,7 +182,7 @@ def _by_segments(
         relative[name] = np.sqrt((1 - coherence) / (2 * coherence * independent))
         kept &= coherence > COHERENT
     kept[-1] = False  # half the sampling rate has no phase
-    return Estimated(
+    return EstimatedResponses(
         frequency[kept],
         {name: value[kept] for name, value in values.items()},
         {name: value[kept] for name, value in relative.items()},

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim.estimation.modal.estimate import estimated
+from feedsim.estimation.modal.estimate import estimate_responses
 from feedsim.files.trace import Recording, read_recording
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.response_files import read_response
@@ -51,7 +51,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredResponses:
     """Responses in SI, the motor first.
 
     Attributes:
@@ -68,10 +68,10 @@ class Measured:
     method: str
     notes: Sequence[Finding] = field(default_factory=tuple)
 
-    def between(self, low: float, high: float) -> Measured:
+    def between(self, low: float, high: float) -> MeasuredResponses:
         """Lines from `low` to `high` [Hz]."""
         kept = (self.frequency >= low) & (self.frequency <= high)
-        return Measured(
+        return MeasuredResponses(
             self.frequency[kept],
             {name: value[kept] for name, value in self.values.items()},
             {name: values[kept] for name, values in self.relative.items()},
@@ -87,7 +87,7 @@ def from_signals(
     time: Channel | None = None,
     interval: float | None = None,
     period: int | None = None,
-) -> Measured:
+) -> MeasuredResponses:
     """Responses from time signals of a file.
 
     Args:
@@ -95,7 +95,7 @@ def from_signals(
             the samples [s], in place of a time. period: of the excitation in samples; None: it is looked for.
 
     Raises InputError: no such column, a unit that is none of torque, current, angle or position and their derivatives,
-    uneven samples, what `estimated` refuses.
+    uneven samples, what `estimate_responses` refuses.
     """
     recording = read_recording(path)
     runs = len(input_.names)
@@ -109,7 +109,7 @@ def from_signals(
         orders[name], linear[name] = OUTPUTS[own], own.startswith("m")
     h = interval if interval is not None else _interval(recording, time)
     read = recording.read([*input_.names, *(n for channel in outputs.values() for n in channel.names)])
-    result = estimated(
+    result = estimate_responses(
         [read[name] for name in input_.names],
         {name: [read[n] for n in channel.names] for name, channel in outputs.items()},
         h,
@@ -121,10 +121,10 @@ def from_signals(
         name: np.asarray(value * s ** orders[name] * factors[name] / factor, dtype=np.complex128)
         for name, value in result.values.items()
     }
-    return Measured(result.frequency, values, result.relative, unit, linear, result.method, recording.notes)
+    return MeasuredResponses(result.frequency, values, result.relative, unit, linear, result.method, recording.notes)
 
 
-def from_responses(path: Path, outputs: Mapping[str, Channel]) -> Measured:
+def from_responses(path: Path, outputs: Mapping[str, Channel]) -> MeasuredResponses:
     """Responses of a file of frequency responses. A unit is one of output over input, such as (rad/s)/(N.m).
 
     Raises InputError: no such response; a unit that is not understood.
@@ -160,7 +160,7 @@ def from_responses(path: Path, outputs: Mapping[str, Channel]) -> Measured:
         relative[name] = np.asarray(np.sqrt((1 - coherence) / (2 * np.maximum(coherence, 1e-12))), dtype=np.float64)
     if len(inputs) > 1:
         raise InputError(f"{path}: one response is over a torque, another over a current")
-    return Measured(
+    return MeasuredResponses(
         np.asarray(response.frequency)[kept],
         {name: value[kept] for name, value in values.items()},
         {name: values[kept] for name, values in relative.items()},

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize_scalar
 
-from feedsim.estimation.modal.measured import Measured
+from feedsim.estimation.modal.measured import MeasuredResponses
 from feedsim.files.trace.response import Complexes
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import Finding, InputError
@@ -33,7 +33,7 @@ Lines = NDArray[np.int64]
 MODEL = 0.05  # 0.4 dB and 3 degrees: what a linear model of an axis with friction is not better than
 FOLDS = 5
 FINAL = 1e-12  # of the cost: the last fit ends there
-BETTER = 0.05  # share of the predicted residual that a further mode has to take away
+MIN_IMPROVEMENT_SHARE = 0.05  # share of the predicted residual that a further mode has to take away
 MOST_MODES = 5
 LEAST_LINES = 20
 TRIAL_FREQUENCIES = 80  # frequencies at which a further mode is tried
@@ -60,7 +60,7 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class RationalFit:
     """A fit.
 
     Attributes:
@@ -200,9 +200,9 @@ class _Shape:
         return np.concatenate(result)
 
 
-def fitted(
+def fit_responses(
     frequency: Array, values: Mapping[str, Complexes], relative: Mapping[str, Array], modes: int | None = None
-) -> Fitted:
+) -> RationalFit:
     """Fit responses.
 
     Args:
@@ -228,25 +228,25 @@ def fitted(
             out = every[fold::FOLDS]
             seen = np.setdiff1d(every, out)
             for count, begin in enumerate(chain):
-                x = problem.solved(_Shape(len(names), count), begin, seen)
+                x = problem.solve_from(_Shape(len(names), count), begin, seen)
                 remaining[count, fold] = np.mean(problem.residual(_Shape(len(names), count), x, out) ** 2)
         predicted = {count: float(np.sqrt(np.mean(row))) for count, row in enumerate(remaining)}
         count = 0
         for more in range(1, len(chain)):
-            gained = predicted[more] < (1 - BETTER) ** (more - count) * predicted[count]
+            gained = predicted[more] < (1 - MIN_IMPROVEMENT_SHARE) ** (more - count) * predicted[count]
             if gained and _physical(_Shape(len(names), more), chain[more]):
                 count = more
     else:
         count = len(chain) - 1
-    ended = problem.solved(_Shape(len(names), count), chain[count], every, FINAL)
-    fit, refused = _of(names, problem, ended, count, predicted), []
+    ended = problem.solve_from(_Shape(len(names), count), chain[count], every, FINAL)
+    fit, refused = _rational_fit(names, problem, ended, count, predicted), []
     while modes is None and (said := fit.implausible(frequency)):
         mode, why = said[0]
         refused.append(f"a mode of {mode.frequency:.4g} Hz is left out: {why}")
         rest = tuple(other for other in fit.modes if other is not mode)
         begin = fit.without(mode)
-        ended = problem.solved(_Shape(len(names), len(rest)), begin, every, FINAL)
-        fit = _of(names, problem, ended, len(rest), predicted)
+        ended = problem.solve_from(_Shape(len(names), len(rest)), begin, every, FINAL)
+        fit = _rational_fit(names, problem, ended, len(rest), predicted)
     return replace(fit, refused=tuple(refused))
 
 
@@ -268,7 +268,7 @@ class _Lines:
         J = J.reshape(-1, len(x))
         return np.concatenate([J.real, J.imag])
 
-    def solved(self, shape: _Shape, begin: Array, lines: Lines, tolerance: float = 1e-6) -> Array:
+    def solve_from(self, shape: _Shape, begin: Array, lines: Lines, tolerance: float = 1e-6) -> Array:
         """The least squares from `begin`."""
         low, high = self.bounds(shape)
         scale = np.maximum(np.abs(begin), 1e-3)
@@ -299,7 +299,7 @@ def _chain(problem: _Lines, lines: Lines, most: int) -> list[Array]:
     s, G, weight = problem.s[lines], problem.G[:, lines], problem.weight[:, lines]
     shape = _Shape(outputs, 0)
     begin = shape.without_residues(np.array([np.log(0.3 * first)]), np.zeros(outputs), s, G, weight)
-    result = [problem.solved(shape, begin, lines)]
+    result = [problem.solve_from(shape, begin, lines)]
     grid = np.geomspace(1.1 * first, 0.95 * float(np.abs(problem.s[-1])), TRIAL_FREQUENCIES)
     for count in range(1, most + 1):
         before, last = shape, result[-1]
@@ -313,7 +313,7 @@ def _chain(problem: _Lines, lines: Lines, most: int) -> list[Array]:
                 off = (shape.model(x, s) - G) / np.abs(G) * weight
                 tried.append((float(np.sum(np.abs(off) ** 2)), x))
         tried.sort(key=lambda entry: entry[0])
-        ends = [problem.solved(shape, x, lines) for _, x in (tried[0], tried[len(TRIED_DAMPING) * 4])]
+        ends = [problem.solve_from(shape, x, lines) for _, x in (tried[0], tried[len(TRIED_DAMPING) * 4])]
         costs = [float(np.sum(problem.residual(shape, x, lines) ** 2)) for x in ends]
         result.append(ends[int(np.argmin(costs))])
     return result
@@ -331,7 +331,9 @@ def _physical(shape: _Shape, x: Array) -> bool:
     )
 
 
-def _of(names: tuple[str, ...], problem: _Lines, x: Array, count: int, predicted: Mapping[int, float]) -> Fitted:
+def _rational_fit(
+    names: tuple[str, ...], problem: _Lines, x: Array, count: int, predicted: Mapping[int, float]
+) -> RationalFit:
     shape = _Shape(len(names), count)
     lines = np.arange(len(problem.s), dtype=np.int64)
     r = problem.residual(shape, x, lines)
@@ -348,7 +350,7 @@ def _of(names: tuple[str, ...], problem: _Lines, x: Array, count: int, predicted
         modes.append(Mode(f, D, f * float(sigma[1 + 2 * k]), D * float(sigma[2 + 2 * k]), residues))
     own = {name: shape.of_output(x, c) for c, name in enumerate(names)}
     own_sigma = {name: shape.of_output(sigma, c) for c, name in enumerate(names)}
-    return Fitted(
+    return RationalFit(
         names,
         {name: float(values[1]) for name, values in own.items()},
         {name: float(values[1]) for name, values in own_sigma.items()},
@@ -394,7 +396,7 @@ def scatter(frequency: Array, values: Complexes) -> Complexes:
     return np.asarray(result * np.sqrt(LINES / (LINES - COLUMNS)), dtype=np.complex128)
 
 
-def least(frequency: Array, values: Complexes, at: float) -> tuple[float, float]:
+def find_minimum(frequency: Array, values: Complexes, at: float) -> tuple[float, float]:
     """The frequency near `at` at which a response is least, and its standard deviation [Hz]; nan where the lines do not
     show one. Of a resonance, `values` are those of the reciprocal response."""
     nothing = float("nan"), float("nan")
@@ -430,9 +432,9 @@ def _powers(frequency: Array, at: float) -> Array:
 
 
 MOTOR, SCALE = "motor", "scale"
-OFF = 0.1  # share by which inertia and lead may differ from the machine's without a word
+NOTEWORTHY_DIFFERENCE = 0.1  # share by which inertia and lead may differ from the machine's without a word
 MAX_DEVIATIONS = 3.0, 30.0  # dB and degrees that 90 % of the motor's lines have to be within
-HELD = 0.9  # share of the lines that a fit is judged by
+JUDGED_LINES_SHARE = 0.9  # share of the lines that a fit is judged by
 
 
 @dataclass(frozen=True, eq=False)
@@ -447,8 +449,8 @@ class AxisModes:
     """
 
     axis: str
-    measured: Measured
-    fit: Fitted
+    measured: MeasuredResponses
+    fit: RationalFit
     own: Mapping[str, Complexes]
     table: Modes
     deviations: Mapping[str, tuple[float, float]]
@@ -479,12 +481,14 @@ class AxisModes:
         return fit.modes[0].residues[MOTOR] / fit.rigid[MOTOR] if fit.modes else None
 
 
-def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: int | None = None) -> AxisModes:
-    """Fit the responses of an axis. modes: how many; None: by cross-validation. InputError: what `fitted` refuses."""
-    fit = fitted(measured.frequency, measured.values, measured.relative, modes)
+def identify_modes(measured: MeasuredResponses, machine_modes: Modes, axis: str, modes: int | None = None) -> AxisModes:
+    """Fit the responses of an axis. modes: how many; None: by cross-validation. InputError: what `fit_responses`
+    refuses."""
+    fit = fit_responses(measured.frequency, measured.values, measured.relative, modes)
     frequency = measured.frequency
     remaining = {
-        name: _within(np.log(fit.response(name, frequency) / values)) for name, values in measured.values.items()
+        name: _difference_limits(np.log(fit.response(name, frequency) / values))
+        for name, values in measured.values.items()
     }
     decibel, degrees = remaining[MOTOR]
     if decibel > MAX_DEVIATIONS[0] or degrees > MAX_DEVIATIONS[1]:
@@ -499,21 +503,21 @@ def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: i
     motor = measured.values[MOTOR]
     fine = np.geomspace(low, high, EXTREME_POINTS)
     model = np.log(np.abs(fit.response(MOTOR, fine)))
-    dips = tuple((f, *least(frequency, motor, f)) for f in extremes(fine, -model))
+    dips = tuple((f, *find_minimum(frequency, motor, f)) for f in extremes(fine, -model))
     peaks = tuple(
-        (f, *least(frequency, 1 / motor, f))
+        (f, *find_minimum(frequency, 1 / motor, f))
         for f in extremes(fine, model)
         if any(abs(f / mode.frequency - 1) < PEAK_DISTANCE for mode in fit.modes)
     )
-    warnings, notes = _said(measured, machine_modes, axis, fit)
+    warnings, notes = _compare_with_machine(measured, machine_modes, axis, fit)
     return AxisModes(
         axis, measured, fit, responses_of(machine_modes, axis, measured), _table(machine_modes, axis, fit),
-        remaining, {name: _within(scatter(frequency, values)) for name, values in measured.values.items()},
+        remaining, {name: _difference_limits(scatter(frequency, values)) for name, values in measured.values.items()},
         dips, peaks, tuple(warnings), tuple(notes),
     )  # fmt: skip
 
 
-def responses_of(modes: Modes, axis: str, measured: Measured) -> dict[str, Complexes]:
+def responses_of(modes: Modes, axis: str, measured: MeasuredResponses) -> dict[str, Complexes]:
     """Output -> (N,) acceleration over the motor torque, by a table of modes; without friction and delay."""
     s = 2j * np.pi * measured.frequency
     w = 2 * np.pi * modes.frequency
@@ -535,14 +539,16 @@ def _lead(modes: Modes, axis: str) -> float:
     return float(n @ x / (n @ n))
 
 
-def _within(logarithm: Complexes) -> tuple[float, float]:
+def _difference_limits(logarithm: Complexes) -> tuple[float, float]:
     """dB and degrees that 90 % of differences of logarithms are within."""
     parts = 20 / np.log(10) * logarithm.real, np.degrees(logarithm.imag)
-    decibel, degrees = (float(np.quantile(np.abs(part), HELD)) for part in parts)
+    decibel, degrees = (float(np.quantile(np.abs(part), JUDGED_LINES_SHARE)) for part in parts)
     return decibel, degrees
 
 
-def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[list[Finding], list[Finding]]:
+def _compare_with_machine(
+    measured: MeasuredResponses, modes: Modes, axis: str, fit: RationalFit
+) -> tuple[list[Finding], list[Finding]]:
     """Warnings and notes: senses, units, delays."""
     warnings: list[Finding] = []
     # Notes of the file count as notes here, whatever they weigh elsewhere.
@@ -559,7 +565,7 @@ def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[lis
         notes.append(Finding("sign-turned", "note", text, axis))
     if measured.input_unit == "N.m":
         J, own = 1 / abs(fit.rigid[MOTOR]), modes.J_tot(axis)
-        if abs(J / own - 1) > OFF:
+        if abs(J / own - 1) > NOTEWORTHY_DIFFERENCE:
             warnings.append(Finding(
                 "inertia-contradicted", "doubt",
                 f"axis {axis}: the response has an inertia of {J:.4g} kg.m2, the machine one of {own:.4g} kg.m2; the "
@@ -569,7 +575,7 @@ def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[lis
     if SCALE in fit.rigid:
         lead = abs(fit.rigid[SCALE] / fit.rigid[MOTOR])
         usual = abs(_lead(modes, axis)) if measured.linear[SCALE] else 1.0
-        if abs(lead / usual - 1) > OFF:
+        if abs(lead / usual - 1) > NOTEWORTHY_DIFFERENCE:
             unit = "m/rad" if measured.linear[SCALE] else "rad/rad"
             warnings.append(Finding(
                 "scale-factor-unexpected", "doubt",
@@ -580,7 +586,7 @@ def _said(measured: Measured, modes: Modes, axis: str, fit: Fitted) -> tuple[lis
     return warnings, notes
 
 
-def _table(modes: Modes, axis: str, fit: Fitted) -> Modes:
+def _table(modes: Modes, axis: str, fit: RationalFit) -> Modes:
     """The machine's rigid modes, and those of the axis; other axes are rigid in it."""
     rigid = modes.rigid
     n_0 = 1 / sqrt(modes.J_tot(axis))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from feedsim.estimation.identify import Record, Recorded
+from feedsim.estimation.identify import Record, RecordedAxis
 from feedsim.estimation.identify.clipping import without_clipped
 from feedsim.estimation.identify.inertia import Inertia, inertia
 from feedsim.estimation.identify.parameters import EXCESS
@@ -33,12 +33,12 @@ from feedsim.files.trace import Mark, Recording, read_recording
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import Closing
+from feedsim.foundation.owned import BlockResource
 from feedsim.motions.profile import speed_change
 from feedsim.scenario import Coupling, Friction, Machine
 from feedsim.scenario.loads import MotorLoad, SlideLoad
 from feedsim.simulation.cosim import Follower
-from feedsim.simulation.cosim.loads import Acting
+from feedsim.simulation.cosim.loads import ActingLoad
 from feedsim.simulation.nc import Program
 
 # --- The torque at rest ahead of a record's first motion: what friction holds of it, and a way there ------------------
@@ -84,7 +84,7 @@ Mask = NDArray[np.bool_]
 Rows = NDArray[np.int64]
 
 SETTLING_TIME = 0.6  # [s] at rest ahead of the record
-BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
+LEAD_IN_TIME = 2.0  # [s] of the record ahead of a window that are run, too
 # The state of drive and friction is not known where a record begins in motion; it has died away after that.
 START_TRANSIENT = 0.1  # [s]
 CYCLES_BEHIND = 4  # position cycles that the program goes on behind the last row
@@ -157,10 +157,10 @@ class AxisRecord:
 
 def read_axes(
     file: Path | Recording, axes: Sequence[str], machine: Machine | None = None, mapping: Columns | None = None
-) -> dict[str, Recorded]:
+) -> dict[str, RecordedAxis]:
     """The record of each axis. InputError: as read_records; no position setpoint, or no position."""
     recording = file if isinstance(file, Recording) else read_recording(file)
-    result: dict[str, Recorded] = {}
+    result: dict[str, RecordedAxis] = {}
     for axis in axes:
         read = read_records(recording, mapping, axis, machine, driven=False)
         missing = [
@@ -178,7 +178,7 @@ def read_axes(
     return result
 
 
-def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> AxisRecord:
+def cut_window(axis: str, read: RecordedAxis, window: tuple[float, float] | None) -> AxisRecord:
     """The stretch of an axis that holds the window, from BEFORE ahead of it on; without one the longest stretch.
 
     window: begin and end [s]; an end of inf is that of the stretch.
@@ -209,7 +209,7 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
             )
         record = holding[0]
         end = min(end, float(record.time[-1]))
-    first = int(np.searchsorted(record.time, begin - BEFORE))
+    first = int(np.searchsorted(record.time, begin - LEAD_IN_TIME))
     last = int(np.searchsorted(record.time, end + 0.5 * record.interval))
     record = record.between(first, last)
     slack = 0.5 * record.interval
@@ -221,7 +221,7 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
     return AxisRecord(axis, record, pitch / (2 * np.pi), rows)
 
 
-def unclipped(
+def mark_clipped_rows(
     each: AxisRecord, left_out: str, J: float | None = None, simulated: Array | None = None
 ) -> tuple[AxisRecord, tuple[Finding, ...]]:
     """The record with the rows marked at which its torque is cut off, and findings on them.
@@ -250,7 +250,7 @@ def same_time(records: Mapping[str, AxisRecord]) -> bool:
     return all(np.array_equal(first, time) for time in others)
 
 
-class Replay(Closing):
+class Replay(BlockResource):
     """Records of some axes of a machine, and what its units make of them; the other axes are held where they are.
 
     Units stay open from one machine to the next, until it is closed.
@@ -330,7 +330,7 @@ class Replay(Closing):
     def _spline(axis_record: AxisRecord) -> CubicSpline:
         return CubicSpline(axis_record.record.time - axis_record.record.time[0], axis_record.setpoint)
 
-    def _load(self, axis_record: AxisRecord) -> Acting:
+    def _load(self, axis_record: AxisRecord) -> ActingLoad:
         """The known load of a record over the time of the run; ahead of the record it is that of the first row."""
         record = axis_record.record
         assert record.load is not None
@@ -339,8 +339,8 @@ class Replay(Closing):
         torque = np.concatenate([record.load[first : first + 1], record.load[first:]])
         place = f"load of {record.name}"
         if record.load_on_slide:  # a force counts in the direction of the axis there
-            return Acting(place, SlideLoad.model_construct(axis=axis_record.axis), time, -torque / axis_record.I_P)
-        return Acting(place, MotorLoad.model_construct(axis=axis_record.axis), time, torque)
+            return ActingLoad(place, SlideLoad.model_construct(axis=axis_record.axis), time, -torque / axis_record.I_P)
+        return ActingLoad(place, MotorLoad.model_construct(axis=axis_record.axis), time, torque)
 
     def preload(self, machine: Machine, scale: float = 1.0) -> bool:
         """Decide on `preloaded`: whether the torques at rest are clearly nearer to those of the records so."""
@@ -446,7 +446,7 @@ def per_row_of(interval: float, machine: Machine) -> int:
 
 
 _TIME = re.compile(r"[-+.\d]")  # what a time begins with; a block of a program does not
-_COUNTED = re.compile(r"(.*?)\s*#(\d+)")
+_COUNTED_NAME = re.compile(r"(.*?)\s*#(\d+)")
 MAX_MARKS_NAMED = 12
 
 
@@ -472,12 +472,16 @@ def _span(part: str, marks: Sequence[Mark]) -> tuple[float, float]:
     if _TIME.match(part):
         at = units.parse(part, "s", "0.5 s")
         return at, at
-    counted = _COUNTED.fullmatch(part)
+    counted = _COUNTED_NAME.fullmatch(part)
     name, number = (counted[1], int(counted[2])) if counted else (part, None)
-    indexes = [i for i, mark in enumerate(marks) if _begins(mark.text, name)]
+    indexes = [i for i, mark in enumerate(marks) if _begins_with(mark.text, name)]
     if not indexes or (number is not None and not 1 <= number <= len(indexes)):
-        there = "; ".join(dict.fromkeys(_short(mark.text) for mark in marks)) if len(marks) <= MAX_MARKS_NAMED else ""
-        known = f"there is {there}" if there else _known(marks)
+        there = (
+            "; ".join(dict.fromkeys(_shorten_text(mark.text) for mark in marks))
+            if len(marks) <= MAX_MARKS_NAMED
+            else ""
+        )
+        known = f"there is {there}" if there else _list_marks(marks)
         how_often = f"{name!r} begins {len(indexes)} of them" if indexes else f"none begins with {name!r}"
         raise InputError(f"of the {len(marks)} blocks of the record {how_often}; {known}")
     if number is None and len(indexes) > 1:
@@ -489,20 +493,20 @@ def _span(part: str, marks: Sequence[Mark]) -> tuple[float, float]:
     return marks[i].time, marks[i + 1].time if i + 1 < len(marks) else math.inf
 
 
-def _begins(text: str, name: str) -> bool:
+def _begins_with(text: str, name: str) -> bool:
     """Whether a block begins with a name, which ends where a word of it does: N1 is not N10."""
     own, asked = " ".join(text.split()).lower(), " ".join(name.split()).lower()
     rest = own[len(asked) :]
     return own.startswith(asked) and not (asked[-1].isalnum() and rest[:1].isalnum())
 
 
-def _short(text: str) -> str:
+def _shorten_text(text: str) -> str:
     return text if len(text) <= 24 else f"{text[:20]} ..."
 
 
-def _known(marks: Sequence[Mark]) -> str:
+def _list_marks(marks: Sequence[Mark]) -> str:
     first = dict.fromkeys(text.split()[0] for mark in marks if (text := mark.text.strip()))
-    shown = [_short(name) for name in first][:MAX_MARKS_NAMED]
+    shown = [_shorten_text(name) for name in first][:MAX_MARKS_NAMED]
     return f"they begin with {', '.join(shown)}{' ...' if len(first) > len(shown) else ''}" if shown else "it has none"
 
 
@@ -511,7 +515,7 @@ def _known(marks: Sequence[Mark]) -> str:
 
 BANDWIDTH = 50.0  # [Hz] of a speed loop to begin with: K_p = 2 pi f J
 INTEGRAL = 10e-3  # [s] T_n to begin with
-PRESLIDING = 5e-6  # [m] of travel after which friction is full
+PRESLIDING_TRAVEL = 5e-6  # [m] of travel after which friction is full
 ZONE = 0.06  # [rad] width of an engaging zone
 RESERVE = 1.5  # what the machine may do beyond what the record shows
 # Shares of the mean torque that friction may have of it, where the record does not separate it from the constant load.
@@ -519,13 +523,15 @@ FRICTION_SHARES = (0.05, 0.15, 0.4)
 LEAST_TRAVEL = 0.01  # rad: a motor that turns less determines no drive
 ONE_PHASE_DEVIATION = 1.0  # of the logarithm of an inertia by a torque that is known once a position cycle
 CLIPPED_DEVIATION = 0.3  # of the logarithm of an inertia to which rows belong whose torque is cut off
-SEPARATED = 0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
+SEPARATING_HALF_WIDTH = (
+    0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
+)
 # A torque limit that is not known must not act: gentle moves determine nothing of the torque of rapid ones.
 TORQUE_LIMIT_RATIO = 20.0
 
 
 @dataclass(frozen=True)
-class Begin:
+class FitStart:
     """Where fits of an axis begin.
 
     starts: parameters of drive and friction, a fit each. one_way: what the record determines of constant load and
@@ -536,7 +542,7 @@ class Begin:
     one_way: str = ""
 
 
-def start_values(each: AxisRecord) -> Begin:
+def start_values(each: AxisRecord) -> FitStart:
     """Parameters of drive and friction to begin fits with, by the rigid line of the record.
 
     Motion in one direction determines only the sum of constant load and friction. Little motion in the other one
@@ -568,8 +574,8 @@ def start_values(each: AxisRecord) -> Begin:
     least = 0.01 * torque
     spread = {name: NORMAL_95 * one.sigma for name, one in found.estimates.items() if one.status == "estimated"}
     J_sigma = max(J_sigma, found.J.sigma / J)
-    if max(spread["F_C"], spread.get("M_0", inf)) <= SEPARATED * line["F_C"]:
-        return Begin([_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"])])
+    if max(spread["F_C"], spread.get("M_0", inf)) <= SEPARATING_HALF_WIDTH * line["F_C"]:
+        return FitStart([_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"])])
     # The direction in which it moves further.
     way = -1.0 if float(np.sum(each.speed[moving])) < 0 else 1.0
     there = moving & (way * each.speed > 0)
@@ -583,7 +589,7 @@ def start_values(each: AxisRecord) -> Begin:
     sign = "+" if way > 0 else "-"
     rows_left = "motion in one direction" if each.record.clipped is None else "torque that is not cut off"
     only = f"{rows_left} determines only M_0 {sign} friction: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
-    return Begin(starts, only)
+    return FitStart(starts, only)
 
 
 def of_cycle(start: Mapping[str, float], cycle: float, interval: float) -> dict[str, float]:
@@ -615,12 +621,27 @@ def _values(
     """All values to begin with. J_sigma: deviation of the inertia's logarithm by which a fit may leave it."""
     top = float(np.max(np.abs(each.speed))) / each.I_P
     return {
-        "J": J, "J_sigma": J_sigma, "M_0": M_0, "F_C": F_C, "sigma_2": max(sigma_2, 0.1 * F_C / top),
-        "K_p": 2 * pi * BANDWIDTH * J, "K_i": 2 * pi * BANDWIDTH * J / INTEGRAL,
-        "sigma_0": F_C * each.I_P / PRESLIDING, "sigma_1": 1e-4 * F_C * each.I_P / PRESLIDING, "v_s": 1e-2 * top,
-        "W": ZONE, "gamma": 1.0, EXCESS: 0.0, "F_log": 0.0, "asymmetry": 0.0,
-        "K_v": 30.0, "k_ffw": 1.0, "T_sym": 0.5e-3, "T_dyn": 2 * each.record.interval, "delay": 0.0,
-    }  # fmt: skip
+        "J": J,
+        "J_sigma": J_sigma,
+        "M_0": M_0,
+        "F_C": F_C,
+        "sigma_2": max(sigma_2, 0.1 * F_C / top),
+        "K_p": 2 * pi * BANDWIDTH * J,
+        "K_i": 2 * pi * BANDWIDTH * J / INTEGRAL,
+        "sigma_0": F_C * each.I_P / PRESLIDING_TRAVEL,
+        "sigma_1": 1e-4 * F_C * each.I_P / PRESLIDING_TRAVEL,
+        "v_s": 1e-2 * top,
+        "W": ZONE,
+        "gamma": 1.0,
+        EXCESS: 0.0,
+        "F_log": 0.0,
+        "asymmetry": 0.0,
+        "K_v": 30.0,
+        "k_ffw": 1.0,
+        "T_sym": 0.5e-3,
+        "T_dyn": 2 * each.record.interval,
+        "delay": 0.0,
+    }
 
 
 def limits(each: AxisRecord) -> Mapping[str, float]:

@@ -13,11 +13,11 @@ from scipy.optimize import minimize_scalar
 
 from feedsim.analysis import Figure
 from feedsim.analysis.circularity import amplitude_spectrum
-from feedsim.estimation.identify import Recorded
-from feedsim.estimation.identify.open_loop import reached
+from feedsim.estimation.identify import RecordedAxis
+from feedsim.estimation.identify.open_loop import simulate_angle
 from feedsim.estimation.identify.parameters import FRICTION_NAMES
 from feedsim.estimation.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
-from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, per_row_of, same_time, unclipped
+from feedsim.estimation.replay.closed_loop import AxisRecord, Replay, mark_clipped_rows, per_row_of, same_time
 from feedsim.estimation.replay.drive import implausible
 from feedsim.estimation.replay.moving_lines import Line, in_words, lines_in_motion, same_line, without_outside
 from feedsim.files.trace.trace import Array
@@ -28,10 +28,10 @@ from feedsim.structure import checked_modes
 
 TO_RPM = 30 / np.pi
 BINS = 60  # of the position
-LATEST = 5e-3  # [s]: no channel of a control is later than that against another
+MAX_CHANNEL_DELAY = 5e-3  # [s]: no channel of a control is later than that against another
 NEAR_TORQUE_LIMIT = 0.98  # of a torque limit: what the record shows of it, behind its filters
 LEAST_STILL = 10  # rows at standstill that make a figure
-HELPS = 0.99  # of what is left without a delay
+DELAY_RESIDUAL_SHARE = 0.99  # of what is left without a delay
 MAX_WAY_SHARE = 0.05  # of the setpoint's way: what is off by more is another axis, whatever its lag
 
 
@@ -200,7 +200,7 @@ class Comparison:
         return 0.5 * (edges[1:] + edges[:-1]), means[0], means[1]
 
 
-def replayed(
+def replay_records(
     machine: Machine,
     records: Mapping[str, AxisRecord],
     fmus: Path | None = None,
@@ -223,7 +223,7 @@ def replayed(
     every = {**(beside or {}), **records}
     J = {axis: checked_modes(machine).J_tot(axis) for axis in records}
     comparisons = {
-        axis: compared(axis_record, result[axis], per_row, limits.get(axis, inf), J[axis])
+        axis: compare_axis(axis_record, result[axis], per_row, limits.get(axis, inf), J[axis])
         for axis, axis_record in records.items()
     }
     return {
@@ -240,7 +240,7 @@ def _with_moving_lines(comparison: Comparison, records: Mapping[str, AxisRecord]
     return replace(comparison, moving_lines=further)
 
 
-def compared(
+def compare_axis(
     axis_record: AxisRecord,
     simulated: Mapping[str, Array],
     per_row: int = 1,
@@ -261,10 +261,12 @@ def compared(
     delay = None
     clipped: tuple[Finding, ...] = ()
     if record.driven:
-        delay, torque = _delayed(axis_record, simulated["M_a"], per_row)
-        axis_record, clipped = unclipped(axis_record, "the torque of these rows counts in no figure", simulated=torque)
+        delay, torque = _fit_delay(axis_record, simulated["M_a"], per_row)
+        axis_record, clipped = mark_clipped_rows(
+            axis_record, "the torque of these rows counts in no figure", simulated=torque
+        )
         if clipped:
-            delay, torque = _delayed(axis_record, simulated["M_a"], per_row)
+            delay, torque = _fit_delay(axis_record, simulated["M_a"], per_row)
         channels["torque"] = Channel(record.torque, torque, "N.m", "motor torque")
     if speed is not None and record.speed_setpoint is not None:
         asked = speed.of(record.setpoint, x_a / axis_record.I_P, record.feedforward)
@@ -279,7 +281,7 @@ def compared(
     )  # fmt: skip
 
 
-def _delayed(axis_record: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:
+def _fit_delay(axis_record: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:
     """The delay [s] with which the simulated torque agrees best with the recorded one, and that torque at the rows."""
     time, h = axis_record.record.time, axis_record.record.interval
     fine = time[0] + h / per_row * np.arange(len(torque))
@@ -291,9 +293,11 @@ def _delayed(axis_record: AxisRecord, torque: Array, per_row: int) -> tuple[floa
     def left(delay: float) -> float:
         return rms((at(delay) - axis_record.record.torque)[rows])
 
-    best = minimize_scalar(left, bounds=(-LATEST, LATEST), method="bounded", options={"xatol": 1e-6}).x
+    best = minimize_scalar(
+        left, bounds=(-MAX_CHANNEL_DELAY, MAX_CHANNEL_DELAY), method="bounded", options={"xatol": 1e-6}
+    ).x
     # A delay that hardly helps is none.
-    delay = float(best) if left(float(best)) < HELPS * left(0.0) else 0.0
+    delay = float(best) if left(float(best)) < DELAY_RESIDUAL_SHARE * left(0.0) else 0.0
     return delay, at(delay)
 
 
@@ -303,8 +307,8 @@ def _delayed(axis_record: AxisRecord, torque: Array, per_row: int) -> tuple[floa
 # hides such an error. Equation and start are those of the identification (estimation/identify/open_loop.py).
 
 
-def driven(
-    machine: Machine, records: Mapping[str, AxisRecord], read: Mapping[str, Recorded], fmus: Path | None = None
+def drive_axes(
+    machine: Machine, records: Mapping[str, AxisRecord], read: Mapping[str, RecordedAxis], fmus: Path | None = None
 ) -> dict[str, Comparison]:
     """Each axis under its recorded torque, beside its recorded position.
 
@@ -329,7 +333,7 @@ def driven(
             part = axis_record.record.between(int(rows[0]), int(rows[-1]) + 1)
             # The rows ahead of the window are not compared; as many as there are keep their place.
             x = axis_record.position.copy()
-            x[rows] = axis_record.I_P * reached(part, law, values)
+            x[rows] = axis_record.I_P * simulate_angle(part, law, values)
             channel = Channel(axis_record.position, x, "m", "position in open loop")
             comparisons[axis] = Comparison(axis, axis_record, {"position": channel}, None, None, 0.0, open_loop=True)
     return comparisons

@@ -37,7 +37,7 @@ from feedsim.estimation.identify.position_loop import (
 )
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Correlation, Estimate
-from feedsim.estimation.replay.closed_loop import AxisRecord, Begin, Replay
+from feedsim.estimation.replay.closed_loop import AxisRecord, FitStart, Replay
 from feedsim.estimation.replay.estimates import (
     beside_line,
     beside_modes,
@@ -53,18 +53,18 @@ from feedsim.estimation.replay.machine_files import MOST_MODES, ElasticMode, beg
 from feedsim.estimation.replay.tuning import (
     FINAL_TOLERANCE,
     TABLE,
+    DriveFit,
     OtherCycle,
     Problem,
     Rows,
-    Tried,
-    Tuned,
+    TriedRival,
     first_weights,
     other_cycle,
     possible_modes,
     with_rivals,
 )
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
@@ -85,40 +85,40 @@ BLOCKS: Mapping[str, tuple[str, ...]] = {
     "asymmetry": ("asymmetry",),
 }
 FOLDS = 4
-FAST = 0.1  # of the top speed: what is faster is another kind of motion
-BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
+FAST_SPEED_SHARE = 0.1  # of the top speed: what is faster is another kind of motion
+MIN_LIKELIHOOD_GAIN = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
 INDEPENDENT_TIME = 0.05  # [s]: residuals further apart than that are taken to be independent
 
 
 def friction_parts(
-    problem: Problem, tuned: Tuned, progress: Progress
-) -> tuple[tuple[str, ...], dict[str, float], Tuned, list[Tuned]]:
+    problem: Problem, tuned: DriveFit, progress: Progress
+) -> tuple[tuple[str, ...], dict[str, float], DriveFit, list[DriveFit]]:
     """Parts of the friction law that the record asks for: chosen, the gain of each, a fit with them, and the fits with
     one part more that predict as well as that: the record decides for neither."""
     gains: dict[str, float] = {}
-    undecided: list[Tuned] = []
+    undecided: list[DriveFit] = []
     chosen: list[str] = []
     while len(chosen) < len(BLOCKS):
         progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
         # As near to its end as what it is compared with.
         tuned = problem.near(problem.continued(tuned))
-        score = _predicted(problem, tuned)
+        score = _predict_parts(problem, tuned)
         tried = {}
         for part, block in BLOCKS.items():
             if part in chosen:
                 continue
-            begin = {**tuned.values, **{name: _begin(problem, name) for name in block}}
+            begin = {**tuned.values, **{name: _start_value(problem, name) for name in block}}
             tried[part] = problem.fitted([*tuned.names, *block], begin, tuned)
             if _at_end(problem, tried[part], block):
                 gains[part] = -inf
                 continue
             tried[part] = problem.near(tried[part])
-            by = _predicted(problem, tried[part]) - score
+            by = _predict_parts(problem, tried[part]) - score
             # Both partitions ask for it: what one gains at the other's cost is no law.
             gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
-        asked = [part for part in tried if gains[part] >= BETTER]
+        asked = [part for part in tried if gains[part] >= MIN_LIKELIHOOD_GAIN]
         if not asked:
-            undecided = [value for part, value in tried.items() if gains[part] > -BETTER]
+            undecided = [value for part, value in tried.items() if gains[part] > -MIN_LIKELIHOOD_GAIN]
             break
         chosen.append(asked[0])
         tuned = tried[asked[0]]
@@ -126,7 +126,7 @@ def friction_parts(
     return tuple(chosen), gains, tuned, undecided
 
 
-def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tuple[Tuned, Mapping[int, float]]:
+def with_elastic_modes(problem: Problem, result: DriveFit, count: int | None) -> tuple[DriveFit, Mapping[int, float]]:
     """A fit with elastic modes, and the position [m] that it predicts of quarters of the motion with how many.
 
     One mode after the other: where it is, regression says of what the units leave. It stays where the units, fitted to
@@ -134,7 +134,7 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
     """
     folds = np.array_split(np.arange(len(problem.rows)), FOLDS)
     result = problem.near(result)
-    predicted = {0: unpredicted(problem, result, folds)[0] * problem.weights["position"]}
+    predicted = {0: prediction_errors(problem, result, folds)[0] * problem.weights["position"]}
     for k in range(1, (MOST_MODES if count is None else count) + 1):
         machine, scale = problem.tuned(result.values)
         simulated = problem.replay.follow(machine, ("x_a",), problem.per_row, scale)[problem.each.axis]["x_a"]
@@ -143,7 +143,7 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
         if one is None:
             break
         before, start = result, dict(problem.start)
-        best: tuple[float, Tuned, dict[str, float]] | None = None
+        best: tuple[float, DriveFit, dict[str, float]] | None = None
         for sign in (1.0, -1.0):
             first = begin_mode(k, one, sign)
             problem.start = start | first
@@ -158,8 +158,8 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
         problem.start = best[2]
         fit = problem.near(best[1])
         gain = _likelihood(problem, fit, folds) - _likelihood(problem, before, folds)
-        predicted[k] = unpredicted(problem, fit, folds)[0] * problem.weights["position"]
-        if count is None and not gain > BETTER:
+        predicted[k] = prediction_errors(problem, fit, folds)[0] * problem.weights["position"]
+        if count is None and not gain > MIN_LIKELIHOOD_GAIN:
             problem.start = start
             break
         result = fit
@@ -168,37 +168,37 @@ def with_elastic_modes(problem: Problem, result: Tuned, count: int | None) -> tu
     return result, predicted
 
 
-def _begin(problem: Problem, name: str) -> float:
+def _start_value(problem: Problem, name: str) -> float:
     F_C = problem.start["F_C"]
     return {"F_log": 0.1 * F_C, "gamma": 0.5, EXCESS: 0.1 * F_C, "asymmetry": 0.0}.get(name, problem.start[name])
 
 
-def _at_end(problem: Problem, tuned: Tuned, block: Sequence[str]) -> bool:
+def _at_end(problem: Problem, tuned: DriveFit, block: Sequence[str]) -> bool:
     """Whether a part sits at a bound: the record does not determine it."""
     return any(problem.no_effect(name, tuned.values[name]) for name in block)
 
 
-def _predicted(problem: Problem, tuned: Tuned) -> Array:
+def _predict_parts(problem: Problem, tuned: DriveFit) -> Array:
     """(2,) logarithm of the likelihood of every part of the motion, predicted from the others.
 
     Parts are stretches of time, and then kinds of motion: either direction, slow and fast. What predicts only motion
     that it has seen elsewhere is no law. The fit to the others is a Gauss-Newton step away from the one to all.
     """
     speed = problem.each.speed[problem.rows]
-    kinds = 2 * (speed > 0) + (np.abs(speed) > FAST * np.max(np.abs(speed)))
+    kinds = 2 * (speed > 0) + (np.abs(speed) > FAST_SPEED_SHARE * np.max(np.abs(speed)))
     every = np.arange(len(speed))
     partitions = np.array_split(every, FOLDS), [every[kinds == kind] for kind in np.unique(kinds)]
     return np.array([_likelihood(problem, tuned, folds) for folds in partitions if len(folds) > 1])
 
 
-def _likelihood(problem: Problem, tuned: Tuned, folds: Sequence[Rows]) -> float:
+def _likelihood(problem: Problem, tuned: DriveFit, folds: Sequence[Rows]) -> float:
     """Of the folds, each predicted from the others."""
     count = sum(map(len, folds))
-    position, torque = unpredicted(problem, tuned, folds)
+    position, torque = prediction_errors(problem, tuned, folds)
     return -independent(problem, count) * (log(position) + log(torque))
 
 
-def unpredicted(problem: Problem, tuned: Tuned, folds: Sequence[Rows]) -> tuple[float, float]:
+def prediction_errors(problem: Problem, tuned: DriveFit, folds: Sequence[Rows]) -> tuple[float, float]:
     """Rms of position and torque, in their weights, where each fold is predicted from the others."""
     count = sum(map(len, folds))
     J, r = tuned.jacobian, tuned.residuals
@@ -269,7 +269,7 @@ class DriveFound:
     modes: tuple[ElasticMode, ...] = ()
     modes_predicted: Mapping[int, float] = field(default_factory=dict)
     correlation: Correlation | None = None
-    rivals: Sequence[Tried] = ()
+    rivals: Sequence[TriedRival] = ()
     simulated: tuple[float, float] = (nan, nan)
 
 
@@ -280,7 +280,7 @@ def identify_drive(
     replay: Replay,
     *,
     structure_known: bool,
-    begin: Begin | None = None,
+    begin: FitStart | None = None,
     beside_cycle: float | None = None,
     modes: int | None = 0,
     progress: Progress = lambda what, done, total: None,
@@ -337,19 +337,19 @@ def identify_drive(
     free += ["omega_0", "D"] if drive.reference_model else []
     progress("first fit", 0, 2 + len(BLOCKS))
     parts: dict[str, float] = {}
-    may_be: Sequence[Tuned | Tried] = ()
-    rivals: Sequence[Tried] = ()
-    elastic_rivals: Sequence[Tried] = ()
+    may_be: Sequence[DriveFit | TriedRival] = ()
+    rivals: Sequence[TriedRival] = ()
+    elastic_rivals: Sequence[TriedRival] = ()
     chosen: tuple[str, ...] = ()
     if structure_known:
-        own = {name for name, block in BLOCKS.items() if driven and _has(problem.start, block)}
+        own = {name for name, block in BLOCKS.items() if driven and _has_friction_part(problem.start, block)}
         chosen = tuple(name for name in BLOCKS if name in own)
         free += [name for part in chosen for name in BLOCKS[part]]
-        found = _preloaded(problem, problem.first(free))
+        found = _fit_preloaded(problem, problem.first(free))
     else:
         found = _best_start(problem, free, candidates)
         if not (begin is not None and begin.one_way):  # then what friction holds at rest is all that shows the load
-            found = _preloaded(problem, found)
+            found = _fit_preloaded(problem, found)
         chosen, parts, found, undecided = friction_parts(problem, found, progress)
         progress("rival structures", 1 + len(BLOCKS), 2 + len(BLOCKS))
         found, rivals = with_rivals(problem, found, partial(_misses, problem))
@@ -378,7 +378,7 @@ def identify_drive(
     refuse_poor(each, found)
     found = problem.exact(found, central=True)
     quarters = np.array_split(np.arange(len(rows)), FOLDS)
-    unseen = unpredicted(problem, found, quarters)
+    unseen = prediction_errors(problem, found, quarters)
     predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
     if not each.record.driven:
         predicted = predicted[0], nan
@@ -390,8 +390,8 @@ def identify_drive(
     if begin is not None and begin.one_way:
         estimates = one_way(each, estimates, begin.one_way)
 
-    def judged(fit: Tuned) -> Mapping[str, Estimate]:
-        return estimates_of(problem, fit, unpredicted(problem, fit, quarters), delay, gain, structure_known)
+    def judged(fit: DriveFit) -> Mapping[str, Estimate]:
+        return estimates_of(problem, fit, prediction_errors(problem, fit, quarters), delay, gain, structure_known)
 
     other = None if beside_cycle is None else other_cycle(problem, found, beside_cycle, judged)
     return DriveFound(
@@ -469,18 +469,18 @@ def start_of(machine: Machine, axis: str) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
+def _has_friction_part(values: Mapping[str, float], block: Sequence[str]) -> bool:
     """Whether the friction has the part that a block is of."""
     return values[block[0]] != 0
 
 
-def _misses(problem: Problem, fit: Tuned) -> bool:
+def _misses(problem: Problem, fit: DriveFit) -> bool:
     """Whether a fit leaves more than noise of the position, or has an inertia that the torque line contradicts."""
     noise = max(white(problem.each.position), MIN_POSITION_NOISE)
     return rms(fit.position) > MISSED * noise or contradicts_line(problem.each, problem.machine, fit.values["J"])
 
 
-def _preloaded(problem: Problem, fit: Tuned) -> Tuned:
+def _fit_preloaded(problem: Problem, fit: DriveFit) -> DriveFit:
     """The fit from the torque at rest of the record, where what was found does not come to rest with it by itself."""
     if problem.replay.preload(*problem.tuned(fit.values)):
         fit = problem.fitted(fit.names, fit.values, fit)
@@ -488,13 +488,13 @@ def _preloaded(problem: Problem, fit: Tuned) -> Tuned:
     return fit
 
 
-def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict[str, float]]) -> Tuned:
+def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict[str, float]]) -> DriveFit:
     """The likeliest of first fits from several starts; the problem has that start, and its weights, then.
 
     Raises InputError: the units can run none of them.
     """
     weights = problem.weights
-    best: tuple[float, dict[str, float], dict[str, float], Tuned] | None = None
+    best: tuple[float, dict[str, float], dict[str, float], DriveFit] | None = None
     failed: InputError | None = None
     for start in candidates:
         problem.start, problem.weights = start, dict(weights)
@@ -605,7 +605,8 @@ def _jumps(x_s: Array, x_a: Array, off: Array, time: Array) -> Iterator[str]:
         more = f" and {len(rows) - 1} more time{'s'[: len(rows) > 2]}" if len(rows) > 1 else ""
         yield (
             f"the recorded position jumps by {1e3 * steps[k]:+.4g} mm from {time[k]:.6g} s to the next row{more}, "
-            f"which no axis does and its setpoint does not ask for; give a window without that ({spelt('window')})"
+            f"which no axis does and its setpoint does not ask for; give a window without that "
+            f"({spell_argument('window')})"
         )
 
 

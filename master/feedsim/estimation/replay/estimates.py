@@ -21,21 +21,21 @@ from feedsim.estimation.least_squares import (
     NORMAL_95,
     Covariance,
     between_groups,
+    correlated_middle,
     correlation_length,
     half_width,
-    stretched,
 )
 from feedsim.estimation.replay.closed_loop import AxisRecord
 from feedsim.estimation.replay.machine_files import KEYS, ElasticMode, modes_of
-from feedsim.estimation.replay.tuning import Problem, Tried, Tuned
+from feedsim.estimation.replay.tuning import DriveFit, Problem, TriedRival
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Machine
 
 MAX_RESIDUAL_SHARE = 0.3  # share of the torque, or of the lag, that a fit may leave
-EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
+EXACT_TRAVEL_SHARE = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
 ONE_WAY = 0.1  # share of the mean torque to which the constant load has to be known where the axis moves one way
 SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
 STRETCHES = 8  # of the motion, each of which is left out once
@@ -43,7 +43,7 @@ PRIOR_SHARE = 0.8  # share of the usual deviation that is left: the record does 
 _CONTROLLER = units.parameters("controller")
 ON_THE_MODEL = "{} it rests on an axis that is taken to be rigid"
 SHARED_LAG = "{} only the lag shows, T_dyn + T_sym + (1 - k_ffw)/K_v, and it may be shared otherwise"
-SHARING = ("T_sym", "k_ffw")
+SHARED_PARAMETERS = ("T_sym", "k_ffw")
 LINE_SHARE = 0.02  # standard deviation of a line's inertia, and of its load over the friction, besides its own
 BESIDE_LINE = "{} is {:.4g} +- {:.2g} {} by the torque line of rigid motion, which needs no model of the drive"
 MODE_SHOWS = "the record speaks for an {}; give {} auto, which fits it"
@@ -52,21 +52,23 @@ ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D"
          "delay")  # fmt: skip
 
 
-class _Valued(Protocol):
+class _WithValues(Protocol):
     """What has values by name."""
 
     @property
     def values(self) -> Mapping[str, float]: ...
 
 
-def refuse_poor(each: AxisRecord, found: Tuned) -> None:
+def refuse_poor(each: AxisRecord, found: DriveFit) -> None:
     """Raises InputError: the fit leaves so much that its parameters are those of no axis."""
     signal = {
         "torque": (rms(found.torque), rms(each.record.torque[each.moving]), 1.0, "N.m", "torque"),
         "position": (rms(found.position), rms((each.setpoint - each.position)[each.moving]), 1e6, "um",
                      "distance of the position behind its setpoint"),
     }  # fmt: skip
-    exact = rms(found.position) <= EXACT * float(np.ptp(each.position[each.moving]))  # the setpoint may be the encoder
+    exact = rms(found.position) <= EXACT_TRAVEL_SHARE * float(
+        np.ptp(each.position[each.moving])
+    )  # the setpoint may be the encoder
     for channel, (left, whole, scale, unit, meaning) in signal.items():
         judged = each.record.driven if channel == "torque" else not exact
         if judged and left > MAX_RESIDUAL_SHARE * whole:
@@ -81,7 +83,7 @@ def refuse_poor(each: AxisRecord, found: Tuned) -> None:
 
 def estimates_of(
     problem: Problem,
-    found: Tuned,
+    found: DriveFit,
     unseen: tuple[float, float],
     delay: Constant | None,
     gain: Constant | None,
@@ -97,7 +99,7 @@ def estimates_of(
     result: dict[str, Estimate] = {}
 
     def put(name: str, value: float, sigma: float, by: str) -> None:
-        result[name] = _judged(name, value, sigma, spread.get(by, nan) / problem.deviation(by, values))
+        result[name] = _judge_estimate(name, value, sigma, spread.get(by, nan) / problem.deviation(by, values))
 
     for name in found.names:
         if name not in ("K_i", EXCESS, "K_v", "T_dyn") and not name.startswith("mode_"):
@@ -106,21 +108,21 @@ def estimates_of(
     T_n = values["K_p"] / values["K_i"]
     put("T_n", T_n, T_n * float(np.sqrt(ratio @ covariance @ ratio)), "K_p")
     if gain is not None:
-        result["K_v"] = _judged("K_v", values["K_v"], gain.sigma, 0.0)
+        result["K_v"] = _judge_estimate("K_v", values["K_v"], gain.sigma, 0.0)
     else:
         put("K_v", values["K_v"], spread["K_v"], "K_v")
         if not known:
-            reason = ON_THE_MODEL.format(_without("speed setpoint", problem.each.record.speed_setpoint))
+            reason = ON_THE_MODEL.format(_missing_signal_text("speed setpoint", problem.each.record.speed_setpoint))
             result["K_v"] = replace(result["K_v"], status="undetermined", reason=reason)
     if delay is not None:
-        result["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], delay.sigma), 0.0)
+        result["T_dyn"] = _judge_estimate("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], delay.sigma), 0.0)
         # The lag that the position shows is the delay and (1 - k_ffw)/K_v.
         further = hypot(values["K_v"] * delay.sigma, (1 - values["k_ffw"]) * result["K_v"].sigma / values["K_v"])
         for name, own in (("k_ffw", further), ("T_sym", delay.sigma)):
             result[name] = replace(result[name], sigma=hypot(result[name].sigma, own))
     else:
         put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
-        result = shared_lag(result, _without("following error", problem.each.record.deviation))
+        result = shared_lag(result, _missing_signal_text("following error", problem.each.record.deviation))
     if EXCESS in found.names:
         rise = inner_to_outer(found.names, ["F_S"])[0]
         put("F_S", values["F_C"] + values[EXCESS], float(np.sqrt(rise @ covariance @ rise)), EXCESS)
@@ -131,7 +133,7 @@ def estimates_of(
 
 def correlation_of(
     problem: Problem,
-    found: Tuned,
+    found: DriveFit,
     unseen: tuple[float, float],
     delay: Constant | None,
     gain: Constant | None,
@@ -160,7 +162,10 @@ def correlation_of(
             rows[row] = [float(each == name) for each in found.names]
     matrix = rows @ covariance @ rows.T + np.diag(further)
     if delay is None:  # T_sym and k_ffw share the lag: what shared_lag() adds moves both
-        added = [estimates[name].sigma ** 2 - matrix[k, k] if name in SHARING else 0 for k, name in enumerate(names)]
+        added = [
+            estimates[name].sigma ** 2 - matrix[k, k] if name in SHARED_PARAMETERS else 0
+            for k, name in enumerate(names)
+        ]
         matrix += np.outer(*2 * [np.sqrt(np.maximum(added, 0.0))])
     scale = np.sqrt(np.diag(matrix))
     return Correlation(tuple(names), np.asarray(matrix / np.outer(scale, scale)))
@@ -214,7 +219,7 @@ def shared_lag(estimates: Mapping[str, Estimate], without: str) -> dict[str, Est
 
 
 def with_undecided(
-    estimates: Mapping[str, Estimate], found: _Valued, undecided: Sequence[_Valued]
+    estimates: Mapping[str, Estimate], found: _WithValues, undecided: Sequence[_WithValues]
 ) -> dict[str, Estimate]:
     """Estimates whose intervals include what they would be with a part of the friction law, or of the drive, that the
     record neither asks for nor excludes: it is a part of what is not known.
@@ -237,13 +242,13 @@ def with_undecided(
     return wider
 
 
-def beside_modes(estimates: Mapping[str, Estimate], modes: Sequence[Tried]) -> dict[str, Estimate]:
+def beside_modes(estimates: Mapping[str, Estimate], modes: Sequence[TriedRival]) -> dict[str, Estimate]:
     """Estimates of a rigid axis whose record speaks for an elastic mode: the speed controller that makes up for it is
     another one."""
     shown = [one for one in modes if one.gain > one.least]
     if not shown:
         return dict(estimates)
-    reason = MODE_SHOWS.format(max(shown, key=lambda one: one.gain).name, spelt("modes"))
+    reason = MODE_SHOWS.format(max(shown, key=lambda one: one.gain).name, spell_argument("modes"))
     hidden = {name: replace(one, status="undetermined", reason=reason)
               for name, one in estimates.items() if name in ("K_p", "T_n")}  # fmt: skip
     return {**estimates, **hidden}
@@ -291,7 +296,7 @@ def beside_line(axis_record: AxisRecord, machine: Machine, estimates: Mapping[st
     return result
 
 
-def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:
+def elastic_modes(problem: Problem, found: DriveFit, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:
     """The elastic modes of a fit, with standard deviations."""
     own = modes_of(found.values)
     if not own:
@@ -302,14 +307,14 @@ def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -
     return tuple(sorted(modes, key=lambda each: each.frequency))
 
 
-def _without(signal: str, recorded: Array | None) -> str:
+def _missing_signal_text(signal: str, recorded: Array | None) -> str:
     """Begin of a reason: the record lacks a signal, or has it of other samples than its setpoint and position."""
     if recorded is None:
         return f"without the control's own {signal}"
     return f"as the recorded {signal} follows from setpoint and position too roughly,"
 
 
-def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
+def _judge_estimate(name: str, value: float, sigma: float, left: float) -> Estimate:
     """An estimate that says what it is worth. left: the deviation over the usual one."""
     if name in _CONTROLLER:
         row = _CONTROLLER[name]
@@ -321,7 +326,7 @@ def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
     return found.judged()
 
 
-def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> Array:
+def _covariance(problem: Problem, found: DriveFit, unseen: tuple[float, float]) -> Array:
     """Covariance (P, P), of correlated residuals: every channel counts less by the rows over which they are correlated.
 
     unseen: rms of position and torque that the others do not predict, in their weights. Where a model is not quite that
@@ -334,7 +339,10 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
     prior = J[2 * count :].T @ J[2 * count :]
     normal = sum((J[rows].T @ J[rows] for rows in channels), prior)
     middle = sum(
-        (stretched(J[rows], r[rows], rms, correlation_length) for rows, rms in zip(channels, unseen, strict=True)),
+        (
+            correlated_middle(J[rows], r[rows], rms, correlation_length)
+            for rows, rms in zip(channels, unseen, strict=True)
+        ),
         prior,
     )
     covariance = np.asarray(Covariance.of(normal, hermitian=True).by(middle))

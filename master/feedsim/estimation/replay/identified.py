@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.estimation.identify import AxisLimits, Recorded, identify_axis_limits
+from feedsim.estimation.identify import AxisLimits, RecordedAxis, identify_axis_limits
 from feedsim.estimation.identify.clipping import tied_at_limit
 from feedsim.estimation.identify.inertia import inertia
 from feedsim.estimation.identify.parameters import EXCESS
@@ -22,26 +22,26 @@ from feedsim.estimation.identify.position_loop import rms
 from feedsim.estimation.least_squares import (
     Covariance,
     between_groups,
+    correlated_middle,
     correlation_length,
     half_width,
-    shows,
-    stretched,
+    is_significant,
 )
 from feedsim.estimation.replay.closed_loop import (
     AxisRecord,
-    Begin,
+    FitStart,
     Replay,
     limits,
+    mark_clipped_rows,
     of_cycle,
     same_time,
     start_values,
-    unclipped,
 )
-from feedsim.estimation.replay.compare import Comparison, replayed
+from feedsim.estimation.replay.compare import Comparison, replay_records
 from feedsim.estimation.replay.drive import DriveFound, identify_drive, implausible
 from feedsim.estimation.replay.machine_files import (
     RINGS,
-    Beside,
+    CoupledShape,
     ElasticMode,
     RigidAxis,
     control_cycle,
@@ -52,7 +52,7 @@ from feedsim.estimation.replay.machine_files import (
     machine_files,
     simple_drive,
 )
-from feedsim.estimation.replay.moving_lines import DIES_AWAY, Line, detrended, without_outside
+from feedsim.estimation.replay.moving_lines import DIES_AWAY, Line, remove_parabola, without_outside
 from feedsim.estimation.replay.tuning import decision, with_either
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import Finding, InputError
@@ -78,18 +78,18 @@ from feedsim.structure.modes import modes_text
 
 Rows = NDArray[np.int64]
 
-TRIAL = 0.05  # shape of the trial, of the rigid motion of the axis that the mode is of
+TRIAL_SHAPE = 0.05  # shape of the trial, of the rigid motion of the axis that the mode is of
 FEWEST_ROWS = 50  # at rest while another axis moves
-PREDICTED = 0.8  # share of the variance of one half that a fit to the other half may leave
+PREDICTED_VARIANCE_SHARE = 0.8  # share of the variance of one half that a fit to the other half may leave
 STRETCHES = 8  # of these rows, each of which is left out once
 
 
-def coupled(
+def fit_coupled_shapes(
     machine: Machine,
     records: Mapping[str, AxisRecord],
     fmus: Path | None = None,
     spread: Mapping[int, Sequence[float]] | None = None,
-) -> dict[tuple[int, str], Beside]:
+) -> dict[tuple[int, str], CoupledShape]:
     """Shapes that modes of one axis have at the scale of another one.
 
     Args:
@@ -103,7 +103,7 @@ def coupled(
     """
     table = checked_modes(machine)
     modes = {axis: np.flatnonzero(~table.rigid & (table.ports[f"n_{axis}"] != 0)) for axis in records}
-    result: dict[tuple[int, str], Beside] = {}
+    result: dict[tuple[int, str], CoupledShape] = {}
     plain = None
     with Replay(machine, records, fmus=fmus) as replay:
         for mover, own in modes.items():
@@ -116,9 +116,9 @@ def coupled(
                 plain_x = plain[still]["x_a"]
                 remaining = axis_record.position - plain_x
                 D, e = (
-                    np.concatenate([detrended(signal, rows) for rows in stretches])
+                    np.concatenate([remove_parabola(signal, rows) for rows in stretches])
                     for signal in (
-                        np.column_stack([_seen(replay, machine, int(k), mover, still, plain_x) for k in own]),
+                        np.column_stack([_shape_response(replay, machine, int(k), mover, still, plain_x) for k in own]),
                         remaining,
                     )
                 )
@@ -126,12 +126,12 @@ def coupled(
                     if shape is None:
                         continue
                     moved = []
-                    for changed in _off(machine, int(k), mover, (spread or {}).get(int(k), ())):
-                        alone = _seen(replay, changed, int(k), mover, still, plain_x)[:, None]
-                        other = np.concatenate([detrended(alone, rows) for rows in stretches])
+                    for changed in _vary_mode(machine, int(k), mover, (spread or {}).get(int(k), ())):
+                        alone = _shape_response(replay, changed, int(k), mover, still, plain_x)[:, None]
+                        other = np.concatenate([remove_parabola(alone, rows) for rows in stretches])
                         anew = np.column_stack([D[:, :column], other, D[:, column + 1 :]])
                         moved.append(float(np.linalg.lstsq(anew, e, rcond=1e-9)[0][column]) - shape[0])
-                    result[int(k), still] = Beside(still, shape[0], hypot(shape[1], *moved))
+                    result[int(k), still] = CoupledShape(still, shape[0], hypot(shape[1], *moved))
     return result
 
 
@@ -147,16 +147,16 @@ def _at_rest(axis_record: AxisRecord, mover: AxisRecord) -> list[Rows]:
     return [part for part in parts if len(part) >= FEWEST_ROWS]
 
 
-def _seen(replay: Replay, machine: Machine, k: int, mover: str, still: str, plain: Array) -> Array:
+def _shape_response(replay: Replay, machine: Machine, k: int, mover: str, still: str, plain: Array) -> Array:
     """(N,) position of `still` [m] that a shape of 1 of the k-th mode of `mover` makes. plain: (N,) without one [m]."""
     tried = replay.follow(_with_trial(machine, k, mover, still), ("x_a",))[still]["x_a"]
-    return np.asarray((tried - plain) / TRIAL)
+    return np.asarray((tried - plain) / TRIAL_SHAPE)
 
 
 def _with_trial(machine: Machine, k: int, mover: str, still: str) -> Machine:
     """The machine whose k-th mode moves the scale of `still` by TRIAL of the rigid motion of `mover`."""
     table = checked_modes(machine)
-    size = TRIAL * float(np.max(np.abs(table.ports[f"x_{mover}"][table.rigid])))
+    size = TRIAL_SHAPE * float(np.max(np.abs(table.ports[f"x_{mover}"][table.rigid])))
     ports = {port: np.array(column) for port, column in table.ports.items()}
     ports[f"x_{still}"][k] += size
     path = machine.modes.with_name(f"{machine.modes.stem}_trial_{k}_{still}.csv")  # a plant is known by its file
@@ -164,7 +164,7 @@ def _with_trial(machine: Machine, k: int, mover: str, still: str) -> Machine:
     return machine.model_copy(update={"modes": path})
 
 
-def _off(machine: Machine, k: int, mover: str, spread: Sequence[float]) -> Iterator[Machine]:
+def _vary_mode(machine: Machine, k: int, mover: str, spread: Sequence[float]) -> Iterator[Machine]:
     """The machine with each value of its k-th mode off by a standard deviation, in the order of `spread`."""
     table = checked_modes(machine)
     for which, sigma in enumerate(spread):
@@ -195,15 +195,15 @@ def _shapes(D: Array, e: Array) -> list[tuple[float, float] | None]:
     half = len(e) // 2
     for own, other in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
         b = np.linalg.lstsq(D[own], e[own], rcond=1e-9)[0]
-        if not rms(e[other] - D[other] @ b) ** 2 < PREDICTED * rms(e[other]) ** 2:
+        if not rms(e[other] - D[other] @ b) ** 2 < PREDICTED_VARIANCE_SHARE * rms(e[other]) ** 2:
             return nothing
     b = np.linalg.lstsq(D, e, rcond=1e-9)[0]
     remaining = e - D @ b
-    covariance = Covariance.of(D.T @ D).by(stretched(D, remaining, 0.0, correlation_length))
+    covariance = Covariance.of(D.T @ D).by(correlated_middle(D, remaining, 0.0, correlation_length))
     stretches = np.array_split(np.arange(len(e)), STRETCHES)
     sigma = np.sqrt(np.maximum(np.diag(covariance), between_groups(D, e, stretches)))
     return [
-        (float(value), float(own)) if shows(float(value), half_width(float(own))) else None
+        (float(value), float(own)) if is_significant(float(value), half_width(float(own))) else None
         for value, own in zip(b, sigma, strict=True)
     ]
 
@@ -245,7 +245,7 @@ class DrivesFound:
 
 
 def identify_drives(
-    read: Mapping[str, Recorded],
+    read: Mapping[str, RecordedAxis],
     records: Mapping[str, AxisRecord],
     machine: Machine | None,
     head: Sequence[str],
@@ -276,22 +276,22 @@ def identify_drives(
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
     fitted, outside = {}, {}
-    begins: dict[str, Begin | None] = {}
+    begins: dict[str, FitStart | None] = {}
     limits_of_setpoints: dict[str, AxisLimits] = {}
     clipped: list[Finding] = []
     refusals = dict(refused or {})
     for axis, each in records.items():
-        with _refusing(axis, refusals):
+        with _catch_refusal(axis, refusals):
             _refuse_implausible(each)
             J = _rigid_inertia(each, machine)
-            whole, said = unclipped(each, "the torque of these rows is left out of the fit", J)
+            whole, said = mark_clipped_rows(each, "the torque of these rows is left out of the fit", J)
             if whole.record.driven:
                 marked, share = tied_at_limit(whole.record)
                 whole = replace(whole, record=marked)
                 if share and not said:
                     said = (_tied(axis, float(np.max(np.abs(marked.torque))), share),)
             own, lines = without_outside(whole, J)
-            begins[axis] = _begin(own) if machine is None else None
+            begins[axis] = _find_fit_start(own) if machine is None else None
             fitted[axis], outside[axis] = own, lines
             clipped += said
             with suppress(InputError):
@@ -309,12 +309,12 @@ def identify_drives(
             axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
             try:
                 with (
-                    _begun(machine, name, note, axes, interval, cycle) as own,
+                    _starting_machine(machine, name, note, axes, interval, cycle) as own,
                     Replay(own, {axis: each}, fmus=fmus, only_motion=modes == 0) as replay,
                 ):
                     return identify_drive(
                         own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
-                        beside_cycle=_other(cycle, interval) if machine is None else None, modes=modes,
+                        beside_cycle=_other_cycle(cycle, interval) if machine is None else None, modes=modes,
                         progress=lambda what, done, total: say(f"{axis}: {what}", done, total),
                     )  # fmt: skip
             except InputError as error:
@@ -331,8 +331,8 @@ def identify_drives(
         raise InputError.of("no drive is identified", dict.fromkeys(failed.values()))
     if position_cycle is None and machine is None and (speaks := _speaks_for_other(found)) >= 0:
         # Fits that begin with either cycle must agree on it.
-        if speaks > 0 and _speaks_for_other((anew := drives(_other(cycle, interval)))[0]) < 0:
-            cycle, (found, failed) = _other(cycle, interval), anew
+        if speaks > 0 and _speaks_for_other((anew := drives(_other_cycle(cycle, interval)))[0]) < 0:
+            cycle, (found, failed) = _other_cycle(cycle, interval), anew
         else:
             undecided = True
             found = {
@@ -354,7 +354,7 @@ def identify_drives(
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle, control)
         own_modes = {axis: one.modes for axis, one in found.items()}
-        beside = _beside(files, own_modes, {axis: fitted[axis] for axis in found}, fmus)
+        beside = _couple_modes(files, own_modes, {axis: fitted[axis] for axis in found}, fmus)
         if any(modes != found[axis].modes for axis, modes in beside.items()):
             found = {axis: replace(one, modes=beside[axis]) for axis, one in found.items()}
             rigid = {axis: replace(each, modes=beside[axis]) for axis, each in rigid.items()}
@@ -363,14 +363,14 @@ def identify_drives(
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
 
         def comparison(axis: str, _: object) -> Comparison:
-            return replace(replayed(made[axis], {axis: records[axis]}, fmus, records)[axis], clipped=())
+            return replace(replay_records(made[axis], {axis: records[axis]}, fmus, records)[axis], clipped=())
 
         comparisons = in_parallel([partial(comparison, axis) for axis in records if axis in found])
     return DrivesFound(found, comparisons, files, outside, clipped, undecided, failed, limits_of_setpoints)
 
 
 @contextmanager
-def _refusing(axis: str, refused: dict[str, str]) -> Iterator[None]:
+def _catch_refusal(axis: str, refused: dict[str, str]) -> Iterator[None]:
     """A block in which an axis may be refused: then the reason is kept."""
     try:
         yield
@@ -390,7 +390,7 @@ def _rigid_inertia(each: AxisRecord, machine: Machine | None) -> float | None:
     return None
 
 
-def _beside(
+def _couple_modes(
     files: Mapping[str, str], modes: Mapping[str, Sequence[ElasticMode]], records: Mapping[str, AxisRecord],
     fmus: Path | None,
 ) -> dict[str, tuple[ElasticMode, ...]]:  # fmt: skip
@@ -404,7 +404,7 @@ def _beside(
         every = [mode for own in modes.values() for mode in own]
         with _folder(files) as folder:
             spread = {first + i: mode.sigma for i, mode in enumerate(every) if np.all(np.isfinite(mode.sigma))}
-            shapes = coupled(load_machine(folder), records, fmus, spread)
+            shapes = fit_coupled_shapes(load_machine(folder), records, fmus, spread)
     found, k = {}, first
     for axis, own in modes.items():
         found[axis] = tuple(
@@ -415,7 +415,7 @@ def _beside(
     return found
 
 
-def _begin(each: AxisRecord) -> Begin:
+def _find_fit_start(each: AxisRecord) -> FitStart:
     """What the record alone says of an axis. InputError: it has no torque, or does not accelerate."""
     if not each.record.driven:
         raise InputError(
@@ -439,7 +439,7 @@ def _speaks_for_other(found: Mapping[str, DriveFound]) -> int:
     return decision([one.other for one in found.values() if one.other is not None])
 
 
-def _other(position_cycle: float, interval: float) -> float:
+def _other_cycle(position_cycle: float, interval: float) -> float:
     """The other usual cycle of a position loop: of the interpolator in place of the drive's."""
     return interval if position_cycle < interval else control_cycle(interval)
 
@@ -458,7 +458,7 @@ def _folder(files: Mapping[str, str]) -> Iterator[Path]:
 
 
 @contextmanager
-def _begun(
+def _starting_machine(
     known: Machine | None, name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, cycle: float
 ) -> Iterator[Machine]:
     """The machine that is known, or one of rigid axes, for as long as its files are there."""

@@ -42,14 +42,14 @@ from feedsim.structure.modes import Modes, modes_text
 
 MOST_MODES = 5
 RESONANCE_FREQUENCIES = 60  # frequencies
-DAMPING = (0.01, 0.03, 0.06, 0.1)
+DAMPING_RATIOS = (0.01, 0.03, 0.06, 0.1)
 # Below twice the position loop's corner its gains do the same as a mode; above a fifth of the rows' rate nothing shows.
 ABOVE_LOOP, BELOW_RATE = 2.0, 0.2
 RINGS = 0.2  # [s] behind the motion in which an axis still swings
 
 
 @dataclass(frozen=True)
-class Beside:
+class CoupledShape:
     """What a mode of one axis does at the scale of another one.
 
     axis: the other one. shape: mode shape at its scale over the rigid motion of the mode's own axis [1]. sigma: its
@@ -75,7 +75,7 @@ class ElasticMode:
     motor: float
     scale: float
     sigma: tuple[float, ...] = (np.nan,) * 4
-    beside: tuple[Beside, ...] = ()
+    beside: tuple[CoupledShape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,9 @@ def resonance(axis_record: AxisRecord, simulated: Array, per_row: int, K_v: floa
     low, high = ABOVE_LOOP * K_v / (2 * pi), BELOW_RATE / h
     best: tuple[float, Resonance] | None = None
     for f in np.geomspace(low, high, RESONANCE_FREQUENCIES) if low < high else ():
-        for D in DAMPING:
+        for D in DAMPING_RATIOS:
             A = resonator(float(f), D, acceleration, h / per_row)[::per_row][rows]
-            c = _solved(A, remaining[rows])
+            c = _solve_least_squares(A, remaining[rows])
             off = float(np.sum((remaining[rows] - A @ c) ** 2))
             if best is None or off < best[0]:
                 best = off, Resonance(float(f), D, float(np.copysign(np.hypot(c[0], c[1]), c[0])))
@@ -119,7 +119,7 @@ def resonator(frequency: float, damping: float, a: Array, h: float) -> Array:
     return np.column_stack([lfilter(numerator, denominator, a) for numerator in numerators])
 
 
-def _solved(A: Array, y: Array) -> Array:
+def _solve_least_squares(A: Array, y: Array) -> Array:
     """Least squares by the normal equations of scaled columns: there are few, and many of them are tried."""
     scale = np.linalg.norm(A, axis=0) + 1e-300
     N = (A / scale).T @ (A / scale)
@@ -177,7 +177,7 @@ def modes_of(values: Mapping[str, float]) -> list[ElasticMode]:
 
 TOOL_AXES = ("X", "Y", "Z")
 CONTROL = 125e-6  # [s] the usual control cycle
-ASSUMED = "assumed: the record does not show it"
+ASSUMED_REMARK = "assumed: the record does not show it"
 
 
 def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
@@ -219,7 +219,7 @@ def machine_files(
     """File name -> text, of the whole folder. interval: of the record's rows [s]. control: that the record is of."""
     files = {"machine.yaml": _machine(name, note, axes, interval, position_cycle, control), "modes.csv": _modes(axes)}
     for axis, rigid_axis in axes.items():
-        files[drive_file(axis)] = drive_text(rigid_axis.drive, rigid_axis.estimates, ASSUMED, rigid_axis.head)
+        files[drive_file(axis)] = drive_text(rigid_axis.drive, rigid_axis.estimates, ASSUMED_REMARK, rigid_axis.head)
         files[friction_file(axis)] = friction_axis_text(
             axis, rigid_axis.values, rigid_axis.estimates, rigid_axis.head, rigid_axis.correlation
         )
@@ -263,7 +263,7 @@ def _machine(
     pose = ", ".join(f"{axis}: {_text(1e3 * rigid_axis.position)} mm" for axis, rigid_axis in axes.items())
     control = control_cycle(interval)
     lines = [
-        f"name: {_quoted(name)}", f"note: {_quoted(note)}", *([f"control: {of}"] if of else []), "",
+        f"name: {_quote_text(name)}", f"note: {_quote_text(note)}", *([f"control: {of}"] if of else []), "",
         "modes: modes.csv", f"pose: {{{pose}}}", "",
         f"cycles: {{control: {_text(1e6 * control)} us, position: {_text(1e6 * position_cycle)} us, "
         f"interpolation: {_text(1e6 * interval)} us}}",
@@ -307,7 +307,7 @@ def drive_text(
             if not (isinstance(value, Filter) and value.type == "off"):
                 entries.append((f"{key}: {{{_group(value, exact)}}}", remark))
         elif value is not None:
-            entries.append((f"{key}: {_shown(value, info, exact)}", remark))
+            entries.append((f"{key}: {_value_text(value, info, exact)}", remark))
     column = max(len(entry) for entry, _ in entries) + 3
     lines = [f"# {line}".rstrip() for line in head]
     return (
@@ -318,10 +318,10 @@ def drive_text(
 def _group(group: ParameterGroup, exact: bool) -> str:
     fields = type(group).model_fields
     given = {key: getattr(group, key) for key in fields if getattr(group, key) is not None}
-    return ", ".join(f"{key}: {_shown(value, fields[key], exact)}" for key, value in given.items())
+    return ", ".join(f"{key}: {_value_text(value, fields[key], exact)}" for key, value in given.items())
 
 
-def _shown(value: float | int | bool | str, info: FieldInfo, exact: bool) -> str:
+def _value_text(value: float | int | bool | str, info: FieldInfo, exact: bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     quantity = Quantity.of(info)
@@ -344,11 +344,11 @@ def friction_axis_text(
         for name in Friction.model_fields
         if name in values
     }
-    identified = _identified(axis, estimates, correlation) if correlation is not None else {}
+    identified = _identified_group(axis, estimates, correlation) if correlation is not None else {}
     return friction_text(lines, identified, head, name=friction_file(axis))
 
 
-def _identified(axis: str, estimates: Mapping[str, Estimate], correlation: Correlation) -> dict[str, Any]:
+def _identified_group(axis: str, estimates: Mapping[str, Estimate], correlation: Correlation) -> dict[str, Any]:
     """The group `identified`, as that of friction.yaml; values of the drive by names such as "drive.K_p"."""
     beside = {"M_0": "constant_load", "J": "inertia"}
 
@@ -392,5 +392,5 @@ def _text(value: float) -> str:
     return f"{float(f'{value:.6g}'):.10f}".rstrip("0").rstrip(".")
 
 
-def _quoted(text: str) -> str:
+def _quote_text(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

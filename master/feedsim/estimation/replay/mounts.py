@@ -27,8 +27,8 @@ from feedsim.estimation.least_squares import (
     LeastSquares,
     Point,
     correlation_length,
-    determined,
     half_width,
+    is_determined,
     reason,
     secant,
 )
@@ -45,7 +45,7 @@ from feedsim.simulation.cosim import Follower
 from feedsim.simulation.nc import Program, plan
 from feedsim.structure.build import build
 from feedsim.structure.modes import checked_modes, write_modes
-from feedsim.structure.pose_change import SAME_FREQUENCY, stale
+from feedsim.structure.pose_change import SAME_FREQUENCY, describe_stale_table
 
 MEANINGS = {
     "K_e": "elastic stiffness",
@@ -65,7 +65,7 @@ DIFFERENCES = {"K_e": 1e-2, "F_max": 2e-2, "x_2": 2e-2, "K_v": 1e-2, "c": 1e-2}
 COARSE_TOLERANCE, FINE_TOLERANCE = 3e-3, 1e-5  # share of the cost: predicted reduction of a step at which a search ends
 # Sum of squares, of unit variance, by which friction in the mounts has to be the better explanation: two parameters
 # more, one of them at its bound, gain that with a chance below 1e-5.
-CLEARLY = 25.0
+CLEAR_LIKELIHOOD_GAIN = 25.0
 # Gauss-Newton steps that finish a search, until one gains less than FINISHED of the sum of squares; ways of positions
 # that differences are taken over.
 MOST_FINISHING, FINISHED, SMALLEST_WAY, LARGEST_WAY = 6, 0.05, 1e-3, 0.4
@@ -74,7 +74,7 @@ STRETCH_SWINGS, HOP_SWINGS = 2.0, 0.5  # swings that a stretch of a ring-down ho
 LEAST_FREQUENCY, MOST_FREQUENCY = 4.0, 60.0  # [Hz] of modes on mounts
 G = 9.80665  # [m/s^2]
 CLEAR_RATIO = 3.0  # standard deviations of the noise: least amplitude of a stretch
-SHARP = 0.04  # half of the interval of a stretch's frequency that is shown, over the frequency
+SHARP_HALF_WIDTH = 0.04  # half of the interval of a stretch's frequency that is shown, over the frequency
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +277,7 @@ def with_accelerometer(machine: Machine, folder: Path) -> Machine:
         raise InputError(
             f"{machine.structure}: of matrices the absolute motion of the tool is not known; beams are needed"
         )
-    if how := stale(modes, built.solution.modes, SAME_FREQUENCY):
+    if how := describe_stale_table(modes, built.solution.modes, SAME_FREQUENCY):
         raise InputError(f"{machine.modes}: is not the table of {machine.structure} at the pose of the machine: {how}")
     shapes = tool @ built.solution.shapes[:, : len(modes.frequency)]
     if shapes.shape[1] < len(modes.frequency):
@@ -485,12 +485,12 @@ def identify_mounts(
     """
     stops = Stops(machine, logs, fmus)
     try:
-        return _identified(stops, progress)
+        return _identify_mounts(stops, progress)
     finally:
         stops.close()
 
 
-def _identified(stops: Stops, progress: Callable[[str, int, int], None]) -> FoundMounts:
+def _identify_mounts(stops: Stops, progress: Callable[[str, int, int], None]) -> FoundMounts:
     names, begin = tuple(MEANINGS), stops.begin
     steps = iter(range(1000))
 
@@ -514,11 +514,11 @@ def _identified(stops: Stops, progress: Callable[[str, int, int], None]) -> Foun
     gain = stops.squares(linear) - least
     verdict: Verdict = "not linear"
     free: Sequence[str] = names
-    if gain < CLEARLY:
+    if gain < CLEAR_LIKELIHOOD_GAIN:
         own, _ = stops.searched(
             [values | {"F_max": begin["F_max"], "x_2": begin["x_2"]}], LINEAR, lambda: None, COARSE_TOLERANCE
         )
-        verdict = "linear" if stops.squares(own) - least > CLEARLY else "open"
+        verdict = "linear" if stops.squares(own) - least > CLEAR_LIKELIHOOD_GAIN else "open"
     if verdict == "linear":
         free = LINEAR
         values, covariance = stops.finished(stops.problem(LINEAR, linear), line)
@@ -547,7 +547,7 @@ def _estimate(name: str, value: float, sigma: float, verdict: Verdict) -> Estima
     if verdict == "open":
         why = "linear mounts explain the ring-downs about as well: their amplitudes are too small, or too much alike"
         return replace(whole, sigma=sigma, status="undetermined", reason=why)
-    if not determined(value, half_width(sigma)):
+    if not is_determined(value, half_width(sigma)):
         why = f"{reason(value, half_width(sigma))}: stops at a further jerk, with other amplitudes, determine it"
         return replace(whole, sigma=sigma, status="undetermined", reason=why)
     return replace(whole, sigma=sigma)
@@ -568,7 +568,7 @@ def swings(time: Array, values: Array, frequency: float) -> list[Swing]:
     begin = float(time[0]) + HOP_SWINGS / frequency  # what the position loop makes of the stop has died away
     while begin + length <= time[-1]:
         rows = (time >= begin) & (time < begin + length)
-        one = _swing(time[rows] - begin, values[rows], result[-1].frequency if result else frequency)
+        one = _fit_swing(time[rows] - begin, values[rows], result[-1].frequency if result else frequency)
         if one is not None:
             result.append(replace(one, time=begin))
         elif result:  # it has died away
@@ -577,7 +577,7 @@ def swings(time: Array, values: Array, frequency: float) -> list[Swing]:
     return result
 
 
-def _swing(t: Array, y: Array, frequency: float) -> Swing | None:
+def _fit_swing(t: Array, y: Array, frequency: float) -> Swing | None:
     size = float(np.std(y))
     if len(t) < 12 or not size > 0:
         return None
@@ -602,7 +602,7 @@ def _swing(t: Array, y: Array, frequency: float) -> Swing | None:
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:2], 0.0))
     amplitude = float(np.hypot(linear[2], linear[3]))
     if (
-        not half_width(sigma[0]) < SHARP * end.x[0]
+        not half_width(sigma[0]) < SHARP_HALF_WIDTH * end.x[0]
         or np.any(end.active_mask)
         or amplitude < CLEAR_RATIO * sqrt(variance)
     ):

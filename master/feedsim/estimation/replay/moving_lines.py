@@ -25,7 +25,7 @@ from scipy.signal.windows import dpss
 from scipy.stats import f as f_distribution
 
 from feedsim.estimation.replay.closed_loop import MOVES, AxisRecord
-from feedsim.estimation.replay.machine_files import DAMPING, resonator
+from feedsim.estimation.replay.machine_files import DAMPING_RATIOS, resonator
 from feedsim.files.trace.trace import Array
 
 # --- Vibration from outside: lines in a record of an axis at rest, which go on while it moves -------------------------
@@ -39,12 +39,12 @@ from feedsim.files.trace.trace import Array
 # A line that the record's known load has, or by which its torque moves the axis, is the axis' own.
 
 
-BESIDE = 0.5  # [s] at rest on either side of a motion that are looked at
+REST_WINDOW = 0.5  # [s] at rest on either side of a motion that are looked at
 MIN_REST_TIME_BESIDE = 0.1  # [s] at rest that are needed there
 DIES_AWAY = 0.12  # [s] behind a motion in which the axis itself still swings
 PERIODS = 2  # of a line on the shorter side
 BELOW_RATE = 0.4  # of the rows' rate: above it nothing is separated
-FINER = 8  # frequencies per line width
+LINE_SUBDIVISIONS = 8  # frequencies per line width
 PREDICTED_SHARE = 0.5  # share of the variance at rest that either side has to predict of the other
 MOST_LINES = 3
 MAX_NAMED_LINES = 4  # in a note
@@ -129,7 +129,7 @@ def _rests(axis_record: AxisRecord) -> Iterator[tuple[Rows, Rows]]:
     moving = np.convolve(moving, behind)[: len(moving)] > 0.5
     edges = np.flatnonzero(np.diff(moving.astype(int)))
     stretches = np.split(np.arange(len(moving)), edges + 1)  # at rest and in motion in turns
-    beside, shortest = round(BESIDE / h), round(MIN_REST_TIME_BESIDE / h)
+    beside, shortest = round(REST_WINDOW / h), round(MIN_REST_TIME_BESIDE / h)
     for k in range(1, len(stretches) - 1):
         before, after = stretches[k - 1][-beside:], stretches[k + 1][:beside]
         if moving[stretches[k][0]] and min(len(before), len(after)) >= shortest:
@@ -142,18 +142,18 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
     width = h * (after[-1] - before[0])
     quiet = np.zeros(after[-1] - before[0] + 1)
     for rows in (before, after):
-        quiet[rows - before[0]] = detrended(position, rows)
-    size = FINER * len(quiet)
+        quiet[rows - before[0]] = remove_parabola(position, rows)
+    size = LINE_SUBDIVISIONS * len(quiet)
     power, grid = np.abs(np.fft.rfft(quiet, size)), np.fft.rfftfreq(size, h)
     power[(grid < PERIODS / (h * min(len(before), len(after)))) | (grid > BELOW_RATE / h)] = 0.0
-    best, step = float(grid[int(np.argmax(power))]), 0.5 / (FINER * width)
+    best, step = float(grid[int(np.argmax(power))]), 0.5 / (LINE_SUBDIVISIONS * width)
     for _ in range(3):  # the sine that leaves least is near the highest line
         near = best + step * np.arange(-3, 4)
         best = float(near[int(np.argmin([_remaining_squares(time, position, f, before, after) for f in near]))])
         step /= 3
-    sides = [(before, detrended(position, before)), (after, detrended(position, after))]
+    sides = [(before, remove_parabola(position, before)), (after, remove_parabola(position, after))]
     for (own, y), (other, z) in (sides, sides[::-1]):
-        W, V = (detrended(waves(time, best), rows) for rows in (own, other))
+        W, V = (remove_parabola(waves(time, best), rows) for rows in (own, other))
         sine = np.linalg.lstsq(W, y, rcond=None)[0]
         if not np.sum((z - V @ sine) ** 2) < (1 - PREDICTED_SHARE) * np.sum(z**2):
             return None
@@ -162,18 +162,18 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
 
 def _remaining_squares(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> float:
     """Sum of squares that one sine over both sides leaves."""
-    W, y = _both(time, signal, frequency, before, after)
+    W, y = _detrend_sides(time, signal, frequency, before, after)
     return float(np.sum((y - W @ np.linalg.lstsq(W, y, rcond=None)[0]) ** 2))
 
 
 def _sine(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> Array:
     """(2,) cosine and sine of one line over both sides."""
-    return np.asarray(np.linalg.lstsq(*_both(time, signal, frequency, before, after), rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(*_detrend_sides(time, signal, frequency, before, after), rcond=None)[0])
 
 
-def _both(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> tuple[Array, Array]:
+def _detrend_sides(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> tuple[Array, Array]:
     wave, sides = waves(time, frequency), (before, after)
-    return tuple(np.concatenate([detrended(of, rows) for rows in sides]) for of in (wave, signal))  # type: ignore[return-value]
+    return tuple(np.concatenate([remove_parabola(of, rows) for rows in sides]) for of in (wave, signal))  # type: ignore[return-value]
 
 
 def driven_by_record(
@@ -191,7 +191,9 @@ def driven_by_record(
         time, width = record.time, 1 / (record.time[stretches[-1][-1]] - record.time[stretches[0][0]])
         band = [frequency, *(frequency + side * k * width for k in range(1, BAND_WIDTHS + 1) for side in (-1, 1))]
         every = np.column_stack([waves(time, one) for one in band if one > 0])
-        columns, load = (np.concatenate([detrended(of, rows) for rows in stretches]) for of in (every, record.load))
+        columns, load = (
+            np.concatenate([remove_parabola(of, rows) for rows in stretches]) for of in (every, record.load)
+        )
         line, whole = (part @ np.linalg.lstsq(part, load, rcond=None)[0] for part in (columns[:, :2], columns))
         if line @ line > LOAD_SHARE * (whole @ whole):
             return True
@@ -208,7 +210,7 @@ def waves(time: Array, frequency: float) -> Array:
     return np.column_stack([np.cos(phase), np.sin(phase)])
 
 
-def detrended(signal: Array, rows: Rows) -> Array:
+def remove_parabola(signal: Array, rows: Rows) -> Array:
     """Rows of a signal (N,) or (N, K) less their parabola: creep at rest is no vibration."""
     t = np.linspace(-1.0, 1.0, len(rows))
     trend = np.linalg.qr(np.column_stack([np.ones_like(t), t, t**2]))[0]
@@ -272,7 +274,7 @@ MAX_UNPREDICTED = 0.7  # share of that which a resonance leaves at most
 DRIVEN_SHARE = 0.01  # share of what an axis' setpoint drives in all of the record
 TRIED_RESONANCES = 5  # frequencies within a line width at which a resonance is tried
 UNDECIDED_GAIN, ORDER_GAIN = 0.8, 1.1  # gain of a sine over the angle, of the one over time
-SEPARATED = 0.25  # orders that a line width is at most where whole orders are separated
+MAX_LINE_WIDTH = 0.25  # orders that a line width is at most where whole orders are separated
 TREND_COLUMNS = 4  # columns of a polynomial over the motion
 
 
@@ -400,9 +402,9 @@ class _Motion:
         kept = self._kept(self._candidates())
         # Lines side by side are one whose amplitude changes.
         kept = [f for f in kept if sum(abs(f - other) * self.duration < MIN_DISTANCE for other in kept) == 1]
-        return [one for k in range(len(kept)) if (one := self._judged(kept, k, others)) is not None]
+        return [one for k in range(len(kept)) if (one := self._judge_line(kept, k, others)) is not None]
 
-    def _remaining(self, frequencies: Sequence[float]) -> Array:
+    def _error_without(self, frequencies: Sequence[float]) -> Array:
         """(N,) error without sines of these frequencies."""
         if not len(frequencies):
             return self.y
@@ -436,13 +438,13 @@ class _Motion:
         result: list[float] = []
         scale = float(np.std(self.y)) or 1.0
         for _ in range(MAX_LINES):
-            power, sine = self._spectra(self._remaining(result))
+            power, sine = self._spectra(self._error_without(result))
             peaks = self._peaks(sine)
             ratio = [sine[self.own_range[k]] / self._surroundings(power, k) for k in peaks]
             if not ratio or not max(ratio) > CANDIDATE_RATIO:
                 break
             begin = [*result, float(self.frequency[self.own_range[peaks[int(np.argmax(ratio))]]])]
-            x = least_squares(lambda x: self._remaining(x) / scale, begin, diff_step=1e-4, max_nfev=6).x
+            x = least_squares(lambda x: self._error_without(x) / scale, begin, diff_step=1e-4, max_nfev=6).x
             low, high = self.frequency[self.own_range[[0, -1]]]
             result = [float(one) for one in x if low < one < high]
         return result
@@ -456,8 +458,8 @@ class _Motion:
         """Probability that noise has such a line at any of the frequencies that are looked at."""
         looked_at = self.frequency[self.own_range]
         place = int(np.argmin(np.abs(looked_at - frequencies[k])))
-        around = self._surroundings(self._spectra(self._remaining(frequencies))[0], place)
-        sine = self._spectra(self._remaining([*frequencies[:k], *frequencies[k + 1 :]]))[1][self.own_range[place]]
+        around = self._surroundings(self._spectra(self._error_without(frequencies))[0], place)
+        sine = self._spectra(self._error_without([*frequencies[:k], *frequencies[k + 1 :]]))[1][self.own_range[place]]
         count = self.duration * (looked_at[-1] - looked_at[0])
         return float(f_distribution.sf(sine / around, 2, self._sides[1][place]) * count)
 
@@ -471,9 +473,9 @@ class _Motion:
             frequencies = [*frequencies[:worst], *frequencies[worst + 1 :]]
         return frequencies
 
-    def _judged(self, kept: Sequence[float], k: int, others: Sequence[_Motion]) -> _MotionLine | None:
+    def _judge_line(self, kept: Sequence[float], k: int, others: Sequence[_Motion]) -> _MotionLine | None:
         """A line, where the whole motion shows it, whatever the axes drive."""
-        f, z = kept[k], self._remaining([*kept[:k], *kept[k + 1 :]])
+        f, z = kept[k], self._error_without([*kept[:k], *kept[k + 1 :]])
         W = _without_trend(waves(self.time, f))
         c = _fit(W, z)
         size = float(np.hypot(*c))
@@ -483,7 +485,7 @@ class _Motion:
         if size < MIN_AMPLITUDE or min(own) < MIN_PROJECTION:
             return None
         apart = [one for one in kept if abs(one - f) * self.duration > BAND_PRODUCT]
-        if self._driven(f, self._remaining(apart), others):
+        if self._is_driven(f, self._error_without(apart), others):
             return None
         over_angle, near, separated, turns = self._over_angle(f, z)
         if over_angle > ORDER_GAIN * gain:
@@ -499,14 +501,14 @@ class _Motion:
         waved = [taper * wave for taper in self.wide for wave in waves(self.time, f).T]
         return np.asarray(np.linalg.qr(np.array(waved).T)[0].T)
 
-    def _driven(self, f: float, z: Array, others: Sequence[_Motion]) -> bool:
+    def _is_driven(self, f: float, z: Array, others: Sequence[_Motion]) -> bool:
         """Whether a resonance that the setpoints drive takes more of z near a frequency than a sine of that does, and
         predicts the other motions, as far as they have something there."""
         near, h = self.near(f), self.axis_record.record.interval
         own, sine = near @ z, near @ waves(self.time, f)
         most, best = _square(sine @ _fit(sine, own)), None
         for one in f + np.linspace(-1, 1, TRIED_RESONANCES) / self.duration:
-            for D in DAMPING:
+            for D in DAMPING_RATIOS:
                 answers = [resonator(one, D, a, h) for a in self.accelerations]
                 driven = [q for q in answers if np.ptp(q[self.rows]) > DRIVEN_SHARE * np.ptp(q)]
                 if not driven:  # nothing accelerates: no resonance is driven
@@ -539,4 +541,4 @@ class _Motion:
         for own in order + width * np.linspace(-1, 1, 21):
             W = _without_trend(waves(turn, own))
             gains.append(_square(W @ _fit(W, z)))
-        return max(gains), abs(order - round(order)) < width, width < SEPARATED, turns
+        return max(gains), abs(order - round(order)) < width, width < MAX_LINE_WIDTH, turns

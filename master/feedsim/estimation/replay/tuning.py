@@ -163,7 +163,7 @@ FIRST_TOLERANCE, COMPARED_TOLERANCE, FINAL_TOLERANCE = 3e-3, 2e-4, 3e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Tuned:
+class DriveFit:
     """A fit.
 
     Attributes:
@@ -322,7 +322,7 @@ class Problem:
         """Standard deviation of a parameter's prior, in its own unit, at values."""
         return parameter(name, self.start).slope(abs(values[name]))
 
-    def weigh(self, tuned: Tuned) -> None:
+    def weigh(self, tuned: DriveFit) -> None:
         """Take what is left with what was found as what a residual is worth.
 
         What is left of either channel is correlated over rows, and counts by as many as say something of their own:
@@ -336,7 +336,7 @@ class Problem:
             "torque": max(rms(torque), least) * sqrt(correlation_length(torque - np.mean(torque))),
         }
 
-    def first(self, free: Sequence[str]) -> Tuned:
+    def first(self, free: Sequence[str]) -> DriveFit:
         """A fit from the start, whose weights are those of what is left."""
         fit = self.fitted(free, {}, tolerance=FIRST_TOLERANCE)
         self.weigh(fit)
@@ -348,10 +348,10 @@ class Problem:
         self,
         free: Sequence[str],
         begin: Mapping[str, float],
-        near: Tuned | None = None,
+        near: DriveFit | None = None,
         tolerance: float = COMPARED_TOLERANCE,
         give_up: GiveUp = never,
-    ) -> Tuned:
+    ) -> DriveFit:
         """From `begin`, with the weights as they are, to where no step has a predicted reduction above that share.
 
         near: a fit nearby, whose Jacobian is taken over. give_up: as of a search (estimation/least_squares.py).
@@ -362,23 +362,23 @@ class Problem:
         for k, name in enumerate(names):
             if near is not None and name in near.names:
                 slopes[:, k] = near.point.slopes[:, near.names.index(name)]
-        return self._tuned(problem, secant(problem, problem.position(begin), slopes, tolerance, give_up))
+        return self._drive_fit(problem, secant(problem, problem.position(begin), slopes, tolerance, give_up))
 
-    def continued(self, fit: Tuned, tolerance: float = COMPARED_TOLERANCE) -> Tuned:
+    def continued(self, fit: DriveFit, tolerance: float = COMPARED_TOLERANCE) -> DriveFit:
         """From where a fit of this problem has ended, with the weights as they are."""
         problem = self._least_squares(fit.names)
-        return self._tuned(problem, secant_from(problem, fit.point, tolerance))
+        return self._drive_fit(problem, secant_from(problem, fit.point, tolerance))
 
-    def near(self, fit: Tuned) -> Tuned:
+    def near(self, fit: DriveFit) -> DriveFit:
         """The same with its Jacobian by differences there, or where the fit was hardly another one: what
         cross-validation is taken from."""
         problem = self._least_squares(fit.names)
-        return self._tuned(problem, fit.point if fit.point.near else problem.exact(fit.point))
+        return self._drive_fit(problem, fit.point if fit.point.near else problem.exact(fit.point))
 
-    def exact(self, fit: Tuned, central: bool = False) -> Tuned:
+    def exact(self, fit: DriveFit, central: bool = False) -> DriveFit:
         """The same with its Jacobian by differences, which intervals are taken from."""
         problem = self._least_squares(fit.names)
-        return self._tuned(problem, problem.exact(fit.point, central))
+        return self._drive_fit(problem, problem.exact(fit.point, central))
 
     def residuals(self, names: Sequence[str], values: Mapping[str, float]) -> Array:
         """(2 N + M,) as those of a fit, without one."""
@@ -390,7 +390,7 @@ class Problem:
         """Half the sum of squares, with the weights as they are."""
         return self._least_squares(names).cost(point.x, point.errors)
 
-    def moved(self, fit: Tuned, step: Array) -> dict[str, float]:
+    def moved(self, fit: DriveFit, step: Array) -> dict[str, float]:
         """The values of a fit after a step (P,) in usual deviations, within the bounds."""
         problem = self._least_squares(fit.names)
         return problem.values(np.clip(fit.point.x + step, problem.low, problem.high))
@@ -411,9 +411,9 @@ class Problem:
         problem = LeastSquares(errors, parameters, steps, prior, weights, _first_and_then_others)
         return problem
 
-    def _tuned(self, problem: LeastSquares, point: Point) -> Tuned:
+    def _drive_fit(self, problem: LeastSquares, point: Point) -> DriveFit:
         values, residuals, jacobian = problem.values(point.x), problem.residuals(point), problem.jacobian(point)
-        return Tuned(problem.names, values, point, residuals, jacobian, self.counted)
+        return DriveFit(problem.names, values, point, residuals, jacobian, self.counted)
 
 
 def _first_and_then_others(of: Callable[[Array], Array], points: Sequence[Array]) -> list[Array]:
@@ -432,7 +432,7 @@ def _first_and_then_others(of: Callable[[Array], Array], points: Sequence[Array]
 
 
 CLEARLY = 1.5  # of what decides between cycles: a fit that the record speaks against by so much is not finished
-OTHERWISE = "with a position cycle of {:g} ms, which fits as well, it is {:.4g} {}"
+OTHER_CYCLE_TEXT = "with a position cycle of {:g} ms, which fits as well, it is {:.4g} {}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -458,7 +458,7 @@ def decision(others: Sequence[OtherCycle]) -> int:
 
 
 def other_cycle(
-    problem: Problem, fit: Tuned, cycle: float, judged: Callable[[Tuned], Mapping[str, Estimate]]
+    problem: Problem, fit: DriveFit, cycle: float, judged: Callable[[DriveFit], Mapping[str, Estimate]]
 ) -> OtherCycle:
     """A fit once more, with another cycle of the position loop [s].
 
@@ -536,7 +536,7 @@ def with_either(estimates: Mapping[str, Estimate], other: OtherCycle) -> dict[st
         value, half = other.estimates[name].value, half_width(one.sigma)
         moved = abs(value - one.value)
         if moved > half:
-            reason = OTHERWISE.format(1e3 * other.cycle, value, one.unit)
+            reason = OTHER_CYCLE_TEXT.format(1e3 * other.cycle, value, one.unit)
             result[name] = replace(one, status="undetermined", reason=reason)
         else:
             both = max(half, moved + half_width(other.estimates[name].sigma))
@@ -564,7 +564,7 @@ MODE_PLACES, MODE_DAMPING, MODE_SHAPE = (25.0, 50.0, 100.0), 0.03, 0.3
 
 
 @dataclass(frozen=True)
-class Rival:
+class RivalStructure:
     """A structure. drive: what it changes of the drive. begin: further parameters, with their start; a limit is no
     parameter, but what the record shows."""
 
@@ -579,7 +579,7 @@ class Rival:
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class TriedRival:
     """A rival beside a fit.
 
     Attributes:
@@ -595,24 +595,24 @@ class Tried:
     values: Mapping[str, float] = field(default_factory=dict)
 
 
-def rivals_of(problem: Problem) -> list[Rival]:
+def rivals_of(problem: Problem) -> list[RivalStructure]:
     """What the drive of a problem may have besides."""
     drive = problem.machine.shipped_drive(problem.each.axis, "the identification of a drive")
     result = []
     limit = limit_shown(problem.each.record)
     if limit is not None and limit < drive.M_max:
-        result.append(Rival("torque limit", {"M_max": limit}))
+        result.append(RivalStructure("torque limit", {"M_max": limit}))
     if not drive.reference_model:
-        result.append(Rival("reference model", {"reference_model": True, **BEGIN_MODEL}, BEGIN_MODEL))
+        result.append(RivalStructure("reference model", {"reference_model": True, **BEGIN_MODEL}, BEGIN_MODEL))
     if drive.ideal_current_loop and drive.filter_1.type == "off":
         low_pass = Filter.model_construct(type="low_pass", f=BEGIN_CURRENT, D_num=None, D_den=CURRENT_DAMPING)
-        result.append(Rival("current loop", {"filter_1": low_pass}, {"filter_1.f": BEGIN_CURRENT}))
+        result.append(RivalStructure("current loop", {"filter_1": low_pass}, {"filter_1.f": BEGIN_CURRENT}))
     elif "filter_1.D_den" not in problem.start and drive.filter_1.type == "low_pass":
-        result.append(Rival("damping of the current loop", {}, {"filter_1.D_den": OTHER_DAMPING}))
+        result.append(RivalStructure("damping of the current loop", {}, {"filter_1.D_den": OTHER_DAMPING}))
     return result
 
 
-def possible_modes(problem: Problem, fit: Tuned) -> list[Tried]:
+def possible_modes(problem: Problem, fit: DriveFit) -> list[TriedRival]:
     """What an elastic mode may do to the values of a rigid axis: at places over the usual range, by two runs each, in
     which the scale moves with the motor and against it."""
     start, result = dict(problem.start), []
@@ -622,27 +622,29 @@ def possible_modes(problem: Problem, fit: Tuned) -> list[Tried]:
         for sign in (1.0, -1.0):
             mode = frequency, MODE_DAMPING, MODE_SHAPE, sign * MODE_SHAPE
             problem.start = start | dict(zip((f"{key}_1" for key in KEYS), mode, strict=True))
-            both.append(_predicted(problem, fit, Rival(f"elastic mode of {frequency:g} Hz", {}), count))
+            both.append(_predict_rival(problem, fit, RivalStructure(f"elastic mode of {frequency:g} Hz", {}), count))
         result.append(max(both, key=lambda one: one.gain))
     problem.start = start
     return result
 
 
-def with_rivals(problem: Problem, fit: Tuned, misses: Callable[[Tuned], bool]) -> tuple[Tuned, list[Tried]]:
+def with_rivals(
+    problem: Problem, fit: DriveFit, misses: Callable[[DriveFit], bool]
+) -> tuple[DriveFit, list[TriedRival]]:
     """The fit with the rivals that the record asks for, one after the other, and what was tried; the problem has their
     structure then.
 
     misses: whether a fit contradicts what the record shows without one, and may have ended far away.
     """
-    tried: dict[str, Tried] = {}
+    tried: dict[str, TriedRival] = {}
     far = misses(fit)
     while True:
         fit = problem.near(fit)
         machine, start = problem.machine, problem.start
-        best: tuple[Tried, Tuned, Machine, dict[str, float]] | None = None
+        best: tuple[TriedRival, DriveFit, Machine, dict[str, float]] | None = None
         for rival in rivals_of(problem):
-            problem.machine, problem.start = _with(machine, problem.each.axis, rival), start | dict(rival.begin)
-            one = _predicted(problem, fit, rival)
+            problem.machine, problem.start = _apply_rival(machine, problem.each.axis, rival), start | dict(rival.begin)
+            one = _predict_rival(problem, fit, rival)
             if far or one.gain > FITTED_SHARE * one.least:
                 other = _best_fit(problem, fit, rival, one.least, misses if far else None)
                 if other is not None:  # else it has ended elsewhere: the fit is one of it in the limit
@@ -659,7 +661,7 @@ def with_rivals(problem: Problem, fit: Tuned, misses: Callable[[Tuned], bool]) -
         fit, far = problem.continued(fit), False
 
 
-def _predicted(problem: Problem, fit: Tuned, rival: Rival, tests: int = 1) -> Tried:
+def _predict_rival(problem: Problem, fit: DriveFit, rival: RivalStructure, tests: int = 1) -> TriedRival:
     """By one run with the rival as it begins: what a step towards it gains, and how far it may lead at 95 %.
 
     Of the change of the residuals, what the parameters of the fit make up for says nothing. tests: that share the error
@@ -669,27 +671,27 @@ def _predicted(problem: Problem, fit: Tuned, rival: Rival, tests: int = 1) -> Tr
     try:
         changed = problem.residuals(fit.names, fit.values) - fit.residuals
     except InputError:  # the units cannot run it
-        return Tried(rival.name, 0.0, least, False)
+        return TriedRival(rival.name, 0.0, least, False)
     answer = -np.linalg.lstsq(fit.jacobian, changed, rcond=None)[0]
     alone = changed + fit.jacobian @ answer
     size = float(alone @ alone)
     if not size > 0:
-        return Tried(rival.name, 0.0, least, False)
+        return TriedRival(rival.name, 0.0, least, False)
     towards = -float(fit.residuals @ alone) / size
     share = min(max(towards, 0.0) + NORMAL_95 / np.sqrt(size), 1.0)
     values = problem.moved(fit, share * answer)
-    return Tried(rival.name, 0.5 * max(towards, 0.0) ** 2 * size, least, False, values)
+    return TriedRival(rival.name, 0.5 * max(towards, 0.0) ** 2 * size, least, False, values)
 
 
-def _with(machine: Machine, axis: str, rival: Rival) -> Machine:
+def _apply_rival(machine: Machine, axis: str, rival: RivalStructure) -> Machine:
     own = machine.axes[axis]
     drive = machine.shipped_drive(axis, "the identification of a drive").model_copy(update=dict(rival.drive))
     return machine.model_copy(update={"axes": machine.axes | {axis: own.model_copy(update={"drive": drive})}})
 
 
 def _best_fit(
-    problem: Problem, fit: Tuned, rival: Rival, least: float, misses: Callable[[Tuned], bool] | None
-) -> Tuned | None:
+    problem: Problem, fit: DriveFit, rival: RivalStructure, least: float, misses: Callable[[DriveFit], bool] | None
+) -> DriveFit | None:
     """From the fit without the rival; where that may have ended far away, from where it began, too, unless the first
     has found what is missing. None: there is no better one.
 
@@ -704,7 +706,7 @@ def _best_fit(
 
     # What delays the speed setpoint is beside what the symmetry filter has to match.
     later = problem.start["T_sym"] + 2 * rival.begin.get("D", 0.0) / rival.begin.get("omega_0", 1.0)
-    best: Tuned | None = None
+    best: DriveFit | None = None
     cost = without
     for begin, near in (({**fit.values, **rival.begin}, fit), ({"T_sym": later}, None)):
         with suppress(InputError):  # the units cannot run it

@@ -6,6 +6,6 @@ Start with names.py; the table is names.csv. Files are read by archive.py, and r
 of what they hold.
 """
 
-from feedsim.files.control.names import CONTROLS, Name, known, names_of, table
+from feedsim.files.control.names import CONTROLS, Name, find_name, names_of, table
 
-__all__ = ["CONTROLS", "Name", "known", "names_of", "table"]
+__all__ = ["CONTROLS", "Name", "find_name", "names_of", "table"]

@@ -58,7 +58,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Odd:
+class OddLine:
     """A line that was not understood."""
 
     line: int
@@ -88,7 +88,7 @@ class Archive:
     encoding: str = "latin-1"
     container: bool = False
     entries: list[Entry] = field(default_factory=list)
-    odd: list[Odd] = field(default_factory=list)
+    odd: list[OddLine] = field(default_factory=list)
     comments: int = 0
     odd_count: int = 0
     axis_names: dict[str, str] = field(default_factory=dict)
@@ -126,10 +126,10 @@ class Archive:
         if len(self.odd) >= MOST_ODD:
             return
         shown = "".join(c if c.isprintable() else "." for c in text.strip())
-        self.odd.append(Odd(line, shown[:77] + "..." if len(shown) > 80 else shown, reason))
+        self.odd.append(OddLine(line, shown[:77] + "..." if len(shown) > 80 else shown, reason))
 
 
-def decoded(data: bytes) -> tuple[str, str]:
+def decode_text(data: bytes) -> tuple[str, str]:
     """Text and encoding of a file; encoding it again gives the bytes."""
     for mark, encoding in ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8")):
         if data.startswith(mark):

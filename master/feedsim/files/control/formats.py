@@ -1,6 +1,6 @@
 """How files of controls are read: a row of _FORMATS and a function for each kind of file.
 
-Start reading at opened().
+Start reading at parse_file().
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from feedsim.files.control.archive import (
     MAX_INCLUDED_BYTES,
     Archive,
     Entry,
-    decoded,
+    decode_text,
     lines,
     scalar,
 )
@@ -34,7 +34,7 @@ from feedsim.foundation.errors import InputError
 Include = Callable[[str], tuple[PurePath, bytes]]  # as #INCLUDE names a file -> its path and content
 MAX_INCLUDES = 100  # #INCLUDE lines, those of included files counted again each time
 _SECTION = re.compile(r"\[([^\[\]]*)\]")
-_ASSIGNED = re.compile(r"(?P<name>[A-Za-z_]\w*)[ \t]*=[ \t]*(?P<value>.*)$")
+_ASSIGNMENT = re.compile(r"(?P<name>[A-Za-z_]\w*)[ \t]*=[ \t]*(?P<value>.*)$")
 _COMMENT = re.compile(r"[ \t][#;]")
 MAX_JOINTS = 16  # of LinuxCNC (EMCMOT_MAX_JOINTS)
 _AXIS_LETTERS = "XYZABCUVW"
@@ -49,7 +49,7 @@ _OF_ALL = (
 
 
 @dataclass(frozen=True)
-class _Setting:
+class _SectionSetting:
     """KEY = VALUE below a section. span: None where several lines make it, so that it cannot be written."""
 
     archive: Archive
@@ -77,7 +77,7 @@ def parse(archive: Archive, include: Include | None) -> None:
             continue
         if not re.fullmatch(r"(?:AXIS|JOINT)_\d+", one.section):
             one.archive.entries.append(_entry(one, f"{one.section}.{one.key}"))
-    by_section: dict[str, list[_Setting]] = {}
+    by_section: dict[str, list[_SectionSetting]] = {}
     for one in settings:
         if one.span is not None:
             by_section.setdefault(one.section, []).append(one)
@@ -94,7 +94,7 @@ class _Reader:
         self._root, self._include = root, include
         self._section, self._count, self._size = "", 0, 0
 
-    def settings(self, archive: Archive, chain: tuple[PurePath, ...]) -> Iterator[_Setting]:
+    def settings(self, archive: Archive, chain: tuple[PurePath, ...]) -> Iterator[_SectionSetting]:
         chain = (*chain, archive.path)
         for number, start, line, several in _logical(archive.text):
             bare = line.lstrip(" \t")
@@ -109,18 +109,20 @@ class _Reader:
                 self._section = head[1].strip().upper() if head else ""
                 if head is None:
                     archive.add_odd(number, line, "a section without its closing bracket")
-            elif (assigned := _ASSIGNED.match(bare)) and self._section:
+            elif (assigned := _ASSIGNMENT.match(bare)) and self._section:
                 at = start + len(line) - len(bare) + assigned.start("value")
                 comment = _COMMENT.search(" " + assigned["value"])
                 text = (assigned["value"][: comment.start()] if comment else assigned["value"]).rstrip()
                 if several:
                     archive.add_odd(number, line, "a value of several lines")
                 span = None if several else (at, at + len(text))
-                yield _Setting(archive, self._section, assigned["name"].upper(), text, number, span)
+                yield _SectionSetting(archive, self._section, assigned["name"].upper(), text, number, span)
             else:
                 archive.add_odd(number, line, "no KEY = VALUE below a section")
 
-    def _included(self, archive: Archive, number: int, word: str, chain: tuple[PurePath, ...]) -> Iterator[_Setting]:
+    def _included(
+        self, archive: Archive, number: int, word: str, chain: tuple[PurePath, ...]
+    ) -> Iterator[_SectionSetting]:
         where = f"{archive.path}:{number}: #INCLUDE {word}"
         self._count += 1
         if self._include is None:
@@ -137,7 +139,7 @@ class _Reader:
             # The same file by another name, ./a.inc of a.inc.
             known = next((file for file in self._root.included.values() if file.path == path), None)
             if known is None:
-                text, encoding = decoded(data)
+                text, encoding = decode_text(data)
                 known = Archive(path.name, archive.control, archive.form, text, encoding, path=path)
             self._root.included[word] = known
         self._size += len(known.text)
@@ -188,7 +190,11 @@ def _letters(joints: list[str], first: Mapping[tuple[str, str], str], old: bool)
 
 
 def _of_joint(
-    joint: str, letter: str, by_section: Mapping[str, list[_Setting]], first: Mapping[tuple[str, str], str], old: bool
+    joint: str,
+    letter: str,
+    by_section: Mapping[str, list[_SectionSetting]],
+    first: Mapping[tuple[str, str], str],
+    old: bool,
 ) -> None:
     """Entries of a joint; limits of its axis and of all axes act on it as well."""
     own = by_section[joint]
@@ -217,9 +223,9 @@ def _of_joint(
             one.archive.entries.append(_entry(one, f"JOINT.{key}", joint, common[0], common[1], reason))
 
 
-def _first_two(settings: Sequence[_Setting], names: Mapping[str, str]) -> list[tuple[str, _Setting]]:
+def _first_two(settings: Sequence[_SectionSetting], names: Mapping[str, str]) -> list[tuple[str, _SectionSetting]]:
     """Limit and setting of a section that several joints share; two values of one limit are enough to refuse it."""
-    result: dict[tuple[str, str], _Setting] = {}
+    result: dict[tuple[str, str], _SectionSetting] = {}
     counts: Counter[str] = Counter()
     for one in settings:
         if (key := names.get(one.key, "")) and counts[key] < 2 and (key, one.text) not in result:
@@ -228,7 +234,9 @@ def _first_two(settings: Sequence[_Setting], names: Mapping[str, str]) -> list[t
     return [(key, one) for (key, _), one in result.items()]
 
 
-def _entry(one: _Setting, key: str, axis: str = "", scale: float = 1.0, unsure: str = "", doubt: str = "") -> Entry:
+def _entry(
+    one: _SectionSetting, key: str, axis: str = "", scale: float = 1.0, unsure: str = "", doubt: str = ""
+) -> Entry:
     assert one.span is not None
     sense = _LIMITS.get(key.partition(".")[2], 0) if axis else 0
     section = f"[{one.section}]" if sense else ""
@@ -270,7 +278,7 @@ _VALUE_HEADS = ("value", "wert", "valeur", "setting", "actual", "offline", "onli
 _UNIT_HEADS = ("unit", "einheit", "unité")
 
 
-def opened(name: str, data: bytes, path: PurePath | None = None, include: Include | None = None) -> Archive:
+def parse_file(name: str, data: bytes, path: PurePath | None = None, include: Include | None = None) -> Archive:
     """What a file holds, by its content.
 
     Args:
@@ -280,7 +288,7 @@ def opened(name: str, data: bytes, path: PurePath | None = None, include: Includ
     Raises:
         InputError: none of the formats; a file to include that there is not.
     """
-    text, encoding = decoded(data)
+    text, encoding = decode_text(data)
     plain = text.lstrip("\ufeff")
     for control, form, is_one, parse in _FORMATS:
         if is_one(plain):
@@ -470,20 +478,47 @@ def _numbers(cells: Sequence[tuple[str, int]], named: int) -> list[int]:
     return indexes
 
 
-def _has(pattern: str) -> Callable[[str], bool]:
+def _contains_pattern(pattern: str) -> Callable[[str], bool]:
     compiled = re.compile(pattern, re.MULTILINE)
     return lambda text: compiled.search(text) is not None
 
 
 _FORMATS: tuple[tuple[str, str, Callable[[str], bool], Callable[[Archive, Include | None], None]], ...] = (
-    ("twincat", ".xti of TwinCAT NC", _has(r"<TcSmItem\b|<AxisPara\b"), _xti),
-    ("sinumerik", "machine data of a SINUMERIK", _has(r"(?i)\$M[ANC]_[A-Z0-9_][^\n=]{0,160}="), sinumerik.parse),
-    ("sinumerik", "parameters of SINAMICS", _has(r"^[ \t]*+[pP]0*\d{1,5}[ \t]*+(\[[ \t\d]{1,20}\])?[ \t]*+="),
-     sinumerik.parse),
-    ("linuxcnc", "INI file of LinuxCNC",
-     _has(r"^[ \t]*+(\[(EMC|TRAJ|EMCMOT|KINS|JOINT_\d+|AXIS_[\dXYZABCUVW])\]|#INCLUDE[ \t])"), parse),
-    ("twincat", "axis list of TwinCAT CNC", _has(r"^[ \t]*+(kopf|kenngr|getriebe|antr|lr_param|lr_hw|vorsteuer|"
-                                                 r"frict_comp|filter)(\[\d+\])?\.\w"), _isg),
-    ("sinumerik", "table of parameters", _has(r"(^|[;,\t\"' ])([pP]0*\d{3,5}(\[\d+\])?|[SP]-\d-\d{4}|P-AXIS-\d{5}"
-                                              r"|MD\d{5}(\[\d+\])?)[;,\t\"' ]"), _table),
-)  # fmt: skip
+    ("twincat", ".xti of TwinCAT NC", _contains_pattern(r"<TcSmItem\b|<AxisPara\b"), _xti),
+    (
+        "sinumerik",
+        "machine data of a SINUMERIK",
+        _contains_pattern(r"(?i)\$M[ANC]_[A-Z0-9_][^\n=]{0,160}="),
+        sinumerik.parse,
+    ),
+    (
+        "sinumerik",
+        "parameters of SINAMICS",
+        _contains_pattern(r"^[ \t]*+[pP]0*\d{1,5}[ \t]*+(\[[ \t\d]{1,20}\])?[ \t]*+="),
+        sinumerik.parse,
+    ),
+    (
+        "linuxcnc",
+        "INI file of LinuxCNC",
+        _contains_pattern(r"^[ \t]*+(\[(EMC|TRAJ|EMCMOT|KINS|JOINT_\d+|AXIS_[\dXYZABCUVW])\]|#INCLUDE[ \t])"),
+        parse,
+    ),
+    (
+        "twincat",
+        "axis list of TwinCAT CNC",
+        _contains_pattern(
+            r"^[ \t]*+(kopf|kenngr|getriebe|antr|lr_param|lr_hw|vorsteuer|"
+            r"frict_comp|filter)(\[\d+\])?\.\w"
+        ),
+        _isg,
+    ),
+    (
+        "sinumerik",
+        "table of parameters",
+        _contains_pattern(
+            r"(^|[;,\t\"' ])([pP]0*\d{3,5}(\[\d+\])?|[SP]-\d-\d{4}|P-AXIS-\d{5}"
+            r"|MD\d{5}(\[\d+\])?)[;,\t\"' ]"
+        ),
+        _table,
+    ),
+)

@@ -104,7 +104,7 @@ def names_of(control: str) -> Mapping[str, Name]:
     return names
 
 
-def known(number: str) -> Name | None:
+def find_name(number: str) -> Name | None:
     """The parameter that is filed under a number, such as MD32200, p1460 or S-0-0100; None where there is none."""
     return next((name for name in table() if name.number == number), None)
 
@@ -120,17 +120,19 @@ def known(number: str) -> Name | None:
 #     ~p1461=100              else there is a doubt: what is taken holds for a part alone
 #
 # A name is one of the control; behind a dot stands a bit, in brackets an element. On the right stands a number or
-# another name, which a minus may precede. May use nothing. Start reading at judged().
+# another name, which a minus may precede. May use nothing. Start reading at judge_conditions().
 
 
-Look = Callable[[str], "float | bool | str | None"]  # name -> value; None: the file has none, several, or no number
-Lack = Callable[[str], str]  # name -> why there is no value
+ValueLookup = Callable[
+    [str], "float | bool | str | None"
+]  # name -> value; None: the file has none, several, or no number
+LackExplanation = Callable[[str], str]  # name -> why there is no value
 _TERM = re.compile(r"^(?P<name>[\w.@-]+?)(?P<element>\[\d+\])?=(?P<right>[^:?]+)(?P<free>\?)?$")
 VALUE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Judged:
+class ConditionVerdict:
     """What conditions say.
 
     state: "acts", "inactive", "unknown" (a parameter is missing), "case" (our value is `value`). reason: in words.
@@ -143,44 +145,44 @@ class Judged:
     doubts: tuple[str, ...] = ()
 
 
-def absent(name: str) -> str:
+def explain_absence(name: str) -> str:
     """Why a parameter has no value, of one that no file has."""
     return f"the file has no {name} (--assume)"
 
 
-def judged(acts: str, look: Look, lack: Lack = absent) -> Judged:
+def judge_conditions(acts: str, look: ValueLookup, lack: LackExplanation = explain_absence) -> ConditionVerdict:
     """What the conditions say of a file; look: a parameter's value there; lack: why it has none."""
     doubts = []
     clauses = [clause.strip() for clause in acts.split(";") if clause.strip()]
     for clause in clauses:
         term, colon, value = clause.partition(": ")
-        if colon and _holds(term, look)[0]:
-            return Judged("case", value.strip(), f"{term}")
+        if colon and _evaluate_term(term, look)[0]:
+            return ConditionVerdict("case", value.strip(), f"{term}")
     for clause in clauses:
         if ": " in clause:
             continue
         if clause.startswith("~"):
-            holds, name = _holds(f"{clause[1:]}?", look)
+            holds, name = _evaluate_term(f"{clause[1:]}?", look)
             if holds is False:
-                doubts.append(f"{name} is {shown(look(name))}, not {clause[1:].partition('=')[2]}")
+                doubts.append(f"{name} is {value_text(look(name))}, not {clause[1:].partition('=')[2]}")
             continue
         unfit, clause = clause.startswith("!"), clause.removeprefix("!")
-        result = [_holds(term.strip(), look) for term in clause.split(" or ")]
+        result = [_evaluate_term(term.strip(), look) for term in clause.split(" or ")]
         if any(holds for holds, _ in result):
             continue
         unknown = [name for holds, name in result if holds is None]
         if unknown:
             reason = f"it acts where {clause.removesuffix('?')}, and {lack(unknown[0])}"
-            return Judged("unknown", reason=reason)
+            return ConditionVerdict("unknown", reason=reason)
         name = result[0][1]
-        reason = f"it acts where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
+        reason = f"it acts where {clause.removesuffix('?')}; {name} is {value_text(look(name))}"
         if unfit:
-            reason = f"it can be taken where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
-        return Judged("unknown" if unfit else "inactive", reason=reason)
-    return Judged("acts", doubts=tuple(doubts))
+            reason = f"it can be taken where {clause.removesuffix('?')}; {name} is {value_text(look(name))}"
+        return ConditionVerdict("unknown" if unfit else "inactive", reason=reason)
+    return ConditionVerdict("acts", doubts=tuple(doubts))
 
 
-def tied(acts: str) -> list[tuple[str, str, float]]:
+def tied_parameters(acts: str) -> list[tuple[str, str, float]]:
     """Pairs of parameters that are to be equal: name, other, and the sign of the other."""
     result = []
     for clause in re.split(r";| or ", acts):
@@ -191,7 +193,7 @@ def tied(acts: str) -> list[tuple[str, str, float]]:
     return result
 
 
-def depends(acts: str) -> list[str]:
+def condition_names(acts: str) -> list[str]:
     """Names that the conditions look up."""
     result = []
     for clause in acts.split(";"):
@@ -203,12 +205,12 @@ def depends(acts: str) -> list[str]:
     return result
 
 
-def shown(value: float | bool | str | None) -> str:
+def value_text(value: float | bool | str | None) -> str:
     """A value as messages have it."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _holds(term: str, look: Look) -> tuple[bool | None, str]:
+def _evaluate_term(term: str, look: ValueLookup) -> tuple[bool | None, str]:
     """Whether a term holds, None where the file does not say; and the name that it is of."""
     result = _TERM.match(term)
     assert result is not None, term

@@ -1,7 +1,7 @@
 """Values of our parameters, in SI, out of what files of a control hold; and what could not be taken, with the reason.
 
 Nothing is guessed. A value is taken where the file has it once, where it acts, where its unit is confirmed by a public
-source (or by who calls), and where nothing contradicts it. May use errors. Start reading at read().
+source (or by who calls), and where nothing contradicts it. May use errors. Start reading at read_values().
 """
 
 from __future__ import annotations
@@ -14,7 +14,15 @@ from functools import cache
 from pathlib import Path
 
 from feedsim.files.control.archive import Archive, Entry, scalar
-from feedsim.files.control.names import Judged, Name, absent, depends, judged, shown, table
+from feedsim.files.control.names import (
+    ConditionVerdict,
+    Name,
+    condition_names,
+    explain_absence,
+    judge_conditions,
+    table,
+    value_text,
+)
 from feedsim.foundation.errors import Finding, InputError
 
 # --- What values of feed axes usually are: a value far outside is read in a wrong unit, more often than it is true ----
@@ -24,7 +32,7 @@ RANGES_FILE = Path(__file__).with_name("usual.csv")
 
 
 @dataclass(frozen=True)
-class Usual:
+class UsualRange:
     """A range, both ends included. unit: SI, of both ends; "" of a count."""
 
     low: float
@@ -37,11 +45,12 @@ class Usual:
 
 
 @cache
-def usual_ranges() -> Mapping[str, Usual]:
+def usual_ranges() -> Mapping[str, UsualRange]:
     """Our parameter -> what it usually is. The ranges are judgement, from axes of tens of grams to tens of tonnes."""
     with RANGES_FILE.open(encoding="utf-8", newline="") as file:
         return {
-            row["parameter"]: Usual(float(row["low"]), float(row["high"]), row["unit"]) for row in csv.DictReader(file)
+            row["parameter"]: UsualRange(float(row["low"]), float(row["high"]), row["unit"])
+            for row in csv.DictReader(file)
         }
 
 
@@ -74,21 +83,21 @@ class View:
     ) -> None:  # fmt: skip
         self.axis, self.archives, self.assume = axis, archives, assume
         self.notes: list[Finding] = []
-        self._called = _called(archives, theirs)
-        self.known = self._called & {entry.axis for archive in archives for entry in archive.entries if entry.axis}
+        self._axis_names = _axis_aliases(archives, theirs)
+        self.known = self._axis_names & {entry.axis for archive in archives for entry in archive.entries if entry.axis}
         known = [place for archive in archives for place in archive.places]
         self.places = tuple(whole_place(place, known) for place in places) if places else self._own_places(theirs, axes)
         for place in self.places:
             if place not in known:
-                raise InputError(f"no drive object or list {place!r}; the files have {_listed(known) or 'none'}")
+                raise InputError(f"no drive object or list {place!r}; the files have {_list_names(known) or 'none'}")
         if not self.known and not self.places:
             has = list(dict.fromkeys(name for archive in archives for name in axes_of(archive)))
             lists = [f"{place}{f' ({name})' if name else ''}" for archive in archives
                      for place, name in archive.places.items()]  # fmt: skip
             unnamed = next((archive.unnamed for archive in archives if archive.unnamed), "")
             raise InputError(
-                f"no axis {theirs!r}; the files have {_listed(has) or 'no axes'}"
-                + (f"; lists that drives can be chosen from: {_listed(lists)}" if lists else "")
+                f"no axis {theirs!r}; the files have {_list_names(has) or 'no axes'}"
+                + (f"; lists that drives can be chosen from: {_list_names(lists)}" if lists else "")
                 + (f". {unnamed[0].upper()}{unnamed[1:]}: name the joint, --axes {axis}=JOINT_n" if unnamed else "")
             )
 
@@ -104,7 +113,7 @@ class View:
         if len(every) == 1 and len(axes) == 1:
             return tuple(every)
         if every:
-            shown_ = _listed([f"{place}{f' ({name})' if name else ''}" for place, name in every.items()])
+            shown_ = _list_names([f"{place}{f' ({name})' if name else ''}" for place, name in every.items()])
             remedy = f"--drives {self.axis}={next(iter(every))}"
             self.notes.append(Finding(
                 "drive-not-known", "note",
@@ -132,7 +141,7 @@ class View:
         if not own:
             return Sought(every, None, "" if not every else f"the file has elements of it, but not [{element}]")
         if any(entry.sense for _, entry in own):
-            return _tightest(every, own)
+            return _find_tightest_limit(every, own)
         if len({comparable(entry.text) for _, entry in own}) > 1:
             lines = ", ".join(f"{archive.name}:{entry.line} ({entry.text[:20]})" for archive, entry in own[:4])
             return Sought(every, None, f"the files have several values: {lines}")
@@ -144,7 +153,7 @@ class View:
             (archive, entry)
             for archive in self.archives
             for entry in archive.in_programs
-            if entry.key in keys and (not entry.axis or entry.axis in self._called)
+            if entry.key in keys and (not entry.axis or entry.axis in self._axis_names)
         ]
 
     def value(self, name: str) -> Value | None:
@@ -167,12 +176,12 @@ class View:
             return float((int(value) >> int(bit)) & 1) if whole else None
         return float(value) if isinstance(value, bool) else value
 
-    def lack(self, name: str) -> str:
+    def explain_lack(self, name: str) -> str:
         """Why value() has none, for a sentence."""
         key, element, bit = name_parts(name)
         result = self.sought(key, element=int(element or 0))
         if result.chosen is None:
-            return result.problem or absent(name)
+            return result.problem or explain_absence(name)
         archive, entry = result.chosen
         where = f"{archive.name}:{entry.line}"
         if entry.doubt:
@@ -195,22 +204,22 @@ def whole_place(place: str, known: Sequence[str]) -> str:
 
 def _holds_parameters(archive: Archive, place: str) -> bool:
     """Whether a drive object has what an axis needs; control units and infeeds have not."""
-    return not _needed(archive.control).isdisjoint(archive.keys_of_places.get(place, ()))
+    return not _required_keys(archive.control).isdisjoint(archive.keys_of_places.get(place, ()))
 
 
 @cache
-def _needed(control: str) -> frozenset[str]:
+def _required_keys(control: str) -> frozenset[str]:
     names = [name for name in table() if name.control == control and not name.parameter.startswith("cycles.")]
     return frozenset(key for name in names for key in (name.key, name.number))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_LISTED]) + (
         f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
     )
 
 
-def _tightest(every: Sequence[tuple[Archive, Entry]], own: Sequence[tuple[Archive, Entry]]) -> Sought:
+def _find_tightest_limit(every: Sequence[tuple[Archive, Entry]], own: Sequence[tuple[Archive, Entry]]) -> Sought:
     """Of a limit that several sections set, the entry that acts: the smallest upper one, the largest lower one."""
     limits: dict[str, float] = {}
     for archive, entry in own:
@@ -236,7 +245,7 @@ def axes_of(archive: Archive) -> Iterator[str]:
         yield f"{axis} ({name})" if name and name != axis else axis
 
 
-def _called(archives: Sequence[Archive], theirs: str) -> frozenset[str]:
+def _axis_aliases(archives: Sequence[Archive], theirs: str) -> frozenset[str]:
     """What the files call the axis: its name, and AX1 or JOINT_0 by the tables of names; several joints of a gantry."""
     asked = theirs.upper()
     names = [(axis, name.upper()) for archive in archives for axis, name in archive.axis_names.items()]
@@ -251,7 +260,7 @@ def comparable(text: str) -> object:
         return text
 
 
-ALL = "all"
+ALL_PARAMETERS = "all"
 # What SINUMERIK's machine data are in, where MD10220 and MD10230 say nothing else: gains in 1000/min.
 USUAL_MASK, USUAL_GAIN = 0x200, 1000 / 60
 _OF_UNITS = ("SCALING_SYSTEM_IS_METRIC", "MD10240", "MD10220", "MD10230[9]")
@@ -260,7 +269,7 @@ MAX_SOFTWARE_LIMIT = 1e4
 
 
 @dataclass(frozen=True)
-class Taken:
+class TakenValue:
     """A value of ours.
 
     axis: ours; "" of the machine. value: SI. entry, archive: where it stands; None where it follows from what was
@@ -320,7 +329,7 @@ class Taken:
 
 
 @dataclass(frozen=True)
-class Refused:
+class RefusedValue:
     """A value that was not taken. text: as the file has it. weight: "doubt", or "note" of what does not act."""
 
     axis: str
@@ -337,14 +346,14 @@ class Reading:
 
     control: str
     axes: Mapping[str, str]
-    taken: list[Taken] = field(default_factory=list)
-    refused: list[Refused] = field(default_factory=list)
+    taken: list[TakenValue] = field(default_factory=list)
+    refused: list[RefusedValue] = field(default_factory=list)
     doubts: list[Finding] = field(default_factory=list)
     notes: list[Finding] = field(default_factory=list)
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def read(
+def read_values(
     archives: Sequence[Archive],
     axes: Mapping[str, str],
     *,
@@ -369,10 +378,10 @@ def read(
         raise InputError(f"files of several controls: {', '.join(sorted(controls))}; import one control at a time")
     rows = [name for name in table() if name.control in controls]
     numbers = {name.number for name in rows}
-    if unknown := [name for name in checked if name != ALL and name not in numbers]:
+    if unknown := [name for name in checked if name != ALL_PARAMETERS and name not in numbers]:
         raise InputError(f"{unknown[0]} is no number of the table of names of the control {controls.pop()}")
     reading = Reading(controls.pop(), dict(axes))
-    asked = _asked(rows)
+    asked = _deciding_parameters(rows)
     if unknown := [
         entry for entry in assume if entry not in asked and entry not in {name_parts(name)[0] for name in asked}
     ]:
@@ -390,13 +399,13 @@ def read(
         reading.places[axis] = view.places
         reading.notes += view.notes
         for name in rows:
-            _read(reading, view, name, checked)
+            _read_parameter(reading, view, name, checked)
     _of_machine(reading)
-    reading.doubts += [doubt for entry in reading.taken if (doubt := _unusual(entry))]
+    reading.doubts += [doubt for entry in reading.taken if (doubt := _describe_unusual_value(entry))]
     return reading
 
 
-def _unusual(taken: Taken) -> Finding | None:
+def _describe_unusual_value(taken: TakenValue) -> Finding | None:
     """A finding on a value far outside of what feed axes have; None of any other."""
     usual = usual_ranges().get(taken.parameter)
     if usual is None or taken.condition or isinstance(taken.value, bool | str) or usual.holds(taken.value):
@@ -407,30 +416,32 @@ def _unusual(taken: Taken) -> Finding | None:
     return Finding("value-unusual", "doubt", text, taken.where, "check the unit")
 
 
-def _asked(rows: Sequence[Name]) -> list[str]:
+def _deciding_parameters(rows: Sequence[Name]) -> list[str]:
     """Parameters whose values decide about others: conditions, ratios, units of machine data."""
-    result = [name for row in rows for name in (*depends(row.acts), *row.times)]
+    result = [name for row in rows for name in (*condition_names(row.acts), *row.times)]
     if any(row.number.startswith("MD") for row in rows):
         result += _OF_UNITS
     return sorted(dict.fromkeys(result))
 
 
-def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) -> None:
+def _read_parameter(reading: Reading, view: View, name: Name, checked: Collection[str]) -> None:
     sought = view.sought(name.key, name.number)
     if not sought.entries:
-        _case(reading, view, name)
+        _read_case(reading, view, name)
         return
     if sought.chosen is None:
         archive, entry = sought.entries[0]
-        reading.refused.append(Refused(view.axis, name, entry.text, sought.problem, f"{archive.name}:{entry.line}"))
+        reading.refused.append(
+            RefusedValue(view.axis, name, entry.text, sought.problem, f"{archive.name}:{entry.line}")
+        )
         return
     archive, entry = sought.chosen
     where = f"{archive.name}:{entry.line}"
 
     def refuse(reason: str, weight: str = "doubt") -> None:
-        reading.refused.append(Refused(view.axis, name, entry.text, reason, where, weight))
+        reading.refused.append(RefusedValue(view.axis, name, entry.text, reason, where, weight))
 
-    said = judged(name.acts, view.value, view.lack)
+    said = judge_conditions(name.acts, view.value, view.explain_lack)
     if said.state == "case":
         _of_case(reading, view, name, said)
         return
@@ -440,7 +451,7 @@ def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) ->
     if name.number.startswith("MD") and {entry.number, entry.key} - {"", name.number, name.key}:
         refuse(f"the file has {entry.number} {entry.key}, the table of names {name.number} {name.key}")
         return
-    if doubt := entry.doubt or ("" if {name.number, ALL} & {*checked} else entry.unsure):
+    if doubt := entry.doubt or ("" if {name.number, ALL_PARAMETERS} & {*checked} else entry.unsure):
         refuse(doubt)
         return
     try:
@@ -453,11 +464,11 @@ def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) ->
     if reason := _unit(view, name, entry, checked):
         refuse(reason)
         return
-    value, reason = _converted(view, name, entry, raw)
+    value, reason = _convert_entry(view, name, entry, raw)
     if reason or value is None:
         refuse(reason)
         return
-    reading.taken.append(Taken(view.axis, name, value, entry, archive))
+    reading.taken.append(TakenValue(view.axis, name, value, entry, archive))
     if sought.note:
         text = f"{view.axis}: {name.number}: {sought.note}"
         reading.notes.append(Finding("value-chosen", "note", text, view.axis))
@@ -481,15 +492,15 @@ def _read(reading: Reading, view: View, name: Name, checked: Collection[str]) ->
         reading.doubts.append(Finding("value-differs-between-sets", "doubt", text, view.axis))
 
 
-def _case(reading: Reading, view: View, name: Name) -> None:
+def _read_case(reading: Reading, view: View, name: Name) -> None:
     """A parameter that the files do not have may have a value by what switches it off."""
     if name.acts:
-        said = judged(name.acts, view.value, view.lack)
+        said = judge_conditions(name.acts, view.value, view.explain_lack)
         if said.state == "case":
             _of_case(reading, view, name, said)
 
 
-def _of_case(reading: Reading, view: View, name: Name, said: Judged) -> None:
+def _of_case(reading: Reading, view: View, name: Name, said: ConditionVerdict) -> None:
     value: Value = {"true": True, "false": False}.get(said.value, said.value)
     if isinstance(value, str) and value != "off":
         value = float(value)
@@ -498,7 +509,7 @@ def _of_case(reading: Reading, view: View, name: Name, said: Judged) -> None:
     archive, entry = view.sought(key, element=int(element or 0)).chosen or (None, None)
     if {condition, key} & {*view.assume}:
         archive, entry = None, None
-    reading.taken.append(Taken(view.axis, name, value, entry, archive, said.reason))
+    reading.taken.append(TakenValue(view.axis, name, value, entry, archive, said.reason))
 
 
 def _unit(view: View, name: Name, entry: Entry, checked: Collection[str]) -> str:
@@ -515,11 +526,11 @@ def _unit(view: View, name: Name, entry: Entry, checked: Collection[str]) -> str
             return "the machine's basic system is inch (MD10240)"
         mask = view.value("MD10220")
         if mask is not None and mask != USUAL_MASK and name.unit not in ("", "1"):
-            return f"MD10220 is {shown(mask)}: machine data are in units of the machine's maker"
+            return f"MD10220 is {value_text(mask)}: machine data are in units of the machine's maker"
         gain = view.value("MD10230[9]")
         if name.unit == "1000/min" and isinstance(gain, float) and not math.isclose(gain, USUAL_GAIN, rel_tol=1e-3):
-            return f"MD10230[9] is {shown(gain)}: the gain is in another unit than 1000/min"
-    if not name.confirmed and name.number not in checked and ALL not in checked:
+            return f"MD10230[9] is {value_text(gain)}: the gain is in another unit than 1000/min"
+    if not name.confirmed and name.number not in checked and ALL_PARAMETERS not in checked:
         return (
             f"no public source that was opened states its unit; {name.unit or 'its meaning'} is supposed. Check it at "
             f"the control: --checked {name.number}"
@@ -532,17 +543,17 @@ def _plain_unit(text: str) -> str:
     return "".join(c for c in plain if c not in " .·*[]()").replace("percent", "%")
 
 
-def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple[Value | None, str]:
+def _convert_entry(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple[Value | None, str]:
     if raw is None or isinstance(raw, str):
         return None, "no number"
     if name.codes:
         value = next((ours for code, ours in name.codes if float(raw) == code), None)
-        return value, "" if value is not None else f"{shown(float(raw))} is none of " + ", ".join(
+        return value, "" if value is not None else f"{value_text(float(raw))} is none of " + ", ".join(
             f"{code} ({str(ours).lower()})" for code, ours in name.codes
         )
     if not name.si and name.unit != "1":
         if raw not in (0.0, 1.0):
-            return None, f"{shown(float(raw))} is neither 0 nor 1"
+            return None, f"{value_text(float(raw))} is neither 0 nor 1"
         return bool(raw), ""
     if not math.isfinite(float(raw)):
         return None, "no finite number"
@@ -550,11 +561,11 @@ def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple
     for k, other in enumerate(name.times):
         ratio = view.value(other)
         if ratio is None:
-            why = view.lack(other)
-            why = f"{why.removesuffix(')')} {other}=1)" if why == absent(other) else why
+            why = view.explain_lack(other)
+            why = f"{why.removesuffix(')')} {other}=1)" if why == explain_absence(other) else why
             return None, f"it is multiplied by {' / '.join(name.times)}, and {why}"
         if isinstance(ratio, str) or ratio == 0:
-            return None, f"{other} is {shown(ratio)}"
+            return None, f"{other} is {value_text(ratio)}"
         number = number * float(ratio) if k == 0 else number / float(ratio)
     if name.parameter.startswith("travel") and abs(number) >= MAX_SOFTWARE_LIMIT:
         return None, "so far out that it is no limit"
@@ -569,11 +580,11 @@ def _of_machine(reading: Reading) -> None:
     """Values of the whole machine, which every axis has found: kept once, where they are the same."""
     machine = [entry for entry in reading.taken if entry.parameter.startswith("cycles.")]
     reading.taken = [entry for entry in reading.taken if entry not in machine]
-    refused: dict[str, Refused] = {}
+    refused: dict[str, RefusedValue] = {}
     for item in reading.refused:
         if item.name.parameter.startswith("cycles."):
             refused.setdefault(
-                item.name.number, Refused("", item.name, item.text, item.reason, item.where, item.weight)
+                item.name.number, RefusedValue("", item.name, item.text, item.reason, item.where, item.weight)
             )
     reading.refused = [entry for entry in reading.refused if not entry.name.parameter.startswith("cycles.")]
     reading.refused += refused.values()
@@ -582,7 +593,9 @@ def _of_machine(reading: Reading) -> None:
         if len({taken.value for taken in own}) > 1:
             values = ", ".join(f"{taken.axis} {taken.entry.text if taken.entry else ''}" for taken in own)
             reading.refused.append(
-                Refused("", own[0].name, "", f"it is one for all axes of a machine file; here {values}", own[0].where)
+                RefusedValue(
+                    "", own[0].name, "", f"it is one for all axes of a machine file; here {values}", own[0].where
+                )
             )
         else:
-            reading.taken.append(Taken("", own[0].name, own[0].value, own[0].entry, own[0].archive))
+            reading.taken.append(TakenValue("", own[0].name, own[0].value, own[0].entry, own[0].archive))

@@ -1,7 +1,7 @@
 """Values of ours written back into the files of a control: the bytes of changed values differ, and no others.
 
 What cannot be written is listed with the value to type. After the change the file is read again: every other value has
-to be what it was, and every changed one what it should be. May use errors. Start reading at changed().
+to be what it was, and every changed one what it should be. May use errors. Start reading at change_files().
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from decimal import Decimal
 from pathlib import PurePath
 
 from feedsim.files.control.archive import Archive, Entry, scalar
-from feedsim.files.control.formats import opened
-from feedsim.files.control.names import Name, names_of, shown, tied
-from feedsim.files.control.reading import Reading, Taken, Value, View, read
+from feedsim.files.control.formats import parse_file
+from feedsim.files.control.names import Name, names_of, tied_parameters, value_text
+from feedsim.files.control.reading import Reading, TakenValue, Value, View, read_values
 from feedsim.foundation.errors import Finding, InputError
 
 # Values this close are the same [relative]: a text of ten digits and its value in SI.
@@ -43,13 +43,13 @@ class Change:
 
 
 @dataclass
-class Written:
+class WrittenFiles:
     """Files with changed values. contents: name -> bytes; none of a file without a change. changes: all differences.
     same: values that agree. notes: what was not touched although it may matter."""
 
     contents: dict[str, bytes] = field(default_factory=dict)
     changes: list[Change] = field(default_factory=list)
-    same: list[Taken] = field(default_factory=list)
+    same: list[TakenValue] = field(default_factory=list)
     notes: list[Finding] = field(default_factory=list)
     reading: Reading | None = None
 
@@ -61,7 +61,7 @@ class _Edit:
     text: str
 
 
-def changed(
+def change_files(
     archives: Sequence[Archive],
     axes: Mapping[str, str],
     values: Mapping[str, Mapping[str, Value]],
@@ -69,10 +69,11 @@ def changed(
     places: Mapping[str, Sequence[str]] = {},
     assume: Mapping[str, str] = {},
     checked: Collection[str] = (),
-) -> Written:
-    """Lay values into files; values: axis -> our parameter -> SI value. Other arguments and errors: as of read()."""
-    reading = read(archives, axes, places=places, assume=assume, checked=checked)
-    written = Written(reading=reading, notes=list(reading.notes))
+) -> WrittenFiles:
+    """Lay values into files; values: axis -> our parameter -> SI value. Other arguments and errors: as of
+    read_values()."""
+    reading = read_values(archives, axes, places=places, assume=assume, checked=checked)
+    written = WrittenFiles(reading=reading, notes=list(reading.notes))
     edits: list[_Edit] = []
     for entry in reading.taken:
         if entry.axis and not entry.parameter.startswith("cycles."):
@@ -86,7 +87,7 @@ def changed(
         new, _ = _text(view, gone.name, None, ours)
         if gone.weight == "doubt" and not _equal(gone.text, new):
             written.changes.append(Change(gone.axis, gone.name, gone.text, new, False, gone.reason, gone.where))
-    _absent(written, archives, axes, values, reading)
+    _note_absent_values(written, archives, axes, values, reading)
     _bits(written, archives, axes, values, places, assume)
     _apply(written, edits, archives)
     if written.contents:
@@ -94,7 +95,9 @@ def changed(
     return written
 
 
-def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, values: Mapping[str, Value]) -> None:
+def _compare(
+    written: WrittenFiles, edits: list[_Edit], view: View, taken: TakenValue, values: Mapping[str, Value]
+) -> None:
     ours = values.get(taken.parameter)
     group = taken.parameter.rpartition(".")[0]
     if ours is None:
@@ -106,7 +109,7 @@ def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, val
         return
     if isinstance(ours, str):
         ours = SYNONYMS.get(ours, ours)
-    if _same(taken.value, ours):
+    if _are_equal_values(taken.value, ours):
         written.same.append(taken)
         return
     if taken.entry is None or taken.condition:
@@ -133,7 +136,7 @@ def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, val
         return
     edits += [_Edit(archive, entry, _text(view, taken.name, entry, ours)[0]) for archive, entry in own]
     also = []
-    for other, right, sign in tied(taken.name.acts):
+    for other, right, sign in tied_parameters(taken.name.acts):
         if right != taken.name.key:
             continue
         key, _, element = other.removesuffix("]").partition("[")
@@ -148,11 +151,11 @@ def _compare(written: Written, edits: list[_Edit], view: View, taken: Taken, val
     written.changes.append(Change(taken.axis, taken.name, _old(taken), new, True, "; ".join(also), taken.where))
 
 
-def _condition(taken: Taken) -> str:
+def _condition(taken: TakenValue) -> str:
     return f"{taken.entry.key} is {taken.entry.text}" if taken.entry is not None else "what switches it on is off"
 
 
-def _old(taken: Taken) -> str:
+def _old(taken: TakenValue) -> str:
     return taken.entry.text if taken.entry is not None else ""
 
 
@@ -162,10 +165,10 @@ def _equal(old: str, new: str) -> bool:
         a, b = scalar(old), scalar(new)
     except ValueError:
         return False
-    return _same(a, b)
+    return _are_equal_values(a, b)
 
 
-def _same(a: Value, b: Value) -> bool:
+def _are_equal_values(a: Value, b: Value) -> bool:
     if isinstance(a, str) or isinstance(b, str) or isinstance(a, bool) or isinstance(b, bool):
         return a == b
     return math.isclose(a, b, rel_tol=TEXT_TOLERANCE, abs_tol=1e-300)
@@ -178,7 +181,7 @@ def _text(view: View, name: Name, entry: Entry | None, ours: Value) -> tuple[str
         code = next((code for code, value in name.codes if value == ours), None)
         return (str(code), "") if code is not None else (str(ours), f"{ours} is switched by another parameter")
     if isinstance(ours, bool) or (not name.si and name.unit != "1"):
-        return _switched(name, old, bool(ours))
+        return _switch_text(name, old, bool(ours))
     if isinstance(ours, str):
         return ours, "no number"
     raw = float(ours) / name.factor / (entry.scale if entry is not None else 1.0)
@@ -194,7 +197,7 @@ def _text(view: View, name: Name, entry: Entry | None, ours: Value) -> tuple[str
     return text, ""
 
 
-def _switched(name: Name, old: str, on: bool) -> tuple[str, str]:
+def _switch_text(name: Name, old: str, on: bool) -> tuple[str, str]:
     bit = name.number.partition(".")[2]
     if not bit:
         return (("TRUE" if on else "FALSE") if old.strip().upper() in ("TRUE", "FALSE") else str(int(on))), ""
@@ -232,10 +235,13 @@ def number(value: float) -> str:
     return plain.rstrip("0").rstrip(".") if "." in plain else plain
 
 
-def _absent(
-    written: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
+def _note_absent_values(
+    written: WrittenFiles,
+    archives: Sequence[Archive],
+    axes: Mapping[str, str],
+    values: Mapping[str, Mapping[str, Value]],
     reading: Reading,
-) -> None:  # fmt: skip
+) -> None:
     """Values of the machine file whose parameter the files do not have."""
     named = {(entry.axis, entry.name.parameter) for entry in reading.taken}
     named |= {(entry.axis, entry.name.parameter) for entry in reading.refused}
@@ -251,16 +257,20 @@ def _absent(
             view = View(archives, axis, axes[axis], (), axes, {})
             new, _ = _text(view, name, None, ours)
             reason = "the files have no such parameter"
-            for other, right, sign in tied(name.acts):
+            for other, right, sign in tied_parameters(name.acts):
                 if right == name.key:
                     reason += f"; {other} is to be {'-' if sign < 0 else ''}{new} as well"
             written.changes.append(Change(axis, name, "", new, False, reason))
 
 
 def _bits(
-    result: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
-    places: Mapping[str, Sequence[str]], assume: Mapping[str, str],
-) -> None:  # fmt: skip
+    result: WrittenFiles,
+    archives: Sequence[Archive],
+    axes: Mapping[str, str],
+    values: Mapping[str, Mapping[str, Value]],
+    places: Mapping[str, Sequence[str]],
+    assume: Mapping[str, str],
+) -> None:
     """Bits of the control that switch a filter on, whose values are to be typed: they are to be set with them."""
     seen: set[tuple[str, str]] = set()
     changes: list[Change] = []
@@ -278,14 +288,14 @@ def _bits(
                 called = f"switches {group.rpartition('.')[2].replace('_', ' ')} on"
                 name = replace(change.name, parameter=f"{group}.type", number=bit[1], name=called, unit="", si="",
                                key="", acts="", codes=())  # fmt: skip
-                old = "" if before is None else shown(before)
+                old = "" if before is None else value_text(before)
                 reason = "set it with the values of the filter"
                 changes.append(Change(change.axis, name, old, "1", False, reason, where))
         changes.append(change)
     result.changes = changes
 
 
-def _apply(written: Written, edits: Sequence[_Edit], archives: Sequence[Archive]) -> None:
+def _apply(written: WrittenFiles, edits: Sequence[_Edit], archives: Sequence[Archive]) -> None:
     for archive in archives:
         own: dict[tuple[int, int], str] = {}
         for edit in edits:
@@ -313,13 +323,13 @@ def _read_again(archives: Sequence[Archive], contents: Mapping[str, bytes]) -> l
             def include(word: str, included: Mapping[str, Archive] = archive.included) -> tuple[PurePath, bytes]:
                 return included[word].path, contents.get(included[word].name, included[word].content)
 
-            made = opened(archive.name, contents.get(archive.name, archive.content), archive.path, include)
+            made = parse_file(archive.name, contents.get(archive.name, archive.content), archive.path, include)
             result += [made, *{id(file): file for file in made.included.values()}.values()]
     return result
 
 
 def _check(
-    result: Written, archives: Sequence[Archive], axes: Mapping[str, str],
+    result: WrittenFiles, archives: Sequence[Archive], axes: Mapping[str, str],
     values: Mapping[str, Mapping[str, Value]], edits: Sequence[_Edit], how: Mapping[str, object],
 ) -> None:  # fmt: skip
     """Read what was made: every value is as it was, but the changed ones, which are as they should be."""
@@ -329,13 +339,13 @@ def _check(
         wanted = [changed_ones.get(id(entry), entry.text) for entry in archive.entries]
         if [entry.text for entry in made.entries] != wanted or made.odd_count != archive.odd_count:
             raise InputError(f"{archive.name}: writing the values would change others; nothing was written")
-    now = {(entry.axis, entry.parameter): entry.value for entry in read(again, axes, **how).taken}  # type: ignore[arg-type]
+    now = {(entry.axis, entry.parameter): entry.value for entry in read_values(again, axes, **how).taken}  # type: ignore[arg-type]
     for change in result.changes:
         if change.written:
             ours = values[change.axis][change.name.parameter]
             ours = SYNONYMS.get(ours, ours) if isinstance(ours, str) else ours
             value = now.get((change.axis, change.name.parameter))
-            if value is not None and not _same(value, ours):  # None: another change has switched it off
+            if value is not None and not _are_equal_values(value, ours):  # None: another change has switched it off
                 raise InputError(
                     f"{change.axis} {change.name.number}: {change.new} would be read as {value}, not as {ours}; "
                     "nothing was written"

@@ -9,10 +9,26 @@ from feedsim.files.trace.capture import Mark
 from feedsim.files.trace.files import read_csv, read_signals, write_csv, written_whole
 from feedsim.files.trace.recording import Recording, convert, read_recording
 from feedsim.files.trace.series import Series, as_series, read_series
-from feedsim.files.trace.trace import Array, Table, Trace, least_and_largest, matches, matching, release, stretches
+from feedsim.files.trace.trace import Array, Table, Trace, least_and_largest, match_names, matches, release, stretches
 
 __all__ = [
-    "Array", "Mark", "Recording", "Series", "Table", "Trace", "as_series", "convert", "least_and_largest",
-    "matches", "matching", "read_csv", "read_recording", "read_series", "read_signals", "release", "stretches",
-    "write_csv", "written_whole",
+    "Array",
+    "Mark",
+    "Recording",
+    "Series",
+    "Table",
+    "Trace",
+    "as_series",
+    "convert",
+    "least_and_largest",
+    "match_names",
+    "matches",
+    "read_csv",
+    "read_recording",
+    "read_series",
+    "read_signals",
+    "release",
+    "stretches",
+    "write_csv",
+    "written_whole",
 ]  # fmt: skip

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from feedsim.files import source
 from feedsim.files.source import check_depth
-from feedsim.files.trace.cells import twice
-from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, recorded
+from feedsim.files.trace.cells import duplicate_names
+from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, recordable_values
 from feedsim.foundation.errors import InputError
 
 # --- What a capture shows of its axes by its own figures: pitch, direction, units, and why where it shows none --------
@@ -40,13 +40,15 @@ USUAL_PITCHES = (1, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 12.5, 15, 16, 20, 25, 30, 32,
 LEAST_PITCH = 0.9  # mm: below it the positions are in another unit, where the figure is a usual pitch in it
 OTHER_LENGTHS = {"in": 25.4, "m": 1000.0}  # unit -> mm
 DEGREES_PER_TURN = 360.0  # deg: what a rotary axis travels with a turn
-FITS = 0.1  # relative residual up to which POWER is TORQUE times a speed
+FIT_RESIDUAL = 0.1  # relative residual up to which POWER is TORQUE times a speed
 PITCH_TOLERANCE = 0.01  # relative; a pitch is known to that at best, as the channels are sampled at different instants
 NEAR_WITHOUT = 0.03  # the same where rows had to be left out, of which some beside are touched, too
 # N.m of TORQUE for an A of CURRENT that motors of feed axes with a screw have.
 TORQUE_CONSTANTS = (0.05, 5.0)
-TOGETHER = 0.9  # of a correlation, above which TORQUE and CURRENT are the same thing in two units
-HEAP = 0.005  # share of the rows that are one value to the last digit, at an end of the range: it is cut off there
+SAME_SIGNAL_CORRELATION = 0.9  # of a correlation, above which TORQUE and CURRENT are the same thing in two units
+CUT_OFF_SHARE = (
+    0.005  # share of the rows that are one value to the last digit, at an end of the range: it is cut off there
+)
 FIT_ROWS = 20_000  # rows that a fit rests on
 MAX_AXES_SEARCHED = 32  # axes among which a signal of another one is looked for
 OUTLIER_SHARE = 0.02  # share of the rows that may stand out
@@ -89,7 +91,7 @@ class _Fit:
 
     @property
     def fits(self) -> bool:
-        return self.residual < FITS and 1e-9 < abs(self.pitch) < 1e9  # beyond that it is no pitch in mm
+        return self.residual < FIT_RESIDUAL and 1e-9 < abs(self.pitch) < 1e9  # beyond that it is no pitch in mm
 
 
 Rows = NDArray[np.bool_]
@@ -113,14 +115,17 @@ def _axis(number: str, names: Mapping[str, str], columns: Mapping[str, Array]) -
         if not np.ptp(values):
             what = "it does not move" if name == "ENC_POS" else f"{name} is {values[0]:.6g} throughout"
             return replace(blank, why=what)
-    fit, doubts = _fitted(columns["time"], torque, power, position)
+    fit, doubts = _fit_sound_rows(columns["time"], torque, power, position)
     if fit is None:
-        return replace(blank, why=_swapped(number, names, columns) or "POWER is not TORQUE times the motor's speed",
-                       doubts=doubts)  # fmt: skip
+        return replace(
+            blank,
+            why=_find_swapped_signal(number, names, columns) or "POWER is not TORQUE times the motor's speed",
+            doubts=doubts,
+        )
     return _with_units(replace(blank, doubts=doubts), fit, columns)
 
 
-def _fitted(time: Array, torque: Array, power: Array, position: Array) -> tuple[_Fit | None, tuple[str, ...]]:
+def _fit_sound_rows(time: Array, torque: Array, power: Array, position: Array) -> tuple[_Fit | None, tuple[str, ...]]:
     """The fit over rows that are sound, None where there is none; and which rows are not."""
     whole = np.ones(len(time), dtype=bool)
     # Rows beside a spike of the position have a wrong speed.
@@ -130,10 +135,10 @@ def _fitted(time: Array, torque: Array, power: Array, position: Array) -> tuple[
     for name, rows in torn.items():
         if rows.any():
             first = time[np.argmax(rows)]
-            faults.append((f"{name} has spikes in {np.sum(rows)} rows, the first at {first:.6g} s", _widened(rows)))
+            faults.append((f"{name} has spikes in {np.sum(rows)} rows, the first at {first:.6g} s", _widen_rows(rows)))
     if not torn["ENC_POS"].any() and (jumps := _jumps(position)).any():
         first = time[np.argmax(jumps)]
-        faults.append((f"ENC_POS jumps in {np.sum(jumps)} rows, the first at {first:.6g} s", _widened(jumps)))
+        faults.append((f"ENC_POS jumps in {np.sum(jumps)} rows, the first at {first:.6g} s", _widen_rows(jumps)))
     for name, (rows, text) in cut.items():
         if rows.any():
             faults.append((f"{name} is cut off at {text}", rows))
@@ -145,16 +150,16 @@ def _fitted(time: Array, torque: Array, power: Array, position: Array) -> tuple[
         best = min(best, _fit(time, torque, power, position, sound), key=lambda fit: fit.residual)
     if best.fits:
         # A limit of the drive that power agrees with is none of the record.
-        kept = [text for text, rows in faults if not _agrees(time, torque, power, position, rows, best)]
+        kept = [text for text, rows in faults if not _is_consistent(time, torque, power, position, rows, best)]
         return best, tuple(kept)
     return None, tuple(text for text, _ in faults)
 
 
-def _agrees(time: Array, torque: Array, power: Array, position: Array, rows: Rows, best: _Fit) -> bool:
+def _is_consistent(time: Array, torque: Array, power: Array, position: Array, rows: Rows, best: _Fit) -> bool:
     """Whether POWER, TORQUE and speed fit in these rows as well as elsewhere."""
     product = 2 * np.pi / best.pitch * torque * np.gradient(position, time)
     off, size = np.abs(power - product)[rows], float(np.sqrt(np.mean(power**2)))
-    return bool(np.sqrt(np.mean(off**2)) < 2 * FITS * size)
+    return bool(np.sqrt(np.mean(off**2)) < 2 * FIT_RESIDUAL * size)
 
 
 def _spikes(values: Array) -> Rows:
@@ -175,7 +180,7 @@ def _jumps(position: Array) -> Rows:
     return values
 
 
-def _widened(rows: Rows) -> Rows:
+def _widen_rows(rows: Rows) -> Rows:
     return np.convolve(rows.astype(float), np.ones(9), "same") > 0.5
 
 
@@ -184,7 +189,7 @@ def _cut_off(values: Array) -> tuple[Rows, str]:
     rows, reported = np.zeros(len(values), dtype=bool), []
     for end in (float(values.max()), float(values.min())):
         same = values == end
-        if end and same.mean() > HEAP and same.sum() > 5:
+        if end and same.mean() > CUT_OFF_SHARE and same.sum() > 5:
             rows |= same
             reported.append(f"{end:.6g} in {100 * same.mean():.2g} % of the rows")
     return rows, " and ".join(reported)
@@ -213,13 +218,13 @@ def _fit(time: Array, torque: Array, power: Array, position: Array, rows: Rows) 
     return best
 
 
-def _swapped(number: str, names: Mapping[str, str], columns: Mapping[str, Array]) -> str:
+def _find_swapped_signal(number: str, names: Mapping[str, str], columns: Mapping[str, Array]) -> str:
     """The signal that fits if it is taken of another axis, in words; "" where there is none."""
     own = {signal: columns[f"{signal}|{number}"] for signal in ("TORQUE", "POWER", "ENC_POS")}
     if len(names) > MAX_AXES_SEARCHED:
         return ""
     whole = np.ones(len(columns["time"]), dtype=bool)
-    best: tuple[float, str] = (FITS, "")
+    best: tuple[float, str] = (FIT_RESIDUAL, "")
     for other, name in names.items():
         for signal in own:
             values = columns.get(f"{signal}|{other}")
@@ -253,17 +258,17 @@ def _with_units(axis: CaptureAxis, fit: _Fit, columns: Mapping[str, Array]) -> C
             return replace(capture_axis, pitch=None, torque="", why=why)
     if size < LEAST_PITCH:
         for unit, factor in OTHER_LENGTHS.items():
-            if (usual := _usual(size * factor)) is not None:
+            if (usual := _usual_pitch(size * factor)) is not None:
                 doubt = (
                     f"in mm its pitch would be {size:.4g} mm, which no screw has; positions are taken as {unit}, which "
                     f"makes it {usual:g} mm"
                 )
                 return replace(capture_axis, pitch=usual, length=unit, doubts=(*axis.doubts, doubt))
-    pitch = DEGREES_PER_TURN if rotary else _usual(size, NEAR_WITHOUT if axis.doubts else PITCH_TOLERANCE)
+    pitch = DEGREES_PER_TURN if rotary else _usual_pitch(size, NEAR_WITHOUT if axis.doubts else PITCH_TOLERANCE)
     return replace(capture_axis, pitch=float(pitch) if pitch is not None else size)
 
 
-def _usual(size: float, near: float = PITCH_TOLERANCE) -> float | None:
+def _usual_pitch(size: float, near: float = PITCH_TOLERANCE) -> float | None:
     """The usual pitch that an estimate [mm] holds, `near` at the most (relative); None where it holds none."""
     usual = min(USUAL_PITCHES, key=lambda value: abs(np.log(value / size)))
     return float(usual) if abs(usual - size) < near * usual else None
@@ -275,7 +280,7 @@ def _torque_constant(number: str, columns: Mapping[str, Array]) -> float | None:
     if current is None or not np.ptp(current):
         return None
     alike = float(np.corrcoef(torque, current)[0, 1])
-    return abs(float(torque @ current) / float(current @ current)) if abs(alike) > TOGETHER else None
+    return abs(float(torque @ current) / float(current @ current)) if abs(alike) > SAME_SIGNAL_CORRELATION else None
 
 
 # --- Captures of a SINUMERIK control: the JSON files of SINUMERIK Edge ("Capture4Analysis") ---------------------------
@@ -320,7 +325,7 @@ class JsonStream:
         where = f"at character {self._before + self._at}"
         return InputError(f"{self._path} is no JSON file that can be read: {expected} is expected {where}")
 
-    def _take(self, allowed: str) -> str:
+    def _take_character(self, allowed: str) -> str:
         text = self.peek()
         if not text or text not in allowed:
             raise self.wrong(" or ".join(allowed))
@@ -355,7 +360,7 @@ class JsonStream:
 
     def members(self) -> Iterator[str]:
         """Names of an object; behind each one its value must be taken."""
-        self._take("{")
+        self._take_character("{")
         if self.peek() == "}":
             self._at += 1
             return
@@ -363,14 +368,14 @@ class JsonStream:
             if self.peek() != '"':
                 raise self.wrong("a name")
             name = self.value()
-            self._take(":")
+            self._take_character(":")
             yield name
-            if self._take(",}") == "}":
+            if self._take_character(",}") == "}":
                 return
 
     def items(self) -> Iterator[int]:
         """Numbers from 0 of the items of an array; behind each one it must be taken."""
-        self._take("[")
+        self._take_character("[")
         if self.peek() == "]":
             self._at += 1
             return
@@ -378,7 +383,7 @@ class JsonStream:
         while True:
             yield number
             number += 1
-            if self._take(",]") == "]":
+            if self._take_character(",]") == "]":
                 return
 
     def end(self) -> None:
@@ -396,7 +401,7 @@ MAX_NAME_LENGTH, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a m
 MOST_NUMBERS, MOST_BLOCKS = 1 << 27, 1_000_000
 LENGTHS = {"DES_POS": "mm", "ENC_POS": "mm", "ENC1_POS": "mm", "ENC2_POS": "mm", "CONT_DEV": "mm",
            "VEL_FFW": "mm/s", "CMD_SPEED": "mm/s"}  # fmt: skip
-OTHERS = {"TORQUE": "N.m", "TORQUE_FFW": "N.m", "CURRENT": "A", "POWER": "W", "LOAD": "%"}
+OTHER_SIGNALS = {"TORQUE": "N.m", "TORQUE_FFW": "N.m", "CURRENT": "A", "POWER": "W", "LOAD": "%"}
 # Of programs that know no UTF-8; characters outside ASCII are in names alone.
 WINDOWS = "cp1252"
 
@@ -445,12 +450,12 @@ def read_capture(path: Path) -> Capture:
     names = content.names
     values = np.frombuffer(content.cells, dtype=np.float64).reshape(-1, len(names))
     for k, name in enumerate(names):
-        column, wrong = recorded(values[:, k])
+        column, wrong = recordable_values(values[:, k])
         if wrong.any():
             row = int(np.argmax(wrong))
             cell = values[row, k]
             allowed = f"; allowed: up to {MAX_MAGNITUDE:g}" if np.isfinite(cell) else ", no finite number"
-            raise InputError(f"{path}, row {row + 1}: {name} is {_shown(float(cell))}{allowed}")
+            raise InputError(f"{path}, row {row + 1}: {name} is {_cell_text(float(cell))}{allowed}")
         values[:, k] = column
     counter = values[:, names.index(COUNTER)]
     if (backwards := np.flatnonzero(np.diff(counter) <= 0)).size:
@@ -470,22 +475,22 @@ def read_capture(path: Path) -> Capture:
 
 def _content(path: Path) -> _Content:
     """All that is read of a file, in UTF-8, or, where it is none, in UTF-16 or Windows-1252."""
-    with source.opened(path) as file:
+    with source.open_file(path) as file:
         wide = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
     for encoding in ("utf-16",) if wide else ("utf-8-sig", WINDOWS):
         try:
-            with source.opened(path) as file, io.TextIOWrapper(file, encoding, newline="") as text:
-                return _walked(JsonStream(text, path), path)
+            with source.open_file(path) as file, io.TextIOWrapper(file, encoding, newline="") as text:
+                return _read_content(JsonStream(text, path), path)
         except UnicodeDecodeError as error:
             problem = error
     raise InputError(f"{path} is no JSON file that can be read: {problem}")
 
 
-def _walked(stream: JsonStream, path: Path) -> _Content:
+def _read_content(stream: JsonStream, path: Path) -> _Content:
     content = _Content(path)
     if stream.peek() != "{":
         stream.value()
-        raise _missing(path, "Header")
+        raise _missing_key_error(path, "Header")
     for key in stream.members():
         if key == "Header":
             header = stream.value()
@@ -500,9 +505,9 @@ def _walked(stream: JsonStream, path: Path) -> _Content:
             stream.value()
     stream.end()
     if content.header is None:
-        raise _missing(path, "Header")
+        raise _missing_key_error(path, "Header")
     if not content.payload:
-        raise _missing(path, "Payload")
+        raise _missing_key_error(path, "Payload")
     if content.rows < 2:
         raise InputError(f"{path}: {content.rows} rows of HFData; at least 2 are needed")
     if content.width != len(content.names):
@@ -546,7 +551,7 @@ def _row(content: _Content, row: object) -> None:
                 fault = ", no finite number"
                 if isinstance(cell, int) and not isinstance(cell, bool):
                     fault = f"; allowed: up to {MAX_MAGNITUDE:g}"
-                raise InputError(f"{content.path}, row {content.rows}: {name} is {_shown(cell)}{fault}") from None
+                raise InputError(f"{content.path}, row {content.rows}: {name} is {_cell_text(cell)}{fault}") from None
 
 
 def _event(content: _Content, event: Mapping[str, Any]) -> None:
@@ -564,7 +569,7 @@ def _of_length(content: _Content, row: int, there: str) -> InputError:
     return InputError(f"{content.path}, row {row + 1}: {there}; {wanted}")
 
 
-def _missing(path: Path, key: str) -> InputError:
+def _missing_key_error(path: Path, key: str) -> InputError:
     return InputError(
         f"{path} is no capture of a control: {key} is missing; expected is a SINUMERIK capture with Header "
         "(SignalListHFData, CycleTimeMs) and Payload (HFData)"
@@ -575,7 +580,7 @@ def _cycle(path: Path, header: Mapping[str, Any]) -> float:
     cycle = header.get("CycleTimeMs")
     if not isinstance(cycle, (int, float)) or isinstance(cycle, bool) or not LEAST_CYCLE <= cycle <= 1000:
         allowed = f"a number of milliseconds, {LEAST_CYCLE:g} to 1000, is expected"
-        raise InputError(f"{path}: Header.CycleTimeMs is {_shown(cycle)}; {allowed}")
+        raise InputError(f"{path}: Header.CycleTimeMs is {_cell_text(cycle)}; {allowed}")
     return float(cycle)
 
 
@@ -591,12 +596,13 @@ def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
     texts = [*names, *(str(signal.get("Axis", "")) for signal in _signals(header))]
     if long := [text for text in texts if len(text) > MAX_NAME_LENGTH]:
         raise InputError(
-            f"{path}: Header.SignalListHFData has a name of {len(long[0])} characters, {_shown(long[0])}; allowed: up "
+            f"{path}: Header.SignalListHFData has a name of {len(long[0])} characters, {_cell_text(long[0])}; "
+            f"allowed: up "
             f"to {MAX_NAME_LENGTH}"
         )
     if COUNTER not in names:
         raise InputError(f"{path}: Header.SignalListHFData has no {COUNTER}, the counter that is the clock")
-    if doubled := twice(names):
+    if doubled := duplicate_names(names):
         raise InputError(f"{path}: Header.SignalListHFData has {doubled[0]!r} twice")
     return names
 
@@ -611,7 +617,7 @@ def _axes(header: Mapping[str, Any]) -> dict[str, str]:
     return dict(sorted(result.items(), key=lambda item: (len(item[0]), item[0])))
 
 
-def _shown(cell: object) -> str:
+def _cell_text(cell: object) -> str:
     """A cell for a message, which a number of a hundred digits would fill."""
     text = repr(cell)
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
@@ -622,7 +628,7 @@ def _unit(name: str, columns: Mapping[str, Array], axes: Mapping[str, CaptureAxi
     signal, _, number = name.partition("|")
     unit, axis = LENGTHS.get(signal), axes.get(number)
     if unit is None:
-        unit = OTHERS.get(signal, "")
+        unit = OTHER_SIGNALS.get(signal, "")
         return axis.torque if unit == "N.m" and axis is not None else unit
     if unit == "mm/s" and not _per_second(columns, signal, number):
         return ""

@@ -23,10 +23,10 @@ from typing import Literal
 import numpy as np
 
 from feedsim.files.source import content
-from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recorded, suggest
+from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recordable_values, suggest_name
 from feedsim.foundation import units
-from feedsim.foundation.errors import Finding, InputError, few
-from feedsim.foundation.units import NUMBER, known_unit, spelled
+from feedsim.foundation.errors import Finding, InputError, shorten_list
+from feedsim.foundation.units import NUMBER, known_unit, spell_unit
 
 # --- Time stamps -> seconds since the first one: dates as loggers and gateways write them, times of day,
 #     milliseconds
@@ -101,7 +101,7 @@ def stamps(cells: Sequence[str], lines: Sequence[int], where: str, name: str) ->
     clocks -= np.array([offsets[zone] for zone in zones])
     day = ""
     if days[0]:
-        numbers = _numbered(days, where, lines[0], name)
+        numbers = _number_dates(days, where, lines[0], name)
         whole = DAY * np.array([numbers[day] - numbers[days[0]] for day in days], dtype=np.float64) + clocks
         day = _first_day(days, numbers)
     else:  # half a day back is midnight
@@ -139,7 +139,7 @@ def _offset(zone: str | None) -> int:
     return (1 if zone[0] == "+" else -1) * (3600 * int(digits[:2]) + 60 * int(digits[2:]))
 
 
-def _numbered(days: Sequence[str], where: str, line: int, name: str) -> Mapping[str, int]:
+def _number_dates(days: Sequence[str], where: str, line: int, name: str) -> Mapping[str, int]:
     """Date -> its number. Of one date any will do; of several the order of their parts must show."""
     changes = [row for row in range(1, len(days)) if days[row] != days[row - 1]]
     if not changes:
@@ -250,7 +250,7 @@ class Layout:
 
 def layout_of(lines: io.StringIO, where: str) -> Layout:
     """Layout of a text, which is then read up to its first row. InputError: one column. csv.Error: a cell too long."""
-    ahead, separator = _ahead(lines)
+    ahead, separator = _find_header(lines)
     lines.seek(0)
     remarks = [lines.readline().rstrip("\r\n") for _ in range(ahead)]
     first, count = lines.readline(), ahead + 1
@@ -270,7 +270,7 @@ def layout_of(lines: io.StringIO, where: str) -> Layout:
     return Layout(separator, header, units, header_line, count, tuple(remarks))
 
 
-def _ahead(lines: io.StringIO) -> tuple[int, str]:
+def _find_header(lines: io.StringIO) -> tuple[int, str]:
     """How many lines stand ahead of the header, and what separates its columns; 0 and "" where no line is one."""
     above, line, below = "", lines.readline(), lines.readline()
     ahead = 0
@@ -332,7 +332,7 @@ def named_columns(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     return [[row[i] for i in named] if len(row) == len(rows[0]) else list(row) for row in rows]
 
 
-def twice(names: Iterable[str]) -> list[str]:
+def duplicate_names(names: Iterable[str]) -> list[str]:
     """Names that are there more than once, each once."""
     return [name for name, count in Counter(names).items() if count > 1]
 
@@ -443,7 +443,7 @@ class Table:
         for text in (name, *titles([name])):
             if text in self._indices:
                 return self._indices[text]
-        raise InputError(f"{self.head}: no column {name!r}{suggest(name, self.names)}")
+        raise InputError(f"{self.head}: no column {name!r}{suggest_name(name, self.names)}")
 
     def axis(self, given: str | None, usual: Sequence[str], unit: str) -> int:
         """The column over which the others run: `given`, else as of usual_column(). InputError: there is none."""
@@ -452,7 +452,7 @@ class Table:
         if (index := usual_column(self.names, self.units, usual, unit, self.head)) is not None:
             return index
         raise InputError(
-            f"{self.head}: no {usual[0]} column; name one '{usual[0]} [{unit}]'{suggest(usual[0], self.names)}"
+            f"{self.head}: no {usual[0]} column; name one '{usual[0]} [{unit}]'{suggest_name(usual[0], self.names)}"
         )
 
     def factor(self, index: int, unit: str, what: str, usual: str) -> float:
@@ -493,7 +493,7 @@ def usual_column(
             if len(exact or matches) > 1:
                 raise InputError(f"{where}: several columns are called {name!r} in some case")
             return (exact or matches)[0]
-    return 0 if names and fits(spelled(header_units[0]), unit) else None
+    return 0 if names and is_of_kind(spell_unit(header_units[0]), unit) else None
 
 
 def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = False) -> Table:
@@ -527,7 +527,7 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
         heads = [f"{name} [{unit}]" if unit else name for name, unit in zip(heads, layout.units, strict=True)]
     if long := next((cell for cell in heads if len(cell) > MAX_HEAD), None):
         raise InputError(
-            f"{where}: a column is headed {shown(long)}, {len(long)} characters; allowed: up to {MAX_HEAD}"
+            f"{where}: a column is headed {cell_text(long)}, {len(long)} characters; allowed: up to {MAX_HEAD}"
         )
     names, header_units = (split or _header)(titles(heads), where)
     _check_widths(body, body_lines, header, layout, path)
@@ -548,7 +548,7 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
         tuple(columns), body_lines, layout.separator != "," and read is None,
         None if read is None else read[:, used], layout.remarks, {}, tuple(notes),
     )  # fmt: skip
-    return _dated(table)
+    return _convert_dates(table)
 
 
 def _rows(lines: io.StringIO, layout: Layout, path: Path) -> tuple[list[list[str]], list[int]]:
@@ -596,7 +596,7 @@ def _check_widths(
             raise InputError(f"{path}:{line}: {len(row)} values, the header has {len(header)} columns{hint}")
 
 
-def _dated(table: Table) -> Table:
+def _convert_dates(table: Table) -> Table:
     """With its columns of time stamps as seconds, and those of milliseconds since 1970 from their first row on."""
     dates: dict[int, Stamps | InputError] = {}
     names, header_units = table.names, list(table.units)
@@ -608,7 +608,11 @@ def _dated(table: Table) -> Table:
                 dates[i] = error
             header_units[i] = "s"
     for i, name in enumerate(names):
-        if (values := _whole(table, i)) is not None and not header_units[i] and (begin := epoch(name, values)):
+        if (
+            (values := _millisecond_values(table, i)) is not None
+            and not header_units[i]
+            and (begin := epoch(name, values))
+        ):
             note = f"{table.where}: column {name!r} is taken as milliseconds since 1970; time counts from {begin} UTC"
             dates[i] = Stamps(values - values[0], note, begin[:10])
             header_units[i] = "ms"
@@ -623,7 +627,7 @@ def _dated(table: Table) -> Table:
     return replace(table, units=tuple(header_units), dates=dates, notes=notes)
 
 
-def _whole(table: Table, index: int) -> Array | None:
+def _millisecond_values(table: Table, index: int) -> Array | None:
     """Values of a column of whole numbers of 12 or 13 digits; None of any other."""
     if table.numbers is not None:
         return table.numbers[:, index]
@@ -686,7 +690,7 @@ def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[st
 def _head(index: int, cell: str, where: str) -> tuple[str, str]:
     match = _HEADER.fullmatch(cell)
     if not match or (cell and not match[1]):
-        raise InputError(f"{where}: column {index + 1} is headed {shown(cell)}; expected is name [unit]")
+        raise InputError(f"{where}: column {index + 1} is headed {cell_text(cell)}; expected is name [unit]")
     if match[2] is None:  # no square brackets; "x (mm) []" says that there is no unit
         return round_unit(match[1]) or (match[1], "")
     return match[1], match[2].strip()
@@ -697,7 +701,7 @@ def check_unlike(names: Sequence[str], where: str) -> None:
     seen: dict[str, int] = {}
     for i, name in enumerate(names):
         if name and (first := seen.setdefault(name, i)) != i:
-            raise InputError(f"{where}: duplicate column {shown(name)} (columns {first + 1} and {i + 1})")
+            raise InputError(f"{where}: duplicate column {cell_text(name)} (columns {first + 1} and {i + 1})")
     if seen and all(re.fullmatch(r"[-+0-9.,eE]+", name) for name in seen):
         raise InputError(f"{where}: the first line holds numbers; a header of name [unit] is needed")
 
@@ -717,7 +721,7 @@ def round_unit(cell: str) -> tuple[str, str] | None:
     return match[1], match[3].strip()
 
 
-def fits(unit: str, wanted: str) -> bool:
+def is_of_kind(unit: str, wanted: str) -> bool:
     """Whether a unit is of the kind of the wanted one."""
     try:
         units.factor(unit or "1", wanted)
@@ -726,7 +730,7 @@ def fits(unit: str, wanted: str) -> bool:
     return True
 
 
-def shown(cell: str) -> str:
+def cell_text(cell: str) -> str:
     """A cell for a message."""
     return repr(cell if len(cell) <= MAX_SHOWN else f"{cell[:MAX_SHOWN]}...")
 
@@ -778,7 +782,7 @@ def numbers(cells: Sequence[str], decimal: Decimal, lines: Sequence[int], where:
         except ValueError:
             pass
         else:
-            if not recorded(values)[1].any():
+            if not recordable_values(values)[1].any():
                 return values
     for line, cell, text in zip(lines, cells, plain, strict=True):
         if not cell:
@@ -786,9 +790,10 @@ def numbers(cells: Sequence[str], decimal: Decimal, lines: Sequence[int], where:
         if cell.lower().lstrip("+-") in ("nan", "inf", "infinity", "#n/a", "n/a", "null", "none"):
             raise InputError(f"{where}:{line}: {cell!r} in column {name!r}; every value must be a finite number")
         if not plain_number(text):
-            raise InputError(f"{where}:{line}: {shown(cell)} in column {name!r} is no number{instead_of(cell)}")
+            raise InputError(f"{where}:{line}: {cell_text(cell)} in column {name!r} is no number{instead_of(cell)}")
         if abs(float(text)) > MAX_MAGNITUDE:
             raise InputError(
-                f"{where}:{line}: {few([cell], 1)} in column {name!r} is too large; allowed: up to {MAX_MAGNITUDE:g}"
+                f"{where}:{line}: {shorten_list([cell], 1)} in column {name!r} is too large; allowed: up to "
+                f"{MAX_MAGNITUDE:g}"
             )
     return np.array([float(text) for text in plain], dtype=np.float64)

@@ -19,7 +19,7 @@ from feedsim.files.trace.cells import TIME_NAMES, read_table, round_unit
 from feedsim.files.trace.trace import Array, Trace, first_not_finite, stretches
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.owned import held, locked
+from feedsim.foundation.owned import defer_signals, lock_file
 
 
 @contextmanager
@@ -36,13 +36,13 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
         if is_stream(path):
             buffer = BytesIO()
             yield buffer
-            _poured(path, buffer.getvalue())
+            _write_into(path, buffer.getvalue())
             return
         target = Path(os.path.realpath(path))
         file = None
         try:
-            with held():  # what is made is known, and removed
-                file = _begun(target)
+            with defer_signals():  # what is made is known, and removed
+                file = _open_temporary_file(target)
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -62,7 +62,7 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
-def _begun(target: Path) -> IO[bytes]:
+def _open_temporary_file(target: Path) -> IO[bytes]:
     """A file beside `target`, locked as long as it is open; what processes that have gone have left there is removed.
 
     OSError: it cannot be made.
@@ -74,7 +74,7 @@ def _begun(target: Path) -> IO[bytes]:
                 _remove_orphan(other)
     while True:
         file: IO[bytes] = NamedTemporaryFile(dir=target.parent, prefix=prefix, suffix=suffix, delete=False)  # noqa: SIM115
-        if locked(file.fileno()) is not False and Path(file.name).exists():
+        if lock_file(file.fileno()) is not False and Path(file.name).exists():
             return file
         file.close()  # taken for one that has been left
 
@@ -82,7 +82,7 @@ def _begun(target: Path) -> IO[bytes]:
 def _remove_orphan(path: Path) -> None:
     """Remove a file that nobody has locked."""
     with suppress(OSError), path.open("r+b") as file:
-        if locked(file.fileno()):
+        if lock_file(file.fileno()):
             if os.name == "nt":  # it does not remove what is open
                 file.close()
             path.unlink()
@@ -113,7 +113,7 @@ def _descriptor(path: Path) -> int | None:
     return None
 
 
-def _poured(path: Path, content: bytes) -> None:
+def _write_into(path: Path, content: bytes) -> None:
     number = _descriptor(path)
     # An open file is shared, not opened again: into one behind a shell's ">" both would write from its start.
     if number is None:
@@ -237,25 +237,25 @@ def write_csv(path: str | Path, trace: Trace) -> None:
         if (row := first_not_finite(values)) is not None:
             raise OutputError(f"{path} is not written: {name} is {values[row]} at {trace.time[row]:.9g} s")
     with written_whole(path) as file:
-        file.write(heading(trace))
+        file.write(header_line(trace))
         for columns in stretches(trace.time, *trace.columns.values(), rows=ROWS):
             file.write(lines_of(columns))
 
 
-def heading(trace: Trace) -> bytes:
+def header_line(trace: Trace) -> bytes:
     """The first line of a trace's file."""
     units = [(name, trace.unit(name)) for name in trace.columns]
     heads = ["time [s]", *(f"{name} [{unit}]" if unit or round_unit(name) else name for name, unit in units)]
-    return f"{','.join(quoted(cell) for cell in heads)}\n".encode()
+    return f"{','.join(quote_cell(cell) for cell in heads)}\n".encode()
 
 
 def lines_of(columns: Sequence[Array]) -> bytes:
     """Rows of a file, the time being the first of the columns."""
-    text = zip(*(shortest(values) for values in columns), strict=True)
+    text = zip(*(shortest_numbers(values) for values in columns), strict=True)
     return "".join(f"{','.join(cells)}\n" for cells in text).encode()
 
 
-def shortest(values: Array) -> list[str]:
+def shortest_numbers(values: Array) -> list[str]:
     """Every number in its shortest form that reads back the same, as repr() writes it, whole ones without ".0"."""
     if not values.size:
         return []
@@ -272,6 +272,6 @@ def shortest(values: Array) -> list[str]:
     return text
 
 
-def quoted(cell: str) -> str:
+def quote_cell(cell: str) -> str:
     """A cell as it stands in a file."""
     return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',;"') else cell

@@ -25,22 +25,22 @@ from numpy.typing import NDArray
 from feedsim.files import source
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.installation import need
-from feedsim.foundation.units import known_unit, spelled
+from feedsim.foundation.installation import require_module
+from feedsim.foundation.units import known_unit, spell_unit
 
 # --- What a MAT file holds, whatever its version: numbers, texts, structures and cells, by name -----------------------
 
 
 MAX_INFLATED_BYTES = 2 << 30  # bytes that the variables of a file may inflate to,
 RATIO = 100  # nor more than this many times the file's own size,
-FREE = 256 << 20  # from so many bytes on
+FREE_BYTES = 256 << 20  # from so many bytes on
 MAX_DEPTH = 50  # structures within structures
 MAX_FIELDS = 100_000  # variables and fields
-REAL = "fiu"  # kinds of numpy's types
+REAL_KINDS = "fiu"  # kinds of numpy's types
 
 
 @dataclass(frozen=True)
-class Other:
+class OtherValue:
     """What is neither numbers nor a structure of its own. `what`: in words; `opaque`: only MATLAB reads it."""
 
     what: str
@@ -48,7 +48,7 @@ class Other:
 
 
 # Text is an array of characters (kind U), several structures and cells are a list.
-Value = NDArray[np.generic] | dict[str, "Value"] | list["Value"] | Other
+Value = NDArray[np.generic] | dict[str, "Value"] | list["Value"] | OtherValue
 
 
 class Fault(Exception):
@@ -57,7 +57,7 @@ class Fault(Exception):
 
 def allowed_bytes(size: int) -> int:
     """What the variables of a file of `size` bytes may inflate to."""
-    return min(MAX_INFLATED_BYTES, max(FREE, RATIO * size))
+    return min(MAX_INFLATED_BYTES, max(FREE_BYTES, RATIO * size))
 
 
 def characters(codes: NDArray[np.uint32]) -> NDArray[np.str_]:
@@ -73,14 +73,14 @@ def lines(value: object) -> list[str]:
     return ["".join(row.tolist()).replace("\0", "").rstrip() for row in np.atleast_2d(value)]
 
 
-def flat(content: Mapping[str, Value]) -> Iterator[tuple[str, NDArray[np.generic] | Other]]:
+def flatten_variables(content: Mapping[str, Value]) -> Iterator[tuple[str, NDArray[np.generic] | OtherValue]]:
     """Variables, those inside structures too, as MATLAB calls them: "structure.field", "signals(2).values". Numbers
     have no dimensions of length 1."""
     for name, value in content.items():
         yield from _parts(name, value)
 
 
-def _parts(name: str, value: Value) -> Iterator[tuple[str, NDArray[np.generic] | Other]]:
+def _parts(name: str, value: Value) -> Iterator[tuple[str, NDArray[np.generic] | OtherValue]]:
     if isinstance(value, dict):
         for field, inner in value.items():
             yield from _parts(f"{name}.{field}", inner)
@@ -108,7 +108,7 @@ def is_hdf5(content: bytes) -> bool:
 
 def variables(content: bytes) -> dict[str, Value]:
     """Variables by name. Fault: damaged, or more than is allowed. InputError: h5py is missing."""
-    h5py = need("h5py", "a MAT file of version 7.3 (HDF5; or save it with -v7)")
+    h5py = require_module("h5py", "a MAT file of version 7.3 (HDF5; or save it with -v7)")
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             return _MatHdf5Reader(h5py, file, allowed_bytes(len(content))).members(file, 0)
@@ -131,7 +131,7 @@ class _MatHdf5Reader:
             if name.startswith("#"):
                 continue
             own = isinstance(group.get(name, getlink=True), self.h5py.HardLink)
-            result[name] = self.value(group[name], depth + 1) if own else Other("a link")
+            result[name] = self.value(group[name], depth + 1) if own else OtherValue("a link")
         return result
 
     def value(self, item: Any, depth: int) -> Value:
@@ -141,15 +141,15 @@ class _MatHdf5Reader:
         attributes: Mapping[str, Any] = item.attrs
         of_class = _mat_hdf5_text(attributes.get("MATLAB_class", ""))
         if "MATLAB_object_decode" in attributes and of_class not in ("string", "function_handle"):
-            return Other(f"an object of class {of_class}", opaque=True)
+            return OtherValue(f"an object of class {of_class}", opaque=True)
         if of_class == "function_handle":
-            return Other("a function", opaque=True)
+            return OtherValue("a function", opaque=True)
         if "MATLAB_sparse" in attributes:
-            return Other("a sparse matrix")
+            return OtherValue("a sparse matrix")
         if isinstance(item, self.h5py.Group):
             return self._group(item, of_class, depth)
         if not isinstance(item, self.h5py.Dataset):
-            return Other("a type")
+            return OtherValue("a type")
         return self._dataset(item, of_class, depth)
 
     def _group(self, group: Any, of_class: str, depth: int) -> Value:
@@ -176,7 +176,7 @@ class _MatHdf5Reader:
         if item.attrs.get("MATLAB_empty", 0):
             return np.zeros(0)
         if item.is_virtual or item.external:
-            return Other("numbers of another file")
+            return OtherValue("numbers of another file")
         size = math.prod(item.shape or (0,)) * item.dtype.itemsize
         self.allowed -= size
         if self.allowed < 0:
@@ -190,7 +190,9 @@ class _MatHdf5Reader:
                 for reference in np.asarray(item[()]).ravel().tolist()
             ]
         if item.dtype.kind not in "fiub":
-            return Other("complex numbers" if item.dtype.names == ("real", "imag") else f"data of type {item.dtype}")
+            return OtherValue(
+                "complex numbers" if item.dtype.names == ("real", "imag") else f"data of type {item.dtype}"
+            )
         values = np.asarray(item[()]).T
         if of_class == "char":
             return characters(np.asarray(values, dtype=np.uint32))
@@ -203,7 +205,7 @@ def _mat_hdf5_text(attribute: object) -> str:
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}  # of data
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
-_OTHERS = {3: "an object", 5: "a sparse matrix", 16: "a function"}
+_OTHER_CLASSES = {3: "an object", 5: "a sparse matrix", 16: "a function"}
 _ENCODINGS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}  # of texts; other types hold a code point each
 _MATRIX, _COMPRESSED = 14, 15
 _CELLS, _STRUCTURE, _CHARACTERS, _OPAQUE = 1, 2, 4, 17
@@ -240,11 +242,11 @@ def _variables(content: bytes) -> dict[str, Value]:
     while at < len(content):
         kind, data, at = reader.element(content, at, f"variable {len(result) + 1}")
         if kind == _COMPRESSED:
-            kind, data, _ = reader.element(reader.inflated(data), 0, f"variable {len(result) + 1}")
+            kind, data, _ = reader.element(reader.inflate(data), 0, f"variable {len(result) + 1}")
         if kind != _MATRIX:
             raise Fault(f"where variable {len(result) + 1} should stand, there is data of type {kind}")
         name, value = reader.matrix(data, 0)
-        result[name] = Other("several variables of that name") if name in result else value
+        result[name] = OtherValue("several variables of that name") if name in result else value
     return result
 
 
@@ -272,7 +274,7 @@ class _Reader:
             raise Fault(f"it ends within {what}, which declares {size} bytes and has {len(view) - start}")
         return kind, view[start : start + size], end
 
-    def inflated(self, data: memoryview) -> bytes:
+    def inflate(self, data: memoryview) -> bytes:
         try:
             stream = zlib.decompressobj()
             result = stream.decompress(data, self.allowed + 1)
@@ -322,10 +324,10 @@ class _Reader:
             with suppress(Fault):  # behind the name: the system of classes, and the class
                 _, _, at = self.element(data, at, "an object")
                 kind_name = _text(bytes(self.element(data, at, "an object")[1]))
-            return name, Other(f"an object of class {kind_name}" if kind_name.isidentifier() or "." in kind_name
+            return name, OtherValue(f"an object of class {kind_name}" if kind_name.isidentifier() or "." in kind_name
                                else "an object", opaque=True)  # fmt: skip
-        if of_class in _OTHERS:
-            return name, Other(_OTHERS[of_class], of_class == 16)
+        if of_class in _OTHER_CLASSES:
+            return name, OtherValue(_OTHER_CLASSES[of_class], of_class == 16)
         raise Fault(f"{where} is of the unknown class {of_class}")
 
     def _numbers(self, data: memoryview, at: int, what: str) -> tuple[NDArray[np.generic], int]:
@@ -368,17 +370,17 @@ class _Reader:
                 raise Fault(f"{where} is text of data of type {kind}")
             codes = numbers.astype(np.uint32)
         if len(codes) != math.prod(shape):
-            return Other("text")
+            return OtherValue("text")
         return characters(codes).reshape(shape, order="F")
 
     def _cells(self, data: memoryview, at: int, depth: int, shape: tuple[int, ...], where: str) -> list[Value]:
         result: list[Value] = []
         for _ in range(math.prod(shape)):
-            value, at = self._inner(data, at, depth, f"a cell of {where}")
+            value, at = self._read_inner(data, at, depth, f"a cell of {where}")
             result.append(value)
         return result
 
-    def _inner(self, data: memoryview, at: int, depth: int, what: str) -> tuple[Value, int]:
+    def _read_inner(self, data: memoryview, at: int, depth: int, what: str) -> tuple[Value, int]:
         """What stands within a structure or a cell, and where the next one begins."""
         kind, inner, at = self.element(data, at, what)
         if kind != _MATRIX:
@@ -400,8 +402,8 @@ class _Reader:
         for _ in range(count):
             fields: dict[str, Value] = {}
             for name in names:
-                value, at = self._inner(data, at, depth, f"the field {name[:60]!r} of {where}")
-                fields[name] = Other("several fields of that name") if name in fields else value
+                value, at = self._read_inner(data, at, depth, f"the field {name[:60]!r} of {where}")
+                fields[name] = OtherValue("several fields of that name") if name in fields else value
             result.append(fields)
         return result
 
@@ -432,9 +434,9 @@ def _version_4(content: bytes) -> dict[str, Value]:
         if at + size * (1 + imaginary) > len(content):
             raise Fault(f"it ends within {name[:60]!r}, which is to have {rows} rows and {columns} columns")
         if name in result:
-            result[name] = Other("several variables of that name")
+            result[name] = OtherValue("several variables of that name")
         elif kind == 2:
-            result[name] = Other("a sparse matrix")
+            result[name] = OtherValue("a sparse matrix")
         else:
             values = np.frombuffer(content, dtype, rows * columns, at).astype(dtype.newbyteorder("="), copy=False)
             if imaginary:
@@ -477,9 +479,11 @@ def is_result(content: Mapping[str, Value]) -> bool:
 def columns(path: Path, content: Mapping[str, Value]) -> Iterator[Column]:
     """Variables of a result, the time first, called "time". InputError: tables that do not fit one another."""
     across = any("binTrans" in row for row in lines(content["Aclass"])) or any(
-        "binTrans" in row for row in lines(_turned(content["Aclass"]))
+        "binTrans" in row for row in lines(_transpose_value(content["Aclass"]))
     )
-    names, texts = (lines(_turned(content.get(key)) if across else content.get(key)) for key in ("name", "description"))
+    names, texts = (
+        lines(_transpose_value(content.get(key)) if across else content.get(key)) for key in ("name", "description")
+    )
     info = _table(path, content, "dataInfo", across)
     if info.shape[1] < 4 or len(names) != len(info) or not np.all(np.isfinite(info)):
         raise InputError(
@@ -505,11 +509,11 @@ def columns(path: Path, content: Mapping[str, Value]) -> Iterator[Column]:
         seen.add(name)
         values = table[:, abs(place) - 1] if place > 0 else -table[:, abs(place) - 1]
         constant = bool(np.all(values == values[0]))
-        over_time = _over(time, table[:, 0], values, beyond, constant)
+        over_time = _resample_table(time, table[:, 0], values, beyond, constant)
         yield Column(name, over_time, _unit(texts, k), constant and number == 1)
 
 
-def _over(time: Array, own: Array, values: Array, beyond: int, constant: bool) -> Array:
+def _resample_table(time: Array, own: Array, values: Array, beyond: int, constant: bool) -> Array:
     """Values of a table over the time of the result."""
     if len(own) == len(time) and bool(np.all(own == time)):
         return values
@@ -527,19 +531,19 @@ def _over(time: Array, own: Array, values: Array, beyond: int, constant: bool) -
 
 def _table(path: Path, content: Mapping[str, Value], key: str, across: bool) -> Array:
     value = content[key]
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in REAL or value.ndim != 2 or not value.size:
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in REAL_KINDS or value.ndim != 2 or not value.size:
         raise InputError(f"{path}: a result file of Modelica, whose {key} is no table of numbers")
     return np.asarray(value.T if across else value, dtype=np.float64)
 
 
-def _turned(value: Value | None) -> Value | None:
+def _transpose_value(value: Value | None) -> Value | None:
     return value.T if isinstance(value, np.ndarray) else value
 
 
 def _unit(texts: list[str], k: int) -> str:
     """Unit at the end of a description."""
     match = _UNIT.fullmatch(texts[k]) if k < len(texts) else None
-    return spelled(match[1].strip()) if match and known_unit(match[1].strip()) else ""
+    return spell_unit(match[1].strip()) if match and known_unit(match[1].strip()) else ""
 
 
 # --- Columns of a MAT file, as the programs call them that have written it --------------------------------------------
@@ -586,18 +590,18 @@ class MatColumns:
     def add(self, name: str, values: Numbers, unit: str = "", written: str = "") -> None:
         """A column. written: as MATLAB calls it, where that is not its name."""
         self.columns[name], self.units[name] = values, unit
-        self.spellings[_short(written or name)] = name
+        self.spellings[_short_name(written or name)] = name
 
 
-def named(name: str, names: Iterable[str], spellings: Mapping[str, str]) -> str:
+def find_column(name: str, names: Iterable[str], spellings: Mapping[str, str]) -> str:
     """The name of a column in any of its spellings; as it is where there is none."""
     if name in names:
         return name
-    short = _short(name)
+    short = _short_name(name)
     return spellings.get(short) or spellings.get(_ONE_OF_A_VECTOR.sub("", short), name)
 
 
-def _short(text: str) -> str:
+def _short_name(text: str) -> str:
     """What MATLAB calls a value, without blanks and the (1) of what is one alone."""
     return re.sub(r"\s+|\(1\)|\{1\}", "", text)
 
@@ -713,14 +717,14 @@ def _elements(written: str, value: Value | None) -> Iterator[tuple[str, dict[str
 
 def _numbers(value: Value | None) -> Numbers | None:
     """Real numbers without dimensions of length 1, more than one; None: it is something else."""
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in REAL or value.size < 2:
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in REAL_KINDS or value.size < 2:
         return None
     return value.squeeze()
 
 
 def _index(value: Value | None) -> int:
     """Which X a signal goes with; the first one, where it does not say so."""
-    number = value.item() if isinstance(value, np.ndarray) and value.dtype.kind in REAL and value.size == 1 else 1
+    number = value.item() if isinstance(value, np.ndarray) and value.dtype.kind in REAL_KINDS and value.size == 1 else 1
     return int(number) if np.isfinite(number) else 1
 
 
@@ -732,7 +736,7 @@ def _label(text: str, unit: str = "") -> tuple[str, str]:
     """Label and unit; of "pos [mm]" its parts."""
     if (match := _UNIT_BEHIND.fullmatch(text)) and not match[2].strip().isdecimal() and known_unit(match[2]):
         text, unit = match[1], match[2]
-    return text, spelled(unit) if unit and known_unit(unit) else ""
+    return text, spell_unit(unit) if unit and known_unit(unit) else ""
 
 
 def _add_groups(result: MatColumns, groups: list[_Group], taken: set[str]) -> None:
@@ -770,12 +774,12 @@ def _add_rest(result: MatColumns, content: Mapping[str, Value], groups: list[_Gr
     """What no group has."""
     whole = tuple(f"{group.written}." for group in groups if group.whole)
     plain: dict[str, Numbers] = {}
-    for name, value in flat(content):
-        if name.startswith(whole) or _short(name) in result.spellings:
+    for name, value in flatten_variables(content):
+        if name.startswith(whole) or _short_name(name) in result.spellings:
             continue
-        if isinstance(value, Other):
-            result.others[name] = _other(name, value)
-        elif value.dtype.kind not in REAL:
+        if isinstance(value, OtherValue):
+            result.others[name] = _describe_other(name, value)
+        elif value.dtype.kind not in REAL_KINDS:
             kind = "text" if value.dtype.kind == "U" else f"{value.dtype} of shape {value.shape}"
             result.others[name] = f"{name!r} ({kind})"
         elif value.size == 1:
@@ -791,7 +795,7 @@ def _add_rest(result: MatColumns, content: Mapping[str, Value], groups: list[_Gr
         result.add(TIME if inside and name == times[0] else name, vector, written=name)
 
 
-def _other(name: str, value: Other) -> str:
+def _describe_other(name: str, value: OtherValue) -> str:
     if not value.opaque:
         return f"{name!r} ({value.what})"
     of_class = value.what.rpartition(" ")[2]

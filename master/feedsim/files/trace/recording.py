@@ -21,13 +21,13 @@ from feedsim.files.trace.capture import CaptureAxis
 from feedsim.files.trace.cells import TIME_NAMES, Table, read_table, titles, usual_column
 from feedsim.files.trace.files import write_csv
 from feedsim.files.trace.mat import MAT, read_columns
-from feedsim.files.trace.mat import named as named_so
+from feedsim.files.trace.mat import find_column as named_so
 from feedsim.files.trace.response_files import UNIVERSAL, read_signals_uff
 from feedsim.files.trace.scopes import read_scope
-from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
+from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, Trace, recordable_values, suggest_name
 from feedsim.foundation import units
-from feedsim.foundation.errors import Finding, InputError, few
-from feedsim.foundation.units import spelled
+from feedsim.foundation.errors import Finding, InputError, shorten_list
+from feedsim.foundation.units import spell_unit
 
 if TYPE_CHECKING:
     from feedsim.files.columns import Columns, Factor
@@ -72,7 +72,7 @@ class Recording:
         wanted = list(dict.fromkeys(names))
         if self._table is not None:
             read = self._table.values(map(self._table.index, wanted)).values()
-            return {name: recorded(column)[0] for name, column in zip(wanted, read, strict=True)}
+            return {name: recordable_values(column)[0] for name, column in zip(wanted, read, strict=True)}
         values = {name: self._vector(name) for name in wanted}
         for name in wanted[1:]:
             if values[name].size != values[wanted[0]].size:
@@ -92,7 +92,7 @@ class Recording:
         if values is None:
             other = self.unread.get(name)
             if name not in self.scalars and other is None:
-                raise InputError(f"{self.path}: no variable {name!r}{suggest(name, self.names)}")
+                raise InputError(f"{self.path}: no variable {name!r}{suggest_name(name, self.names)}")
             what = other or f"{name!r} is a single number"
             raise InputError(f"{self.path}: {what}; a vector of real numbers is needed")
         if self._rows is not None and len(values) == len(self._rows):
@@ -101,7 +101,7 @@ class Recording:
         if not np.all(np.isfinite(numbers)):
             row = int(np.argmin(np.isfinite(numbers))) + 1
             raise InputError(f"{self.path}: {name!r} is not finite at element {row}")
-        numbers, wrong = recorded(numbers)
+        numbers, wrong = recordable_values(numbers)
         if wrong.any():
             row = int(np.argmax(wrong))
             raise InputError(
@@ -112,8 +112,8 @@ class Recording:
     @property
     def there(self) -> str:
         """What the file holds, for messages."""
-        unread = f"; not read: {few([*self.unread.values()], 5)}" if self.unread else ""
-        return f"{few(self.names, 20)}{unread}"
+        unread = f"; not read: {shorten_list([*self.unread.values()], 5)}" if self.unread else ""
+        return f"{shorten_list(self.names, 20)}{unread}"
 
     def scalar(self, name: str) -> float:
         """A number of the file. InputError: there is none of that name."""
@@ -121,7 +121,7 @@ class Recording:
             return self.scalars[name]
         if name in self.names:
             raise InputError(f"{self.path}: variable {name!r} is a vector; a factor must be one number")
-        hint = "; a CSV file has none, write the number itself" if self._table else suggest(name, self.scalars)
+        hint = "; a CSV file has none, write the number itself" if self._table else suggest_name(name, self.scalars)
         raise InputError(f"{self.path}: no variable {name!r}{hint}")
 
     def beside(self, time: str) -> list[tuple[str, str, str]]:
@@ -150,7 +150,7 @@ class Recording:
             return None
         name = self.names[index]
         try:
-            return name, float(units.factor(spelled(self.units[name]) or "s", "s"))
+            return name, float(units.factor(spell_unit(self.units[name]) or "s", "s"))
         except InputError as error:
             raise InputError(f"{self.header}: column {name!r}: {error}") from None
 
@@ -218,7 +218,7 @@ def of_control(path: Path) -> Recording | None:
 def _check(path: Path, columns: Mapping[str, Array]) -> None:
     """InputError: a value that nothing records."""
     for name, values in columns.items():
-        if (wrong := recorded(values)[1]).any():
+        if (wrong := recordable_values(values)[1]).any():
             row = int(np.argmax(wrong))
             raise InputError(
                 f"{path}: {name!r} is {values[row]:.6g} at sample {row + 1}; allowed: up to {MAX_MAGNITUDE:g}"
@@ -255,7 +255,7 @@ MAPPED_NAMES = {
 }
 
 
-def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
+def map_columns(recording: Recording, mappings: Sequence[Columns]) -> Recording:
     """A record with its columns called as those of results are, X.x_a [m], by mapping files, one for each axis.
 
     Without mapping files it is what it was. Raises InputError: a mapping of positions that names no axis, a column that
@@ -273,7 +273,7 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
             first = next(name for role in MAPPED_NAMES if (one := mapping.signal(role)) for name in [one.column])
             columns["time"] = clock.interval * np.arange(len(recording.read([first])[first]), dtype=np.float64)
         elif clock.column is not None:
-            columns["time"] = _scaled(recording, "time", clock.column, clock.unit, clock.factor)
+            columns["time"] = _scale_column(recording, "time", clock.column, clock.unit, clock.factor)
         elif (known_clock := recording.clock()) is not None:
             columns["time"] = recording.read([known_clock[0]])[known_clock[0]] * known_clock[1]
         for role, (name, unit) in MAPPED_NAMES.items():
@@ -282,7 +282,7 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
                 continue
             if "{}" in name and mapping.axis is None:
                 raise InputError(f"{mapping.where(role)}: of which axis is not said: add a line such as axis: X")
-            values = signal.sign * _scaled(recording, role, signal.column, signal.unit, signal.factor)
+            values = signal.sign * _scale_column(recording, role, signal.column, signal.unit, signal.factor)
             own = str(target_of(role, _unit_of(recording, signal.column, signal.unit, signal.factor)))
             if own != unit:
                 if mapping.pitch is None:
@@ -302,14 +302,14 @@ def mapped(recording: Recording, mappings: Sequence[Columns]) -> Recording:
 
 
 def _unit_of(recording: Recording, name: str, unit: str | None, factor: Factor | None) -> units.Unit:
-    from feedsim.files.columns import resulting
+    from feedsim.files.columns import resulting_unit
 
     if name not in recording.units:
-        raise InputError(f"{recording.header}: no column {name!r}{suggest(name, recording.names)}")
-    return resulting(unit or spelled(recording.units[name]) or "1", factor.unit if factor is not None else "1")
+        raise InputError(f"{recording.header}: no column {name!r}{suggest_name(name, recording.names)}")
+    return resulting_unit(unit or spell_unit(recording.units[name]) or "1", factor.unit if factor is not None else "1")
 
 
-def _scaled(recording: Recording, role: str, name: str, unit: str | None, factor: Factor | None) -> Array:
+def _scale_column(recording: Recording, role: str, name: str, unit: str | None, factor: Factor | None) -> Array:
     """Values of a column in the SI unit of its role."""
     from feedsim.files.columns import target_of
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.files.trace.trace import Array, Columns, check_name, check_unit, matching
+from feedsim.files.trace.trace import Array, Columns, check_name, check_unit, match_names
 from feedsim.foundation import units as quantities
 from feedsim.foundation.errors import Finding, InputError
 
@@ -104,7 +104,7 @@ class FrequencyResponse(Columns[Complexes]):
 
     def select(self, patterns: Iterable[str]) -> FrequencyResponse:
         """Columns whose name matches any of the glob patterns. InputError for a pattern that matches nothing."""
-        kept = matching(self.columns, patterns)
+        kept = match_names(self.columns, patterns)
         return FrequencyResponse(
             self.frequency,
             {name: self.columns[name] for name in kept},

@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.files.trace.cells import Table, read_table
-from feedsim.files.trace.files import quoted, shortest, written_whole
+from feedsim.files.trace.files import quote_cell, shortest_numbers, written_whole
 from feedsim.files.trace.response import Complexes, FrequencyResponse, quotient_unit, without_zero
 from feedsim.files.trace.sinumerik_xml import SUFFIX, read_response_xml
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError, no_such_file
-from feedsim.foundation.installation import need
+from feedsim.foundation.installation import require_module
 
 # --- Frequency responses from universal files, dataset 58 (the only room that knows pyuff) ----------------------------
 # Functions are called as their header has it, response over reference: "12:+Z/7:+X" for node and direction.
@@ -49,7 +49,7 @@ DIRECTION_CODES = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ
 DIRECTION_CODES |= {-code: text.replace("+", "-") for code, text in DIRECTION_CODES.items() if code}
 # Frequencies of functions that go together agree up to the digits of the file, 13.5E.
 FREQUENCY_TOLERANCE = 1e-4
-NONE = ("", "NONE")
+EMPTY_NAMES = ("", "NONE")
 UNIT_SYSTEM = 164  # dataset of units: factors from SI to those of the file
 # Specific data type of an axis -> its unit along a direction, and about one, in SI.
 TYPE_UNITS = {
@@ -185,7 +185,7 @@ def _unit_factors(path: Path, sets: Sequence[Mapping[str, Any]]) -> tuple[float,
 
 def _sets(path: Path) -> list[Mapping[str, Any]]:
     """Functions of the file, with the "unit_factors" of the file; other datasets are left alone."""
-    pyuff = need("pyuff", "a universal file")
+    pyuff = require_module("pyuff", "a universal file")
     if not path.is_file():
         raise InputError(no_such_file(path))
     try:
@@ -225,7 +225,7 @@ def _frequencies(path: Path, name: str, function: Mapping[str, Any]) -> Floats:
 
 def _hertz(path: Path, name: str, label: str) -> float:
     """Factor from the unit that the label of the abscissa names to Hz; without a label it is Hz."""
-    if label.upper() in NONE:
+    if label.upper() in EMPTY_NAMES:
         return 1.0
     try:
         return units.parse(f"1 {label}", "rad/s", "1 Hz") / (2 * math.pi)
@@ -251,14 +251,14 @@ def _name(function: Mapping[str, Any]) -> str:
 def _point(function: Mapping[str, Any], end: str) -> str:
     entity = str(function.get(f"{end}_ent_name") or "").strip()
     node, direction = int(function[f"{end}_node"]), int(function[f"{end}_dir"])
-    named = node if entity.upper() in NONE else f"{entity}.{node}"
+    named = node if entity.upper() in EMPTY_NAMES else f"{entity}.{node}"
     where = DIRECTION_CODES.get(direction, str(direction))
     return f"{named}:{where}" if where else str(named)
 
 
 def _label(function: Mapping[str, Any], axis: str) -> str:
     label = str(function.get(f"{axis}_axis_units_lab") or "").strip()
-    return "" if label.upper() in NONE else label.replace("[", "(").replace("]", ")")
+    return "" if label.upper() in EMPTY_NAMES else label.replace("[", "(").replace("]", ")")
 
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".bunv")
@@ -281,16 +281,16 @@ def write_response(path: str | Path, response: FrequencyResponse) -> None:
     """Write a frequency response, whole or not at all. OutputError: the file cannot be written."""
     path = Path(path)
     header = ["frequency [Hz]"]
-    text = [shortest(response.frequency)]
+    text = [shortest_numbers(response.frequency)]
     for name, values in response.columns.items():
         unit = response.unit(name)
         header.append(f"{name} magnitude [{unit}]" if unit else f"{name} magnitude")
         header.append(f"{name} phase [deg]")
-        text += [shortest(np.abs(values)), shortest(response.phase(name))]
+        text += [shortest_numbers(np.abs(values)), shortest_numbers(response.phase(name))]
         if name in response.coherence:
             header.append(f"{name} coherence [1]")
-            text.append(shortest(response.coherence[name]))
-    lines = chain([",".join(quoted(cell) for cell in header)], map(",".join, zip(*text, strict=True)))
+            text.append(shortest_numbers(response.coherence[name]))
+    lines = chain([",".join(quote_cell(cell) for cell in header)], map(",".join, zip(*text, strict=True)))
     with written_whole(path) as file:
         file.write("\n".join(lines).encode("utf-8"))
         file.write(b"\n")

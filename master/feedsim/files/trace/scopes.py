@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from feedsim.files import source
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import Finding, InputError, few
-from feedsim.foundation.units import known_unit, spelled
+from feedsim.foundation.errors import Finding, InputError, shorten_list
+from feedsim.foundation.units import known_unit, spell_unit
 
 MAX_CHANNELS = 1000
 SCOPE_BYTES = 65536  # bytes within which a file shows what it is
@@ -36,7 +36,7 @@ _TWINCAT = re.compile(
     r"^(?:Starttime of export|StartRecord|SampleTime\[ms\]|SymbolName|Data-Type)([\t;,])", re.MULTILINE
 )
 _HALSCOPE = re.compile(r"\s*(#?)\s*Sampling period is (\d+) n(?:s|Sec)\b", re.IGNORECASE)
-_EXCHANGED = str.maketrans(",.", ".,")
+_SWAPPED_SEPARATORS = str.maketrans(",.", ".,")
 TICKS = 1e15  # a time beyond is a date in 100 ns, not in ms since the start
 TICK, MS = 1e-7, 1e-3  # s
 MAX_CLOCK_DIFFERENCE = 1e-9  # [s] by which the same instant may differ between two clocks
@@ -57,17 +57,17 @@ def read_scope(path: Path) -> Signals | None:
     """The signals of such a file; None where it is another one. InputError with the line: what cannot be read."""
     if not path.is_file():
         return None  # a pipe is read once
-    with source.opened(path) as file:
+    with source.open_file(path) as file:
         raw = file.read(SCOPE_BYTES)
-    head = _decoded(raw)
+    head = _decode_head(raw)
     if _HALSCOPE.match(head):
-        return _halscope(path, _decoded(source.content(path)))
+        return _halscope(path, _decode_head(source.content(path)))
     if result := _TWINCAT.search(head):
-        return _twincat(path, _decoded(source.content(path)), result[1])
+        return _twincat(path, _decode_head(source.content(path)), result[1])
     return None
 
 
-def _decoded(raw: bytes) -> str:
+def _decode_head(raw: bytes) -> str:
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return raw.decode("utf-16", "replace")
     try:
@@ -133,7 +133,7 @@ def _twincat(path: Path, text: str, separator: str) -> Signals:
             f"{path}:{first + 1}: {len(rows[first])} values below {width} columns of the header; export it with a "
             "column of time for every channel or sampling time (Timelines: All)"
         )
-    return _grouped(path, header, clocks, channels, body)
+    return _merge_groups(path, header, clocks, channels, body)
 
 
 def _cell(header: Mapping[str, Sequence[str]], key: str, column: int) -> str:
@@ -141,7 +141,7 @@ def _cell(header: Mapping[str, Sequence[str]], key: str, column: int) -> str:
     return row[column].strip() if column < len(row) else ""
 
 
-def _grouped(
+def _merge_groups(
     path: Path, header: Mapping[str, Sequence[str]], clocks: Sequence[int], channels: Mapping[int, str],
     body: Sequence[tuple[int, Sequence[str]]],
 ) -> Signals:  # fmt: skip
@@ -177,8 +177,8 @@ def _grouped(
     resampled: list[str] = []
     interpolated: list[str] = []
     for instants, keeps, (_, values) in zip(times, slower, groups, strict=True):
-        at = _at(instants, time)
-        same = _alike(instants[at], time)
+        at = _rows_at(instants, time)
+        same = _are_same_instants(instants[at], time)
         for k, signal in values.items():
             name = titles[k]
             # What is on or off has no values in between.
@@ -189,7 +189,7 @@ def _grouped(
             (resampled if stepped else interpolated).extend([] if same else [name])
             unit = _cell(header, "Unit", k)
             known = bool(unit) and known_unit(unit)
-            units[name] = spelled(unit) if known else ""
+            units[name] = spell_unit(unit) if known else ""
             unknown += [name] if unit and not known and unit.strip("()").lower() not in ("none", "-") else []
             factor = _cell(header, "ScaleFactor", k).replace(",", ".")
             scaled += [name] if factor not in ("", "1", "1.0") else []
@@ -202,7 +202,7 @@ def _grouped(
         ))  # fmt: skip
 
     def said(names: Sequence[str], words: str) -> str:
-        return f"{path}: {few(names, 4)} {words}"
+        return f"{path}: {shorten_list(names, 4)} {words}"
 
     rarer = "has another sampling time: its values are kept until its next one"
     between = "is sampled at other instants: its values are interpolated"
@@ -247,7 +247,7 @@ def _one_time(path: Path, base: Array, times: Sequence[Array], names: Sequence[s
 
     names: of a channel of every clock. InputError: they have no time in common.
     """
-    slower = [_alike(base[_at(base, instants)], instants) for instants in times]
+    slower = [_are_same_instants(base[_rows_at(base, instants)], instants) for instants in times]
     begin = max(instants[0] for instants in times)
     # A value of what ticks less often lasts until the next one.
     lasting = [_usual_step(instants) - _usual_step(base) if keeps else 0.0
@@ -256,16 +256,16 @@ def _one_time(path: Path, base: Array, times: Sequence[Array], names: Sequence[s
     time = base[(base >= begin - MAX_CLOCK_DIFFERENCE) & (base <= end + MAX_CLOCK_DIFFERENCE)]
     if time.size < 2:
         spans = [f"{name} {own[0]:.6g} to {own[-1]:.6g} s" for name, own in zip(names, times, strict=True)]
-        raise InputError(f"{path}: its channels have no time in common: {few(spans, 4)}")
+        raise InputError(f"{path}: its channels have no time in common: {shorten_list(spans, 4)}")
     return time, slower
 
 
-def _alike(one: Array, other: Array) -> bool:
+def _are_same_instants(one: Array, other: Array) -> bool:
     """Whether instants of two clocks are the same."""
     return bool(np.all(np.abs(one - other) <= MAX_CLOCK_DIFFERENCE + 1e-9 * np.abs(other)))
 
 
-def _at(instants: Array, time: Array) -> NDArray[np.intp]:
+def _rows_at(instants: Array, time: Array) -> NDArray[np.intp]:
     """Row of the last instant that is not later, the first row where all are."""
     return np.asarray((np.searchsorted(instants, time + MAX_CLOCK_DIFFERENCE, side="right") - 1).clip(0))
 
@@ -313,7 +313,7 @@ def _halscope(path: Path, text: str) -> Signals:
     if result[1]:
         labels, values = _table(path, rows)
     else:
-        labels, values = _labelled(path, [(k, line.split()) for k, line in rows])
+        labels, values = _read_labelled_lines(path, [(k, line.split()) for k, line in rows])
         values = values[:-1]  # halscope writes one sample more than it has recorded
         text = f"{path}: halscope writes one sample more than it has recorded: the last one is left out"
         notes = (Finding("rows-left-out", "doubt", text, str(path)),)
@@ -326,7 +326,7 @@ def _halscope(path: Path, text: str) -> Signals:
     return Signals(columns, {"time": "s"} | dict.fromkeys(names, ""), notes)
 
 
-def _labelled(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[list[str], list[list[float]]]:
+def _read_labelled_lines(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[list[str], list[list[float]]]:
     """Labels and values of lines that have both in turn; a last line that is not whole is left out."""
     labels = rows[0][1][::2] if rows else []
     if rows and len(rows[-1][1]) < 2 * len(labels):
@@ -334,7 +334,9 @@ def _labelled(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[list[str],
     values = []
     for line, cells in rows:
         if cells[::2] != labels or len(cells) != 2 * len(labels):
-            raise InputError(f"{path}:{line}: holds {few(cells[::2], 20)}, the first row {few(labels, 20)}")
+            raise InputError(
+                f"{path}:{line}: holds {shorten_list(cells[::2], 20)}, the first row {shorten_list(labels, 20)}"
+            )
         values.append(_samples(path, line, cells[1::2], comma="," in rows[0][1][1]))
     return labels, values
 
@@ -353,7 +355,7 @@ def _table(path: Path, rows: list[tuple[int, str]]) -> tuple[list[str], list[lis
 
 def _samples(path: Path, line: int, cells: list[str], *, comma: bool) -> list[float]:
     """Numbers with decimal points, or commas, as the locale of halscope had them in the first row."""
-    plain = [cell.translate(_EXCHANGED) for cell in cells] if comma else cells
+    plain = [cell.translate(_SWAPPED_SEPARATORS) for cell in cells] if comma else cells
     try:
         return [float(cell) for cell in plain]
     except ValueError:

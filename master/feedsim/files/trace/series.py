@@ -17,19 +17,19 @@ from feedsim.files.trace.cells import (
     TIME_NAMES,
     Decimal,
     Table,
+    cell_text,
     check_unlike,
     decimal_mark,
-    fits,
     instead_of,
+    is_of_kind,
     read_table,
     round_unit,
-    shown,
 )
-from feedsim.files.trace.mat import MAT, named, read_columns
+from feedsim.files.trace.mat import MAT, find_column, read_columns
 from feedsim.files.trace.recording import of_control
 from feedsim.files.trace.trace import Array, TimeColumns, Trace
 from feedsim.foundation import units
-from feedsim.foundation.errors import Finding, InputError, few
+from feedsim.foundation.errors import Finding, InputError, shorten_list
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
 _UNIT_BEHIND = re.compile(r"(.*?[^\s])\s*\[([^\[\]]*)\]")
@@ -104,7 +104,7 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     time_unit = None
     if time is not None and time not in table.names:
         name, colon, unit = time.rpartition(":")
-        if colon and (name in table.names or fits(unit, "s")):
+        if colon and (name in table.names or is_of_kind(unit, "s")):
             time, time_unit = name, unit
     at = table.axis(time, TIME_NAMES, "s")
     if time_unit is not None and units.factor(time_unit, "s") != units.factor(table.units[at] or time_unit, "s"):
@@ -122,7 +122,7 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     instants = read[at]
     if instants is None or not np.all(np.isfinite(instants)):
         row = 0 if instants is None else int(np.argmin(np.isfinite(instants)))
-        text = str(table.numbers[row, at]) if table.numbers is not None else shown(table.columns[at][row])
+        text = str(table.numbers[row, at]) if table.numbers is not None else cell_text(table.columns[at][row])
         raise InputError(
             f"{path}:{table.lines[row]}: {text} in the time column {table.names[at]!r}; "
             f"every instant must be a finite number{instead_of(text)}"
@@ -146,9 +146,9 @@ def _of_mat(path: Path, time: str | None) -> Series:
     """The columns of a MAT file that are as long as its time."""
     mat = read_columns(path)
     name, unit = time or "", ""
-    if time is not None and named(time, mat.columns, mat.spellings) not in mat.columns:
+    if time is not None and find_column(time, mat.columns, mat.spellings) not in mat.columns:
         name, _, unit = time.rpartition(":")
-    at = named(name, mat.columns, mat.spellings)
+    at = find_column(name, mat.columns, mat.spellings)
     if time is None:
         at = next((name for name in mat.columns if name.lower() in TIME_NAMES), "")
     if at not in mat.columns:
@@ -156,7 +156,7 @@ def _of_mat(path: Path, time: str | None) -> Series:
         problem = f"no column {time!r}" if time else "which column is the time? It is called time or t, or name it"
         raise InputError(
             f"{path}: {problem}, for example {first}:s, or map all columns of a drive's record; there is "
-            f"{few([*mat.columns], 20)}"
+            f"{shorten_list([*mat.columns], 20)}"
         )
     known = mat.units[at]
     if unit and known and units.factor(unit, "s") != units.factor(known, "s"):

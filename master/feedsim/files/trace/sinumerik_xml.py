@@ -21,16 +21,16 @@ from feedsim.files import source
 from feedsim.files.trace.response import Complexes, FrequencyResponse
 from feedsim.files.trace.scopes import Signals, unique
 from feedsim.files.trace.trace import Array
-from feedsim.foundation.errors import Finding, InputError, few
-from feedsim.foundation.units import known_unit, spelled
+from feedsim.foundation.errors import Finding, InputError, shorten_list
+from feedsim.foundation.units import known_unit, spell_unit
 
 SUFFIX = ".xml"
 ALPHABET = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
-NOTHING = 9.2188684372274e18  # and above: no value, the bits of an infinity as a whole number
+NO_VALUE_LIMIT = 9.2188684372274e18  # and above: no value, the bits of an infinity as a whole number
 MAX_TRACE_BYTES = 256 << 20  # bytes of a file
 
 
-class _Plain(ElementTree.TreeBuilder):
+class _PlainTreeBuilder(ElementTree.TreeBuilder):
     """Of files without a document type, which is where entities grow."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
@@ -38,7 +38,7 @@ class _Plain(ElementTree.TreeBuilder):
 
 
 def _root(path: Path) -> ElementTree.Element:
-    parser = ElementTree.XMLParser(target=_Plain())
+    parser = ElementTree.XMLParser(target=_PlainTreeBuilder())
     try:
         parser.feed(source.content(path, MAX_TRACE_BYTES))
         root: ElementTree.Element = parser.close()
@@ -94,26 +94,28 @@ def _trace(path: Path, root: ElementTree.Element, frame: ElementTree.Element) ->
             f"{path}: row (rec) {back[0] + 2} of traceData: the time {after:.9g} follows {before:.9g}; it must increase"
         )
     with np.errstate(invalid="ignore"):
-        table[np.abs(table) >= NOTHING] = np.nan
+        table[np.abs(table) >= NO_VALUE_LIMIT] = np.nan
     short = {name.rpartition("/")[2] for name in names}
     titles = unique(_title(name.rpartition("/")[2] if len(short) == len(names) else name) for name in names)
     notes = []
     known = np.isfinite(table)
     if empty := [title for title, rows_of in zip(titles, known.T, strict=True) if not rows_of.any()]:
-        notes.append(Finding("channel-empty", "doubt", f"{path}: {few(empty, 4)}: no value is recorded", str(path)))
+        notes.append(
+            Finding("channel-empty", "doubt", f"{path}: {shorten_list(empty, 4)}: no value is recorded", str(path))
+        )
     whole = [k for k in range(len(titles)) if known[:, k].any()]
     first = max(int(np.argmax(known[:, k])) for k in whole) if whole else 0
     if not whole or first > len(rows) - 2:
         raise InputError(f"{path}: its signals have no rows in common")
     if slow := [titles[k] for k in whole if not known[first:, k].all()]:
-        text = f"{path}: {few(slow, 4)}: sampled less often; values are kept until the next one"
+        text = f"{path}: {shorten_list(slow, 4)}: sampled less often; values are kept until the next one"
         notes.append(Finding("channel-resampled", "doubt", text, str(path)))
     columns, result = {"time": time[first:]}, {"time": "s"}
     for k in whole:
         last = np.maximum.accumulate(np.where(known[:, k], np.arange(len(rows)), 0))
         columns[titles[k]] = table[last, k][first:]
         unit = units[k]
-        result[titles[k]] = spelled(unit) if unit and known_unit(unit) else ""
+        result[titles[k]] = spell_unit(unit) if unit and known_unit(unit) else ""
         if unit and not result[titles[k]]:
             text = f"{path}: {titles[k]} is in {unit!r}, a unit that is not known"
             notes.append(Finding("unit-unknown", "doubt", text, str(path)))

@@ -15,8 +15,8 @@ from typing import IO, TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.foundation.errors import InputError, OutputError, UnknownName, few, nearest
-from feedsim.foundation.installation import need
+from feedsim.foundation.errors import InputError, OutputError, UnknownName, find_nearest_name, shorten_list
+from feedsim.foundation.installation import require_module
 
 if TYPE_CHECKING:
     import pandas
@@ -100,7 +100,7 @@ class Table:
 
 def release(*arrays: Array) -> None:
     """Give back the memory that the pages of mapped arrays have taken; they stay readable. Others are left alone."""
-    for mapped in {id(mapping): mapping for array in arrays if (mapping := _mapping(array)) is not None}.values():
+    for mapped in {id(mapping): mapping for array in arrays if (mapping := _memory_map(array)) is not None}.values():
         if hasattr(mapped, "madvise"):  # not on Windows
             mapped.madvise(mmap.MADV_DONTNEED)
 
@@ -128,7 +128,7 @@ def least_and_largest(values: Array) -> tuple[float, float]:
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 
-def _mapping(array: Array) -> mmap.mmap | None:
+def _memory_map(array: Array) -> mmap.mmap | None:
     base: object = array
     while isinstance(base, np.ndarray):
         base = base.base
@@ -152,7 +152,7 @@ class Columns(Generic[Values]):
         try:
             return self.columns[name]
         except KeyError:
-            raise UnknownName(f"no {self.kind} {name!r}{suggest(name, self.columns)}") from None
+            raise UnknownName(f"no {self.kind} {name!r}{suggest_name(name, self.columns)}") from None
 
     def __contains__(self, name: object) -> bool:
         return name in self.columns
@@ -246,12 +246,12 @@ class Trace(TimeColumns):
 
         InputError for a pattern that matches nothing.
         """
-        kept = matching(self.columns, patterns)
+        kept = match_names(self.columns, patterns)
         return Trace(self.time, {name: self.columns[name] for name in kept}, {name: self.units[name] for name in kept})
 
     def to_pandas(self) -> pandas.DataFrame:
         """A DataFrame over time [s]; units in ``.attrs["units"]``. Raises InputError where pandas is not installed."""
-        frames = need("pandas", "a DataFrame")
+        frames = require_module("pandas", "a DataFrame")
         table = frames.DataFrame(dict(self.columns), index=frames.Index(self.time, name="time [s]"))
         table.attrs["units"] = dict(self.units)
         return table
@@ -269,7 +269,7 @@ def matches(name: str, pattern: str) -> bool:
     return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
-def matching(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
+def match_names(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
     """Names that match any of the glob patterns, in their order; a name that is given as it is means itself alone.
 
     InputError for a pattern that matches nothing.
@@ -278,7 +278,7 @@ def matching(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
     for pattern in patterns:
         result = {pattern} if pattern in names else {name for name in names if matches(name, pattern)}
         if not result:
-            raise InputError(f"no column matches {pattern!r}{suggest(pattern, names)}")
+            raise InputError(f"no column matches {pattern!r}{suggest_name(pattern, names)}")
         wanted |= result
     return [name for name in names if name in wanted]
 
@@ -299,19 +299,19 @@ def check_unit(unit: str) -> str:
     return unit
 
 
-def suggest(name: str, known: Iterable[str]) -> str:
+def suggest_name(name: str, known: Iterable[str]) -> str:
     """'; did you mean ...?' or the list of what there is, as the tail of a message."""
     names = [str(item) for item in known]
-    if near := nearest(name, names):
+    if near := find_nearest_name(name, names):
         return f"; did you mean {near!r}?"
-    return f"; there is {few(names, 12) or 'none'}"
+    return f"; there is {shorten_list(names, 12) or 'none'}"
 
 
 # magnitudes of recorded values: squares and products of three stay numbers
 MAX_MAGNITUDE, MIN_MAGNITUDE = 1e100, 1e-100
 
 
-def recorded(values: Array) -> tuple[Array, NDArray[np.bool_]]:
+def recordable_values(values: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Values as a record may hold them, and which of them it may not: no finite number, or beyond MAX_MAGNITUDE.
 
     What is below MIN_MAGNITUDE is zero: no sensor resolves it, and a quotient by it would be no number.

@@ -11,7 +11,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from feedsim.motions.part_program.expressions import FUNCTIONS, Scanner, Value, calculate, equal, rounded, whole
+from feedsim.motions.part_program.expressions import (
+    FUNCTIONS,
+    Scanner,
+    Value,
+    calculate,
+    equal,
+    round_half_away,
+    whole_number,
+)
 from feedsim.motions.part_program.geometry import Arc, arc_about, arc_of_radius, arc_tangent, sine
 from feedsim.motions.part_program.interpreter import MAX_CALLS, MAX_REPEATED
 from feedsim.motions.part_program.recorder import ARC, MAX_COORDINATE, Corner, Fault, Options, Recorder
@@ -28,11 +36,11 @@ _COORDINATE = re.compile(r"(I?)(PR|PA|[XYZUVWABC])(?=[ \t]*[-+.\dQ])")
 _FEED = re.compile(r"F[ \t]*(MAX|AUTO|(?=[-+.\dQ]))")
 _NO_COMPENSATION = re.compile(r"R0(?![\d.])")
 _COMPENSATION = re.compile(r"R[LR]|R[-+](?=[ \t]|$)")
-_ASSIGNED = re.compile(r"(?:FN[ \t]*0[ \t]*:[ \t]*)?Q(\d{1,4})[ \t]*=")
+_ASSIGNMENT = re.compile(r"(?:FN[ \t]*0[ \t]*:[ \t]*)?Q(\d{1,4})[ \t]*=")
 _FUNCTION = re.compile(r"FN[ \t]*(\d+)[ \t]*:")
-_NOTED = frozenset({"BLK", "TOOL", "STOP", "END"})
+_NOTED_WORDS = frozenset({"BLK", "TOOL", "STOP", "END"})
 _MOVES = frozenset({"L", "LP", "C", "CR", "CP", "CT", "CTP"})
-_REFUSED = {
+_REFUSAL_REASONS = {
     **dict.fromkeys(("APPR", "DEP"), "approach and departure are not supported: write out their movements"),
     **dict.fromkeys(("FL", "FC", "FLT", "FCT", "FPOL", "FSELECT"), "free contour programming is not supported"),
     **dict.fromkeys(("PLANE", "FUNCTION"), "inclined planes and functions are not supported"),
@@ -146,7 +154,7 @@ class Conversational:
         scan.at = at
         if not scan.rest() or scan.rest()[0] in "*%":
             return ""
-        assigned = scan.take(_ASSIGNED)
+        assigned = scan.take(_ASSIGNMENT)
         if assigned:
             self.parameters[int(assigned[1])] = scan.number(f"Q{assigned[1]}")
             return self._ended(scan, "")
@@ -183,10 +191,10 @@ class Conversational:
             self._tool(scan)
         elif word == "CYCL":
             self._cycle(scan)
-        elif word in _NOTED:
+        elif word in _NOTED_WORDS:
             self.recorder.note(word)
         else:
-            raise Fault(word, _REFUSED.get(word, "the word is not understood"))
+            raise Fault(word, _REFUSAL_REASONS.get(word, "the word is not understood"))
         return ""
 
     @staticmethod
@@ -280,7 +288,7 @@ class Conversational:
             at, line = self._place(scan)
             times = 0
             if scan.accept("REP"):
-                times = whole(rounded(self._number(scan, "REP")), "REP")
+                times = whole_number(round_half_away(self._number(scan, "REP")), "REP")
                 if scan.accept("/"):
                     self._number(scan, "REP")
                 if not 0 <= times <= MAX_REPETITIONS:

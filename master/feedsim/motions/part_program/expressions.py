@@ -19,7 +19,7 @@ NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?")
 NAME = re.compile(r"[A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z]\d*")
 SPACE = re.compile(r"[ \t]*")
 TEXT = re.compile(r'"([^"]*)"')
-CODED = re.compile(r"'(?:H([0-9A-F]{1,12})|B([01]{1,48}))'")  # 'H1F', 'B101'
+CODED_NUMBER = re.compile(r"'(?:H([0-9A-F]{1,12})|B([01]{1,48}))'")  # 'H1F', 'B101'
 OPERATOR = re.compile(r"==|<>|>=|<=|<<|[-+*/<>]|(?:DIV|MOD|AND|OR|XOR|B_AND|B_OR|B_XOR)(?![A-Z0-9_])")
 ISO_OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE")
 MAX_DEPTH = 40  # of parentheses and functions
@@ -57,13 +57,13 @@ def compare(operator: str, a: Value, b: Value) -> bool:
             ">=": a > b or same, "<=": a < b or same}[operator]  # fmt: skip
 
 
-def whole(value: float, word: str) -> int:
+def whole_number(value: float, word: str) -> int:
     if value != math.floor(value) or abs(value) > MAX_NUMBER:
         raise Fault(word, f"{value:g} is no whole number")
     return int(value)
 
 
-def rounded(value: float) -> float:
+def round_half_away(value: float) -> float:
     """To the next whole number, halves away from 0."""
     return math.copysign(math.floor(abs(value) + 0.5), value) if abs(value) < MAX_NUMBER else value
 
@@ -89,11 +89,11 @@ def calculate(operator: str, a: float, b: float, iso: bool) -> float:
         if operator == "MOD":
             return math.fmod(a, b) % b if iso else math.fmod(a, b)
         return a / b if operator == "/" else float(math.trunc(a / b))
-    p, q = whole(a, operator), whole(b, operator)
+    p, q = whole_number(a, operator), whole_number(b, operator)
     return float(p & q if operator == "B_AND" else p | q if operator == "B_OR" else p ^ q)
 
 
-def _limited(name: str, function: Callable[[float], float], least: float, most: float) -> Callable[..., float]:
+def _limit_argument(name: str, function: Callable[[float], float], least: float, most: float) -> Callable[..., float]:
     def checked(x: float) -> float:
         if not least <= x <= most:
             limits = f"{least:g} or more" if most == math.inf else f"{least:g} to {most:g}"
@@ -124,14 +124,14 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
     "SIN": (1, sine),
     "COS": (1, lambda x: sine(x + 90.0) if x % 90 == 0 else math.cos(math.radians(math.remainder(x, 360.0)))),
     "TAN": (1, _tangent),
-    "ASIN": (1, _limited("ASIN", lambda x: math.degrees(math.asin(x)), -1.0, 1.0)),
-    "ACOS": (1, _limited("ACOS", lambda x: math.degrees(math.acos(x)), -1.0, 1.0)),
+    "ASIN": (1, _limit_argument("ASIN", lambda x: math.degrees(math.asin(x)), -1.0, 1.0)),
+    "ACOS": (1, _limit_argument("ACOS", lambda x: math.degrees(math.acos(x)), -1.0, 1.0)),
     "ATAN2": (2, lambda y, x: math.degrees(math.atan2(y, x))),
-    "SQRT": (1, _limited("SQRT", math.sqrt, 0.0, math.inf)),
+    "SQRT": (1, _limit_argument("SQRT", math.sqrt, 0.0, math.inf)),
     "ABS": (1, abs),
     "POT": (1, lambda x: x * x),
     "TRUNC": (1, math.trunc),
-    "ROUND": (1, rounded),
+    "ROUND": (1, round_half_away),
     "ROUNDUP": (1, math.ceil),
     "LN": (1, _log),
     "EXP": (1, math.exp),
@@ -164,7 +164,7 @@ class Variable:
         if self.kind == "BOOL":
             return bool(value)
         if self.kind in ("INT", "CHAR"):
-            result = rounded(float(value))
+            result = round_half_away(float(value))
             if not -(2.0**31) <= result < 2.0**31:
                 raise Fault(word, f"{value:g} is beyond the range of {self.kind}")
             return result
@@ -255,11 +255,11 @@ class Scanner:
                     raise Fault(operator, f"{operator} binds tighter than comparisons: put each side in parentheses")
             elif operator in COMPARISONS and was_comparison:
                 raise Fault(operator, "two comparisons in a row: put one in parentheses")
-            left = self._combined(operator, left, right)
+            left = self._combine_values(operator, left, right)
             self._comparison = operator in COMPARISONS
         return left
 
-    def _combined(self, operator: str, left: Value, right: Value) -> Value:
+    def _combine_values(self, operator: str, left: Value, right: Value) -> Value:
         if operator == "<<":
             joined = "".join(v if isinstance(v, str) else f"{float(v):.10g}" for v in (left, right))
             if len(joined) > MAX_TEXT:
@@ -322,7 +322,7 @@ class Scanner:
         text = self.take(TEXT)
         if text:
             return text[1]
-        coded = self.take(CODED)
+        coded = self.take(CODED_NUMBER)
         if coded:
             return float(int(coded[1], 16) if coded[1] else int(coded[2], 2))
         begun = self.at
@@ -338,16 +338,16 @@ class Scanner:
             operand = self.value(name, 11)
             if isinstance(operand, str):
                 raise Fault(name, "a text cannot be negated")
-            return not operand if name == "NOT" else float(~whole(float(operand), name))
+            return not operand if name == "NOT" else float(~whole_number(float(operand), name))
         if name in FUNCTIONS:
-            return self._called(name, *FUNCTIONS[name])
+            return self._call_function(name, *FUNCTIONS[name])
         variable = self.read(self, name)
         if variable is None:
             self.at = begun
             raise Fault(name, "the variable is not defined")
         return variable
 
-    def _called(self, name: str, count: int, function: Callable[..., float]) -> float:
+    def _call_function(self, name: str, count: int, function: Callable[..., float]) -> float:
         self.expect("(", name)
         arguments = [self.number(name)]
         while self.accept(","):
@@ -394,7 +394,7 @@ class Scanner:
         return None
 
     def index(self, word: str) -> int:
-        return whole(rounded(self.number(word)), word)
+        return whole_number(round_half_away(self.number(word)), word)
 
     def indices(self, word: str) -> tuple[int, ...]:
         """[i] or [i, j] after a name; () where there is none."""

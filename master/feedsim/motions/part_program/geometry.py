@@ -300,7 +300,7 @@ def corner_angle(first: Element, second: Element) -> float:
     return math.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
 
 
-def rounding(first: Element, second: Element, radius: float) -> tuple[Point, Point, Arc]:
+def rounding_arc(first: Element, second: Element, radius: float) -> tuple[Point, Point, Arc]:
     """Arc of a radius tangent to both elements: its ends, on the first and the second one, and itself."""
     arcs = []
     for sense in (1, -1):

@@ -12,16 +12,25 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feedsim.motions.part_program.expressions import NAME, Scanner, Value, Variable, badly_written, rounded, whole, zero
+from feedsim.motions.part_program.expressions import (
+    NAME,
+    Scanner,
+    Value,
+    Variable,
+    badly_written,
+    round_half_away,
+    whole_number,
+    zero,
+)
 from feedsim.motions.part_program.movements import Movements
 from feedsim.motions.part_program.recorder import Fault, Recorder
 from feedsim.motions.part_program.source import Place, Program
 from feedsim.motions.part_program.words import (  # fmt: skip
     FRAMES,
     NAMED_CODES,
-    NOTED,
     NOTED_VALUES,
     NOTED_WITH_ARGUMENTS,
+    NOTED_WORDS,
     VALUES,
     WITH_WAY,
     refusal_of,
@@ -40,11 +49,11 @@ _PLAIN_BLOCK = {
 }
 _PLAIN_WORD = re.compile(_WORD)
 _ADDRESS = re.compile(r"([A-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)")
-_ASSIGNED = re.compile(r"([A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z]\d*)[ \t]*=(?!=)")
-_INDEXED = re.compile(r"([A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z])[ \t]*(?=\[)")
+_ASSIGNMENT = re.compile(r"([A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z]\d*)[ \t]*=(?!=)")
+_INDEXED_NAME = re.compile(r"([A-Z_$][A-Z_$][A-Z0-9_$]*|[A-Z])[ \t]*(?=\[)")
 _LABEL = re.compile(r"([A-Z_][A-Z0-9_]*)[ \t]*:(?!=)")
 _SKIP = re.compile(r"/\d?(?!\d)")
-_NUMBERED = re.compile(r"(?:N|:)[ \t]*\d+(?![.\d]|[ \t]*=)")
+_BLOCK_NUMBER = re.compile(r"(?:N|:)[ \t]*\d+(?![.\d]|[ \t]*=)")
 _WAY = re.compile(r"(?:IC|AC|DC|ACP|ACN|CAC|CIC|CDC|CACP|CACN)(?=[ \t]*\()")
 _GOTO = re.compile(r"(GOTO[BFC]?)(?![A-Z0-9_])")
 _TARGET = re.compile(r"N\d+|[A-Z_][A-Z0-9_]*|:\d+")
@@ -55,7 +64,7 @@ _ISO_COMMENT = re.compile(r"\([^()\n]*\)")
 
 
 @dataclass
-class Called:
+class SubprogramCall:
     """A subprogram that is being executed: its variables, loops that count, arguments, and where they came from."""
 
     variables: dict[str, Variable]
@@ -81,20 +90,38 @@ class Interpreter:
         )
         self.places = self.movements.places
         self.parameters: dict[int, float] = {}
-        self.calls = [Called({}, {})]
+        self.calls = [SubprogramCall({}, {})]
         self.program: Program | None = None
         self.flow: Place | str | None = None  # jump, "return" or "end", after the block
         self.repeated = 0
         self.changes = 0  # of variables: a loop in which nothing changes does not end
         self.passed: dict[tuple[int, int], int] = {}  # jump back -> changes when it was last made
         self.control = {
-            "IF": self._if, "ELSE": self._else, "ENDIF": self._nothing, "WHILE": self._while, "ENDWHILE": self._back,
-            "LOOP": self._nothing, "ENDLOOP": self._back, "FOR": self._for, "ENDFOR": self._end_for,
-            "REPEAT": self._repeat, "REPEATB": self._repeat, "UNTIL": self._until, "CASE": self._case,
-            "GOTO": self._goto, "GOTOF": self._goto, "GOTOB": self._goto, "GOTOC": self._goto, "GOTOS": self._goto,
-            "DEF": self._def, "PROC": self._proc, "EXTERN": self._skip_rest, "RET": self._return,
-            "CALL": self._call_text, "EXTCALL": self._call_text,
-        }  # fmt: skip
+            "IF": self._if,
+            "ELSE": self._else,
+            "ENDIF": self._mark_place,
+            "WHILE": self._while,
+            "ENDWHILE": self._jump_back,
+            "LOOP": self._mark_place,
+            "ENDLOOP": self._jump_back,
+            "FOR": self._for,
+            "ENDFOR": self._end_for,
+            "REPEAT": self._repeat,
+            "REPEATB": self._repeat,
+            "UNTIL": self._until,
+            "CASE": self._case,
+            "GOTO": self._goto,
+            "GOTOF": self._goto,
+            "GOTOB": self._goto,
+            "GOTOC": self._goto,
+            "GOTOS": self._goto,
+            "DEF": self._def,
+            "PROC": self._proc,
+            "EXTERN": self._skip_rest,
+            "RET": self._return,
+            "CALL": self._call_text,
+            "EXTCALL": self._call_text,
+        }
 
     # --- Blocks, one after the other ---------------------------------------------------------------------------------
 
@@ -150,7 +177,7 @@ class Interpreter:
     def finish(self) -> None:
         self.movements.finish()
 
-    def _uncommented(self, text: str) -> str:
+    def _strip_comment(self, text: str) -> str:
         """A block without its comment; a ; in a text is none."""
         if ";" in text:
             quoted = False
@@ -168,7 +195,7 @@ class Interpreter:
 
     def block(self, text: str) -> None:
         """A block with more than letters and numbers."""
-        text = self._uncommented(text).strip()
+        text = self._strip_comment(text).strip()
         if not text or self._is_mark(text):
             return
         scan = Scanner(text, self._read_iso if self.iso else self._read, self.iso)
@@ -176,9 +203,9 @@ class Interpreter:
             if self.skip:
                 return
             self.recorder.note("/")
-        if scan.take(_NUMBERED) and not self.iso:
+        if scan.take(_BLOCK_NUMBER) and not self.iso:
             scan.skip_space()
-            if _NUMBERED.match(scan.text, scan.at):
+            if _BLOCK_NUMBER.match(scan.text, scan.at):
                 raise Fault("N", "the block number stands twice")
         if self.iso:
             self._iso_words(scan)
@@ -217,9 +244,9 @@ class Interpreter:
                 raise Fault("(", "a comment in parentheses is not closed")
             scan.at = end + 1
             return True
-        match = scan.take(_ASSIGNED)
+        match = scan.take(_ASSIGNMENT)
         if match:
-            self._assigned(scan, match[1], words)
+            self._read_assignment(scan, match[1], words)
             return True
         match = scan.take(_ADDRESS)
         if match and match[1] == "L":
@@ -230,14 +257,14 @@ class Interpreter:
         if match:
             self._address(scan, match, words)
             return True
-        match = scan.take(_INDEXED)
-        if match and match[1] not in NOTED:
+        match = scan.take(_INDEXED_NAME)
+        if match and match[1] not in NOTED_WORDS:
             self._assign_indexed(scan, match[1])
             return True
         match = match or scan.take(NAME)
         if not match:
             raise Fault(scan.rest().split()[0][:20], "the word is not understood")
-        return self._named(scan, match[0].strip(), words)
+        return self._read_word(scan, match[0].strip(), words)
 
     def _address(self, scan: Scanner, match: re.Match[str], words: list[tuple[str, Any]]) -> None:
         name, number = match[1], match[2]
@@ -249,7 +276,7 @@ class Interpreter:
             raise Fault(f"{name}{number},", "a decimal point is expected, not a comma")
         words.append((name, scan.finite(float(number.replace("EX", "E")), name)))
 
-    def _assigned(self, scan: Scanner, name: str, words: list[tuple[str, Any]]) -> None:
+    def _read_assignment(self, scan: Scanner, name: str, words: list[tuple[str, Any]]) -> None:
         """NAME= value: an axis, a value of the block, an R parameter or a variable."""
         if name not in self.places and (name in self.variables or (name[0] == "R" and name[1:].isdigit())):
             self._assign(scan, name, ())
@@ -281,7 +308,7 @@ class Interpreter:
             return
         raise self.movements.unknown_word(name)
 
-    def _named(self, scan: Scanner, name: str, words: list[tuple[str, Any]]) -> bool:
+    def _read_word(self, scan: Scanner, name: str, words: list[tuple[str, Any]]) -> bool:
         """A word of letters without a value."""
         if name in self.control:
             if words:
@@ -302,7 +329,7 @@ class Interpreter:
         if name in NAMED_CODES:
             words.append(("code", name))
             return True
-        if name in NOTED:
+        if name in NOTED_WORDS:
             self.recorder.note(name)
             if name in NOTED_WITH_ARGUMENTS:
                 if scan.rest()[:1] in ("(", "["):
@@ -425,7 +452,7 @@ class Interpreter:
 
     # --- Branches and loops ------------------------------------------------------------------------------------------
 
-    def _nothing(self, scan: Scanner, word: str) -> None:
+    def _mark_place(self, scan: Scanner, word: str) -> None:
         """Stands for a place alone: LOOP, ENDIF."""
 
     def _skip_rest(self, scan: Scanner, word: str) -> None:
@@ -459,7 +486,7 @@ class Interpreter:
         if not scan.condition(word):
             self.flow = self._partner()
 
-    def _back(self, scan: Scanner, word: str) -> None:
+    def _jump_back(self, scan: Scanner, word: str) -> None:
         self.flow = self._partner()
 
     def _until(self, scan: Scanner, word: str) -> None:
@@ -467,7 +494,7 @@ class Interpreter:
             self.flow = self._partner()
 
     def _for(self, scan: Scanner, word: str) -> None:
-        match = scan.take(_ASSIGNED)
+        match = scan.take(_ASSIGNMENT)
         if not match or not (match[1] in self.variables or re.fullmatch(r"R\d+", match[1])):
             raise Fault(word, f"a variable is expected before {scan.rest() or 'the end of the block'}: FOR I = 1 TO 10")
         first = scan.number(word)
@@ -543,7 +570,7 @@ class Interpreter:
         """P=3 or P3; 1 where it is not there."""
         if not scan.take(_REPEATS):
             return 1
-        number = whole(rounded(scan.number(word)), "P")
+        number = whole_number(round_half_away(scan.number(word)), "P")
         if not 0 <= number <= 9999:
             raise Fault("P", f"{number} repetitions; 0 to 9999 are allowed")
         return number
@@ -581,7 +608,7 @@ class Interpreter:
             raise Fault(names[-1], "the section ends before it begins")
         here = self.here
         for _ in range(times):
-            self._enter(Called(self.variables, {}), word)
+            self._enter(SubprogramCall(self.variables, {}), word)
             self.changes += 1
             ended = self.run(program, *begin, stop)
             self.calls.pop()
@@ -693,7 +720,7 @@ class Interpreter:
             raise Fault(word, "the name of a program is expected, as a text")
         self._call(re.sub(r"^.*[/\\]|\.[A-Z]{3}$", "", name.strip().upper()), scan)
 
-    def _enter(self, call: Called, word: str) -> None:
+    def _enter(self, call: SubprogramCall, word: str) -> None:
         if len(self.calls) > MAX_CALLS:
             raise Fault(word, f"more than {MAX_CALLS} levels of subprograms and repetitions: does it call itself?")
         self.calls.append(call)
@@ -710,7 +737,7 @@ class Interpreter:
             raise Fault(name, f"the call has arguments, but {program.name} has no PROC")
         here = self.here
         for _ in range(times):
-            self._enter(Called({}, {}, list(arguments)), name)
+            self._enter(SubprogramCall({}, {}, list(arguments)), name)
             before = self.movements.saved()
             self.changes += 1
             ended = self.run(program, 0, 1, len(program.code))
@@ -745,7 +772,7 @@ class Interpreter:
             raise Fault(
                 "#", "the number of a parameter is expected; names and parameters of parameters are not supported"
             )
-        index = _parameter(match[0]) if match else whole(scan.number("#"), "#")
+        index = _parameter(match[0]) if match else whole_number(scan.number("#"), "#")
         if not 0 < index < 5000:
             raise Fault(f"#{index}", "parameters #1 to #4999 are known; those beyond are the control's")
         return index
@@ -789,7 +816,7 @@ class Interpreter:
         assert self.program
         if "P" not in values:
             raise Fault("M98", "the number of the subprogram is missing: P")
-        number, times = whole(values.pop("P"), "P"), whole(values.pop("L", 1.0), "L")
+        number, times = whole_number(values.pop("P"), "P"), whole_number(values.pop("L", 1.0), "L")
         if not 0 <= times <= 9999:
             raise Fault("L", f"{times} repetitions; 0 to 9999 are allowed")
         places = self.program.numbered.get(str(number))
@@ -805,7 +832,7 @@ class Interpreter:
                 )
             program, at, line = other, 0, 1
         for _ in range(times):
-            self._enter(Called({}, {}), "M98")
+            self._enter(SubprogramCall({}, {}), "M98")
             ended = self.run(program, at, line, len(program.code))
             self.calls.pop()
             self._spend(max(program.code.count("\n", at), 1))

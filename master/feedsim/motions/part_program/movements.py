@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from feedsim.motions.part_program.expressions import whole
+from feedsim.motions.part_program.expressions import whole_number
 from feedsim.motions.part_program.geometry import (  # fmt: skip
     IDENTITY,
     MIN_DISTANCE,
@@ -39,7 +39,7 @@ from feedsim.motions.part_program.words import (  # fmt: skip
     Blending,
     Modal,
     refusal_of,
-    spelled,
+    spell_code,
 )
 
 MAX_FEED = 1e9  # as programmed
@@ -188,7 +188,7 @@ class Movements:
             spelling, code = value, NAMED_CODES[value]
         else:
             match = self.codes.get(value) if isinstance(value, float) else None
-            spelling = spelled(value) if isinstance(value, float) else "G"
+            spelling = spell_code(value) if isinstance(value, float) else "G"
             if match is None:
                 reason = self.refused.get(value, "the G code is not known")
                 if not self.iso and value not in self.refused and (value in ISO_CODES or value in ISO_REFUSED):
@@ -672,7 +672,7 @@ class Movements:
         name = "P" if self.iso else "TURN"
         if name not in values:
             return 0
-        turns = whole(self._plain(values, name) or 0.0, name) - self.iso
+        turns = whole_number(self._plain(values, name) or 0.0, name) - self.iso
         if not 0 <= turns <= 999:
             raise Fault(name, f"{turns} additional turns; 0 to 999 are allowed")
         return turns

@@ -26,7 +26,7 @@ from feedsim.motions.part_program.geometry import (  # fmt: skip
     corner_angle,
     cross,
     dot,
-    rounding,
+    rounding_arc,
     unit,
 )
 from feedsim.motions.part_program.words import Motion, Moves, Note, row_type
@@ -229,7 +229,7 @@ class Recorder:
         if corner.word in ("CHF", "CHR"):
             a, b = chamfer(first, second, *((corner.size, 0.0) if corner.leg else (0.0, corner.size)))
         else:
-            a, b, round_ = rounding(first, second, corner.size)
+            a, b, round_ = rounding_arc(first, second, corner.size)
             normal = cross(u, v)
             inserted = (in_space(round_.centre)[:3], tuple(round_.sense * x for x in normal), round_.angle)
         cut = list(row)

@@ -171,7 +171,7 @@ _COMMON: dict[float, Code] = {
     97: ("kind of spindle speed", "", None),
 }
 _TOOL_RADIUS = "tool radius compensation is not supported: program the path of the tool's centre (G40)"
-_TAPPING = "threads and tapping follow the spindle, which is not simulated"
+_TAPPING_REASON = "threads and tapping follow the spindle, which is not simulated"
 _CYCLE = "cycles are not supported: write out their movements"
 
 SINUMERIK_CODES: Mapping[float, Code] = {
@@ -212,13 +212,13 @@ ISO_CODES: Mapping[float, Code] = {
     98: ("retract", "", None),
     99: ("retract", "", None),
 }
-_REFUSED: dict[float, str] = {
+_REFUSAL_REASONS: dict[float, str] = {
     **dict.fromkeys((41, 42, 41.1, 42.1), _TOOL_RADIUS),
-    **dict.fromkeys((33, 34, 35, 63, 331, 332, 33.1), _TAPPING),
+    **dict.fromkeys((33, 34, 35, 63, 331, 332, 33.1), _TAPPING_REASON),
     **dict.fromkeys((96, 961, 971, 962), "constant cutting speed needs the spindle, which is not simulated"),
 }
 SINUMERIK_REFUSED: Mapping[float, str] = {
-    **_REFUSED,
+    **_REFUSAL_REASONS,
     **dict.fromkeys((74, 75), "the reference or fixed point of the machine is not known: program the position (G53)"),
     **dict.fromkeys((25, 26), "limits of the working area and the spindle are not supported"),
     **dict.fromkeys((58, 59), "axial substitution of the programmable offset is not supported: use TRANS, ATRANS"),
@@ -229,7 +229,7 @@ SINUMERIK_REFUSED: Mapping[float, str] = {
     **dict.fromkeys((68, 69, 810, 811), "the code is not supported"),
 }
 ISO_REFUSED: Mapping[float, str] = {
-    **_REFUSED,
+    **_REFUSAL_REASONS,
     **dict.fromkeys((28, 30, 28.1, 30.1), "the reference position is not known: program the position (G53)"),
     **dict.fromkeys((73, 74, 76, *range(81, 90)), _CYCLE),
     **dict.fromkeys((10, 52, 92, 92.1, 92.2, 92.3), "offsets that a program sets are not supported"),
@@ -263,7 +263,7 @@ NOTED_WITH_ARGUMENTS = frozenset({
     "MSG", "SETAL", "WAITM", "INIT", "START", "WRTPR", "FGROUP", "LIMS", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND",
     "WORKPIECE", "SETMS",
 })  # fmt: skip
-NOTED = NOTED_WITH_ARGUMENTS | {
+NOTED_WORDS = NOTED_WITH_ARGUMENTS | {
     "STOPRE", "STARTFIFO", "STOPFIFO", "FIFOCTRL", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH",
     "DYNPREC", "NORM", "KONT", "KONTC", "KONTT", "CUT2D", "CUT2DF", "CFC", "CFTCP", "CFIN", "WALIMON", "WALIMOF",
     "SBLON", "SBLOF", "DISPLON", "DISPLOF", "WAITS", "FENDNORM", "FENDP", "UPATH", "SPATH", "TRAFOOF", "ORIWKS",
@@ -306,5 +306,5 @@ def refusal_of(name: str) -> str | None:
     return None
 
 
-def spelled(code: float) -> str:
+def spell_code(code: float) -> str:
     return f"G{code:.10g}" if math.isfinite(code) else f"G{code}"

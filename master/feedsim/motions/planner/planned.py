@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedsim.foundation import installation
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.installation import fmus_directory, mend, shipped
+from feedsim.foundation.installation import fmus_directory, repair_advice, shipped
 from feedsim.motions.part_program import Moves
 
 # --- The path planner's library (``src/planner``), called by ctypes ---------------------------------------------------
@@ -99,7 +99,7 @@ def load() -> ctypes.CDLL:
             return library
         reasons.append(library)
     why = "; ".join(dict.fromkeys(reasons))
-    raise InputError(f"NC programs are planned by a library of C, which is missing here: {why}; {mend('it')}")
+    raise InputError(f"NC programs are planned by a library of C, which is missing here: {why}; {repair_advice('it')}")
 
 
 # --- Rows of an NC program -> the motion along them within the limits of every axis. Equations: docs/theory.md --------
@@ -166,7 +166,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledPath:
     """At T instants: position (T, A) [m]; row (T,), the row of the program; s (T,), place on the programmed path [m]
     from its beginning."""
 
@@ -224,7 +224,7 @@ class PlannedPath:
     _program: Program = field(repr=False)
     _lock: Lock = field(default_factory=Lock, repr=False)
 
-    def sample(self, t: ArrayLike) -> Sampled:
+    def sample(self, t: ArrayLike) -> SampledPath:
         """Position and place on the programmed path at ascending instants ``t`` (T,) [s].
 
         Raises:
@@ -233,7 +233,7 @@ class PlannedPath:
         at, position = self._at(t)
         row, s = np.empty(len(at), np.int64), np.empty(len(at))
         self._call(at, position, row, s, None, None, None, None)
-        return Sampled(position, row, s)
+        return SampledPath(position, row, s)
 
     def derivatives(self, t: ArrayLike) -> Derivatives:
         """Velocity, acceleration and jerk at ascending instants ``t`` (T,) [s], in closed form."""

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.report.formatting import BLUE, MUTED, PALETTE, SUPERSCRIPTS, Array, minus, named
+from feedsim.report.formatting import BLUE, MUTED, PALETTE, SUPERSCRIPTS, Array, colour_name, minus
 
 # --- What the page and the SVG draw alike: sizes [pixels], dashes, steps of ticks. The page's script is handed
 #     LAYOUT
@@ -28,24 +28,24 @@ SECOND = 34.0  # above them, of a second scale
 HEIGHT, ROUND, GAP = 235.0, 520.0, 18.0  # of a panel without what is below, of a polar one, between columns
 ROW, CELL_WITH_NUMBER, CELL_WITH_NAME = 24.0, 30.0, 12.0  # of a grid: height; least widths
 SCALE_STEPS, SCALE_STEP = 12, 10.0  # of a grid without numbers: colours of its scale, and the width of each
-SLANTED = 4.8  # that a letter of a slanted name takes across
+SLANTED_LETTER_WIDTH = 4.8  # that a letter of a slanted name takes across
 LINE_PITCH = 1.15  # from line to line of words, in heights of a letter
 LETTER = 6.3  # of words over curves
 BLOCK = 4  # how finely a panel is looked at for room
 LEADER = 24.0  # distance of a label from its point from which a line leads to it
 FILL, BAND = 0.5, 0.18  # opacity of filled areas and bands
 DEPTH = 0.75  # opacity of the deepest cell
-CLOSED = 0.02  # of the outermost ring: ends of a turn as close as this are one
-NEXT = 0.05  # sine of half the angle between the ends of a turn, at most
+CLOSED_TURN_GAP = 0.02  # of the outermost ring: ends of a turn as close as this are one
+END_ANGLE_SINE = 0.05  # sine of half the angle between the ends of a turn, at most
 FAINT = 0.4  # opacity of faint curves
 RING_GAPS = {1: 0.36, 2: 0.24}  # between rings, by their number to either side; the programmed circle's radius is 1
-OUTER = 1.16  # outermost radius, in gaps beyond the outermost ring
+OUTER_RADIUS = 1.16  # outermost radius, in gaps beyond the outermost ring
 DASHES = {"": "", "dashed": "6 3", "dotted": "2 3"}
-ROOM = 0.07  # of their range, above and below the curves
+CURVE_MARGIN = 0.07  # of their range, above and below the curves
 MIN_TICKS, TICK_WIDTH, TICK_HEIGHT = 3, 74.0, 34.0
 MAX_DIGITS = 7  # of a tick; with more, what ticks have in common stands at the axis
 PHASES = (15, 30, 45, 90, 180, 360, 720, 1440)
-NARROWEST = 4e-9  # span against the largest value: 4 nm of 1 m
+MIN_RELATIVE_SPAN = 4e-9  # span against the largest value: 4 nm of 1 m
 # Unit -> factors and units in which its values are written where their ticks would have powers of ten, coarse to fine.
 UNITS_WITH_PREFIX = {
     "m": ((1, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm")), "mm": ((1e-3, "m"), (1, "mm"), (1e3, "µm"), (1e6, "nm")),
@@ -134,7 +134,7 @@ class Curve:
         """The same curve in at most ``most`` rows (and its ends), keeping the extremes of every bin."""
         if len(self.x) <= self.most:
             return self
-        rows = extremes(self.y, self.most) if self.ascending else along(self.x, self.y, self.most)
+        rows = extremes(self.y, self.most) if self.ascending else loop_rows(self.x, self.y, self.most)
         return replace(self, x=self.x[rows], y=self.y[rows])
 
 
@@ -284,7 +284,7 @@ def extremes(y: Array, most: int) -> NDArray[np.intp]:
     return np.unique(np.concatenate(keep))
 
 
-def along(x: Array, y: Array, most: int) -> NDArray[np.intp]:
+def loop_rows(x: Array, y: Array, most: int) -> NDArray[np.intp]:
     """Rows of a loop: the extremes of both coordinates in every bin, and the ends of its pieces, in their order."""
     gaps = np.flatnonzero(~np.isfinite(x))
     ends = np.clip(np.concatenate([gaps - 1, gaps, gaps + 1]), 0, len(x) - 1)
@@ -312,7 +312,7 @@ QUANTISATION_STEPS = 2**31 - 1  # to either side of the middle; one more is no n
 BLOCK_ROWS = 256  # rows; chart_use.js knows it, too
 
 
-def embedded(charts: Mapping[str, Chart]) -> str:
+def embed_charts(charts: Mapping[str, Chart]) -> str:
     """JSON of charts by their stems, for an element of a page: nothing in it ends the element."""
     pool = _Pool()
     content = {
@@ -404,15 +404,22 @@ def _curve(curve: Curve, pool: _Pool, panel: Panel | None = None) -> dict[str, A
     kept = curve.thinned()
     x, y = (None, None) if panel is None else (panel.x, panel.y)
     return {
-        "name": kept.name, "x": pool(kept.x, x), "y": pool(kept.y, y), "colour": named(kept.colour), "dash": kept.dash,
-        "width": kept.width, "dots": kept.dots, "faint": kept.faint, "filled": kept.filled,
+        "name": kept.name,
+        "x": pool(kept.x, x),
+        "y": pool(kept.y, y),
+        "colour": colour_name(kept.colour),
+        "dash": kept.dash,
+        "width": kept.width,
+        "dots": kept.dots,
+        "faint": kept.faint,
+        "filled": kept.filled,
         "ascending": kept.ascending,
-    }  # fmt: skip
+    }
 
 
 def _level(level: Level) -> dict[str, Any]:
     ends = list(level.ends) if level.ends is not None else None
-    return {"at": level.at, "text": level.text, "upright": level.upright, "colour": named(level.colour),
+    return {"at": level.at, "text": level.text, "upright": level.upright, "colour": colour_name(level.colour),
             "dash": level.dash, "ends": ends}  # fmt: skip
 
 
@@ -422,13 +429,13 @@ def _band(band: Band, pool: _Pool, panel: Panel) -> dict[str, Any]:
     return {
         "name": band.name,
         "x": None if band.x is None else pool(band.x, panel.x),
-        "colour": named(band.colour),
+        "colour": colour_name(band.colour),
         **edges,
     }
 
 
 def _mark(mark: Mark) -> dict[str, Any]:
-    return {"x": mark.x, "y": mark.y, "text": mark.text, "colour": named(mark.colour), "hollow": mark.hollow}
+    return {"x": mark.x, "y": mark.y, "text": mark.text, "colour": colour_name(mark.colour), "hollow": mark.hollow}
 
 
 # --- What a panel shows at first: the ranges of its axes, and the ticks along them. The page's script does the same ---
@@ -471,20 +478,20 @@ class Ticks:
 
 def ranges(panel: Panel) -> tuple[Range, Range]:
     """Abscissae and ordinates that are shown: as the axes say, else those of curves and marks, with room about them."""
-    across = panel.x.span or _whole(panel)
+    across = panel.x.span or _whole_range(panel)
     return across, panel.y.span or _heights(panel, across)
 
 
-def _whole(panel: Panel) -> Range:
-    low, high = spans([_shown(panel.x, curve.x) for curve in panel.curves]) or (0.0, 1.0)
+def _whole_range(panel: Panel) -> Range:
+    low, high = spans([_drawable_values(panel.x, curve.x) for curve in panel.curves]) or (0.0, 1.0)
     return (low, high) if high > low else (low - 0.5, low + 0.5)
 
 
 def _heights(panel: Panel, across: Range) -> Range:
     axis = panel.y
-    heights = [_seen(curve, across) for curve in panel.curves]
+    heights = [_visible_values(curve, across) for curve in panel.curves]
     heights.append(np.array([mark.y for mark in panel.marks if across[0] <= mark.x <= across[1]]))
-    result = spans([_shown(axis, height) for height in heights])
+    result = spans([_drawable_values(axis, height) for height in heights])
     if result is None:
         return (0.1, 10.0) if axis.log else (-1.0, 1.0)
     low, high = result
@@ -492,24 +499,24 @@ def _heights(panel: Panel, across: Range) -> Range:
         return low / 1.3, high * 1.3
     if axis.symlog:  # room in the measure of the axis, on either side of zero
         more = 0.0 if high > low else axis.symlog
-        return low - 3 * ROOM * abs(low) - more, high + 3 * ROOM * abs(high) + more
-    if high > low and high - low < (least := NARROWEST * max(abs(low), abs(high))):
+        return low - 3 * CURVE_MARGIN * abs(low) - more, high + 3 * CURVE_MARGIN * abs(high) + more
+    if high > low and high - low < (least := MIN_RELATIVE_SPAN * max(abs(low), abs(high))):
         low, high = (low + high - least) / 2, (low + high + least) / 2
-    room = ROOM * (high - low) or 0.05 * abs(high) or 1.0
+    room = CURVE_MARGIN * (high - low) or 0.05 * abs(high) or 1.0
     on_ground = low == 0 and any(curve.filled for curve in panel.curves)
     return low - (0.0 if on_ground else room), high + room
 
 
-def _shown(axis: Axis, values: Array) -> Array:
+def _drawable_values(axis: Axis, values: Array) -> Array:
     return np.where(values > 0, values, np.nan) if axis.log else values
 
 
-def _seen(curve: Curve, span: Range) -> Array:
+def _visible_values(curve: Curve, span: Range) -> Array:
     inside = curve.y[(curve.x >= span[0]) & (curve.x <= span[1])]
     return np.append(inside, 0.0) if curve.filled else inside
 
 
-def measured(axis: Axis, values: Array | float) -> Array:
+def axis_measure(axis: Axis, values: Array | float) -> Array:
     """Values in the measure of an axis, which is linear on paper; not finite where a logarithmic axis has none."""
     values = np.asarray(values, dtype=float)
     if axis.symlog:  # linear within this distance from zero
@@ -558,12 +565,12 @@ def _marks(axis: Axis, span: Range, most: float) -> Ticks:
         if turns
         else round_step((high - low) / most)
     )
-    while (count := _marked(span, step)) < MIN_TICKS:  # one or two ticks are no scale
+    while (count := _count_marks(span, step)) < MIN_TICKS:  # one or two ticks are no scale
         finer = _finer(step, turns)
-        if not finer or (count > 1 and _marked(span, finer) > most + 2):
+        if not finer or (count > 1 and _count_marks(span, finer) > most + 2):
             break
         step = finer
-    return _stepped(axis, span, step)
+    return _step_ticks(axis, span, step)
 
 
 def _both_ways(within: float, span: Range) -> list[tuple[float, str]]:
@@ -591,7 +598,7 @@ def round_step(rough: float) -> float:
     return decade * next((entry for entry in (1, 2, 5) if entry * decade >= 0.999 * rough), 10)
 
 
-def _marked(span: Range, step: float) -> int:
+def _count_marks(span: Range, step: float) -> int:
     return math.floor(span[1] / step + 1e-9) - math.ceil(span[0] / step - 1e-9) + 1
 
 
@@ -603,7 +610,7 @@ def _finer(step: float, turns: bool) -> float:
     return decade * {1: 0.5, 2: 1, 5: 2}[round(step / decade)]
 
 
-def _stepped(axis: Axis, span: Range, step: float) -> Ticks:
+def _step_ticks(axis: Axis, span: Range, step: float) -> Ticks:
     """Ticks a step apart, with as many digits as the step asks for."""
     low, high = span
     power = math.floor(math.log10(step) + 1e-9)
@@ -632,7 +639,7 @@ def tick_text(value: float, digits: int = 6) -> str:
     return minus(f"{mantissa}×10{str(int(power)).translate(SUPERSCRIPTS)}")
 
 
-def apart(found_of: Callable[[int], Ticks], place: Callable[[float], float], most: int, end: float) -> Ticks:
+def separate_ticks(found_of: Callable[[int], Ticks], place: Callable[[float], float], most: int, end: float) -> Ticks:
     """Ticks whose texts do not touch: fewer of them, in the end every second one without its text.
 
     found_of: ticks of which there are some number; place: where a value stands [pixels]; end: of the last text.

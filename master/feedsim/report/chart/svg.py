@@ -18,16 +18,17 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.foundation.installation import ask
+from feedsim.foundation.installation import require_extras
 from feedsim.report.chart.model import (
     BAND,
     BLOCK,
     BOTTOM,
     CELL_WITH_NAME,
     CELL_WITH_NUMBER,
-    CLOSED,
+    CLOSED_TURN_GAP,
     DASHES,
     DEPTH,
+    END_ANGLE_SINE,
     FAINT,
     FILL,
     GAP,
@@ -36,15 +37,14 @@ from feedsim.report.chart.model import (
     LEFT,
     LETTER,
     LINE_PITCH,
-    NEXT,
-    OUTER,
+    OUTER_RADIUS,
     RIGHT,
     ROUND,
     ROW,
     SCALE_STEP,
     SCALE_STEPS,
     SECOND,
-    SLANTED,
+    SLANTED_LETTER_WIDTH,
     TICK_HEIGHT,
     TICK_WIDTH,
     TOP,
@@ -60,17 +60,28 @@ from feedsim.report.chart.model import (
     Polar,
     Range,
     Ticks,
-    along,
-    apart,
+    axis_measure,
     extremes,
-    measured,
+    loop_rows,
     ranges,
     round_step,
+    separate_ticks,
     tick_text,
     ticks,
 )
 from feedsim.report.chart.model import MOST_ROWS as MOST_IN_PAGE
-from feedsim.report.formatting import BLUE, GRID, INK, MUTED, PAGE_COLOURS, VERMILLION, Array, minus, named, three
+from feedsim.report.formatting import (
+    BLUE,
+    GRID,
+    INK,
+    MUTED,
+    PAGE_COLOURS,
+    VERMILLION,
+    Array,
+    colour_name,
+    minus,
+    three_digits,
+)
 
 # --- A polar panel of an SVG: deviations about the programmed circle, with rings and the directions of the plane ------
 
@@ -85,7 +96,7 @@ BOLD = 'font-weight="600"'
 
 def fill(colour: str) -> str:
     """A colour of the palette as a page's variable."""
-    return f"var(--{named(colour)})"
+    return f"var(--{colour_name(colour)})"
 
 
 def text(x: float, y: float, words: str, look: str = "", colour: str = INK, anchor: str = "start") -> str:
@@ -96,13 +107,13 @@ def text(x: float, y: float, words: str, look: str = "", colour: str = INK, anch
     return f'<text x="{x:.1f}" y="{y:.1f}" fill="{fill(colour)}"{side} {look}>{escape(words)}</text>'
 
 
-def turned(x: float, y: float, words: str, angle: float, look: str = "") -> str:
+def turned_text(x: float, y: float, words: str, angle: float, look: str = "") -> str:
     """Words turned about (x, y)."""
     place = f'transform="translate({x:.1f} {y:.1f}) rotate({angle:g})"'
     return f'<text {place} fill="{fill(INK)}" {look}>{escape(words)}</text>' if words else ""
 
 
-def heading(words: str, x: float, room: float) -> str:
+def panel_heading(words: str, x: float, room: float) -> str:
     """The title of a panel, as small as its room makes it."""
     size = min(12.0, 12 * room / (7.6 * len(words) or 1))
     return text(x, 15, words, BOLD + (f' font-size="{size:.1f}"' if size < 12 else ""))
@@ -151,7 +162,7 @@ def draw_polar(panel: Polar, width: float, height: float, clip: str) -> str:
     gap = panel.gap
     half = min(width, height - 24) / 2 - 20
     cx, cy, reach = width / 2, 24 + (height - 24) / 2, panel.ring * panel.rings
-    outer = 1 + OUTER * gap * panel.rings
+    outer = 1 + OUTER_RADIUS * gap * panel.rings
     one = half / outer
     step = round_step(reach / 2.4)
     count = math.floor(reach / step + 1e-9)
@@ -179,8 +190,8 @@ def draw_polar(panel: Polar, width: float, height: float, clip: str) -> str:
             continue
         away = one * np.clip(1 + gap * deviation / panel.ring, 0.0, 2 * outer)
         # Not with start or stop in it, and no arc.
-        turned = abs(math.sin((angle[-1] - angle[0]) / 2)) < NEXT
-        closed = "Z" if turned and abs(deviation[-1] - deviation[0]) < CLOSED * reach else ""
+        turned = abs(math.sin((angle[-1] - angle[0]) / 2)) < END_ANGLE_SINE
+        closed = "Z" if turned and abs(deviation[-1] - deviation[0]) < CLOSED_TURN_GAP * reach else ""
         way = path(cx + away * np.cos(angle), cy - away * np.sin(angle))
         parts.append(f'<path d="{way}{closed}" {stroke(curve)}/>')
     parts.append("</g>")
@@ -188,7 +199,7 @@ def draw_polar(panel: Polar, width: float, height: float, clip: str) -> str:
         at = radius(k * step) * math.sqrt(0.5)
         words = f"{'+' if k > 0 else ''}{tick_text(k * step)} µm" if k else "0"
         parts.append(text(cx + at, cy - at + 4, words, HALO.replace('"11"', '"10.5"', 1), MUTED, "middle"))
-    inside = one * (1 - OUTER * gap)
+    inside = one * (1 - OUTER_RADIUS * gap)
     for mark in panel.marks:
         right, up = math.cos(mark.x), math.sin(mark.x)
         r = radius(mark.y)
@@ -239,7 +250,7 @@ def width_of(text: str) -> float:
     return LETTER * max(map(len, text.split("\n"))) + 2
 
 
-class Covered:
+class CoveredSquares:
     """A panel in small squares: which of them curves and words cover."""
 
     def __init__(self, inner: Box) -> None:
@@ -301,7 +312,7 @@ class Covered:
 
 
 MOST_ROWS = 400  # of a curve: two for a pixel or so
-Scaled = Callable[[Array | float], Array]  # values to pixels
+PixelScale = Callable[[Array | float], Array]  # values to pixels
 
 
 @dataclass(frozen=True)
@@ -318,7 +329,7 @@ class Frame:
         return replace(self, left=left)
 
 
-def above(panel: Panel) -> float:
+def room_above(panel: Panel) -> float:
     """Room above the curves."""
     return TOP + (SECOND if panel.x.also is not None else 0)
 
@@ -326,7 +337,7 @@ def above(panel: Panel) -> float:
 def frame_of(panel: Panel, box: Box, aside: float) -> Frame:
     """For a box on paper. aside: room at the right."""
     across, up = ranges(panel)
-    tall = box[3] - above(panel) - BOTTOM
+    tall = box[3] - room_above(panel) - BOTTOM
     names, most = panel.y.names, len(panel.y.names) or max(2, int(tall / TICK_HEIGHT))
     heights = ticks(panel.y, up, most)
     beside = max((6.6 * len(name) + (26 if names else 30) for name in names or heights.texts), default=0.0)
@@ -343,16 +354,16 @@ def frame_of(panel: Panel, box: Box, aside: float) -> Frame:
 def draw_panel(panel: Panel, box: Box, frame: Frame, aside: float, clip: str) -> str:
     """The panel in its box; aside: room at the right; clip: an id of its own."""
     _, _, width, height = box
-    inner: Box = (frame.left, above(panel), width - frame.left - aside, height - above(panel) - BOTTOM)
+    inner: Box = (frame.left, room_above(panel), width - frame.left - aside, height - room_above(panel) - BOTTOM)
     left, top, wide, tall = inner
     right, bottom = left + wide, top + tall
     across = _scale(panel.x, frame.across, left, right)
     up = _scale(panel.y, frame.up, bottom, top)
     begin = 0.0 if panel.y.names else max(0.0, min(left, width - 7.4 * len(panel.title)))
-    parts = [heading(panel.title, begin, width - begin), *_axes(panel, frame, inner, across, up, box)]
+    parts = [panel_heading(panel.title, begin, width - begin), *_axes(panel, frame, inner, across, up, box)]
     inside: list[str] = []
     has_words = bool(panel.note or any(mark.text for mark in panel.marks) or any(level.text for level in panel.levels))
-    covered = Covered(inner) if has_words else None
+    covered = CoveredSquares(inner) if has_words else None
     inside += [_band(band, frame.across, across, up, bottom) for band in panel.bands]
     inside += [_level(level, inner, across, up) for level in panel.levels]
     for curve in sorted(panel.curves, key=lambda curve: not curve.dots):  # a line through its points, not below them
@@ -373,18 +384,18 @@ def draw_panel(panel: Panel, box: Box, frame: Frame, aside: float, clip: str) ->
     ])  # fmt: skip
 
 
-def _scale(axis: Axis, span: Range, first: float, last: float) -> Scaled:
-    low, high = (float(measured(axis, value)) for value in span)
+def _scale(axis: Axis, span: Range, first: float, last: float) -> PixelScale:
+    low, high = (float(axis_measure(axis, value)) for value in span)
     per = (last - first) / ((high - low) or 1.0)
-    return lambda values: np.asarray(first + (measured(axis, values) - low) * per)
+    return lambda values: np.asarray(first + (axis_measure(axis, values) - low) * per)
 
 
-def _axes(panel: Panel, frame: Frame, inner: Box, across: Scaled, up: Scaled, box: Box) -> list[str]:
+def _axes(panel: Panel, frame: Frame, inner: Box, across: PixelScale, up: PixelScale, box: Box) -> list[str]:
     """Grid, ticks and names of the axes, on all sides that have a scale."""
     (left, top, wide, tall), (_, _, width, height) = inner, box
     right, bottom, parts = left + wide, top + tall, []
     most = max(2, int(wide / max([TICK_WIDTH, *(7 * len(name) + 14 for name in panel.x.names)])))
-    along = apart(lambda n: ticks(panel.x, frame.across, n), lambda at: float(across(at)), most, width)
+    along = separate_ticks(lambda n: ticks(panel.x, frame.across, n), lambda at: float(across(at)), most, width)
     ways: dict[bool, list[str]] = {True: [], False: []}  # of the grid: with a text, and without
     for at, words in along.marks:
         x = float(across(at))
@@ -406,7 +417,7 @@ def _axes(panel: Panel, frame: Frame, inner: Box, across: Scaled, up: Scaled, bo
     if panel.x.also is not None:
         axis, factor = _second(panel.x)
         span = (frame.across[0] * factor, frame.across[1] * factor)
-        result = apart(lambda n: ticks(axis, span, n), lambda at: float(across(at / factor)),
+        result = separate_ticks(lambda n: ticks(axis, span, n), lambda at: float(across(at / factor)),
                       max(2, int(wide / TICK_WIDTH)), math.inf)  # fmt: skip
         parts += [text(float(across(at / factor)), top - 5, words, anchor="middle") for at, words in result.marks]
         parts.append(text(left + wide / 2, top - 20, result.title(axis), anchor="middle"))
@@ -435,10 +446,12 @@ def _upright(words: str, x: float, inner: Box, most: float, *, right: bool = Fal
     size = max(8.0, min(12.0, 12 * most / (6.4 * max(map(len, lines), default=1))))
     look = 'text-anchor="middle"' + (f' font-size="{size:.1f}"' if size < 12 else "")
     pitch, first = LINE_PITCH * size, 1 - len(lines) if right else (1 - len(lines)) / 6
-    return "".join(turned(x + pitch * (k + first), top + tall / 2, part, -90, look) for k, part in enumerate(lines))
+    return "".join(
+        turned_text(x + pitch * (k + first), top + tall / 2, part, -90, look) for k, part in enumerate(lines)
+    )
 
 
-def _band(band: Band, span: Range, across: Scaled, up: Scaled, bottom: float) -> str:
+def _band(band: Band, span: Range, across: PixelScale, up: PixelScale, bottom: float) -> str:
     x = np.array(span) if band.x is None else band.x
     low, high = (np.broadcast_to(np.asarray(edge, dtype=float), x.shape) for edge in (band.low, band.high))
     rows = extremes(high, MOST_ROWS) if len(x) > MOST_ROWS else slice(None)
@@ -448,7 +461,7 @@ def _band(band: Band, span: Range, across: Scaled, up: Scaled, bottom: float) ->
     return f'<path d="{outline}Z" fill="{fill(band.colour)}" fill-opacity="{BAND}"/>'
 
 
-def _level(level: Level, inner: Box, across: Scaled, up: Scaled) -> str:
+def _level(level: Level, inner: Box, across: PixelScale, up: PixelScale) -> str:
     left, top, wide, tall = inner
     at = float((across if level.upright else up)(level.at))
     if not math.isfinite(at):
@@ -460,7 +473,9 @@ def _level(level: Level, inner: Box, across: Scaled, up: Scaled) -> str:
     return line(*points, f'stroke="{fill(level.colour)}"{dash}')
 
 
-def _curve(curve: Curve, panel: Panel, frame: Frame, to: tuple[Scaled, Scaled, float], covered: Covered | None) -> str:
+def _curve(
+    curve: Curve, panel: Panel, frame: Frame, to: tuple[PixelScale, PixelScale, float], covered: CoveredSquares | None
+) -> str:
     """A curve, of what is seen; what it covers is entered."""
     across, up, bottom = to
     x, y = curve.x, curve.y
@@ -470,7 +485,7 @@ def _curve(curve: Curve, panel: Panel, frame: Frame, to: tuple[Scaled, Scaled, f
     # A loop of which the page keeps more rows than usual is one whose shape is looked at closely.
     most = MOST_ROWS if curve.ascending or curve.most == MOST_IN_PAGE else curve.most
     if len(x) > most and not curve.dots:
-        rows = extremes(y, most) if curve.ascending else along(x, y, 2 * most)
+        rows = extremes(y, most) if curve.ascending else loop_rows(x, y, 2 * most)
         x, y = x[rows], y[rows]
     if not len(x):
         return ""
@@ -489,7 +504,12 @@ def _curve(curve: Curve, panel: Panel, frame: Frame, to: tuple[Scaled, Scaled, f
 
 
 def _words(
-    panel: Panel, inner: Box, across: Scaled, up: Scaled, marks: Sequence[tuple[Mark, float, float]], covered: Covered
+    panel: Panel,
+    inner: Box,
+    across: PixelScale,
+    up: PixelScale,
+    marks: Sequence[tuple[Mark, float, float]],
+    covered: CoveredSquares,
 ) -> tuple[list[str], list[str]]:
     """What is said of marks and levels, and the note, where no curve is; and lines from points to words far away."""
     left, top, wide, tall = inner
@@ -501,7 +521,7 @@ def _words(
     for mark, x, y in marks:
         if not mark.text:
             continue
-        a, b = covered.put(mark.text, _beside(x, y, width_of(mark.text), left, right))
+        a, b = covered.put(mark.text, _point_label_places(x, y, width_of(mark.text), left, right))
         words.append(text(a, b, mark.text))
         to = (min(max(x, a), a + width_of(mark.text)), b + 3 if b < y else b - 10)
         if math.hypot(to[0] - x, to[1] - y) > LEADER:
@@ -510,7 +530,7 @@ def _words(
         at = float((across if level.upright else up)(level.at))
         first, last = (left, right) if level.upright else (top, bottom)
         if level.text and first - 1 <= at <= last + 1:
-            places = _along_upright(at, level.text, top, bottom) if level.upright else _along(
+            places = _along_upright(at, level.text, top, bottom) if level.upright else _level_label_places(
                 at, level, left, right, across)  # fmt: skip
             words.append(text(*covered.put(level.text, places), level.text, "", MUTED))
     if panel.note:
@@ -526,7 +546,7 @@ def _words(
     return words, leaders
 
 
-def _beside(x: float, y: float, wide: float, left: float, right: float) -> list[Place]:
+def _point_label_places(x: float, y: float, wide: float, left: float, right: float) -> list[Place]:
     """Places for the label of a point."""
     sides = ((x + 7, 0), (x - 7 - wide, 2), (x - wide / 2, 4), (x - 1.6 * wide, 40), (x + 0.6 * wide, 40))
     return [(min(max(from_, left + 3), right - wide - 3), y - 6 + 13 * k, far + abs(13 * k))
@@ -540,7 +560,7 @@ def _along_upright(x: float, words: str, top: float, bottom: float) -> list[Plac
     return [(side, foot, foot - top + far) for foot in feet for side, far in sides]
 
 
-def _along(y: float, level: Level, left: float, right: float, across: Scaled) -> list[Place]:
+def _level_label_places(y: float, level: Level, left: float, right: float, across: PixelScale) -> list[Place]:
     """Places for the label of a level: above or below it, as far right as may be."""
     begin, end = (min(max(float(across(end)), left), right) for end in level.ends) if level.ends else (left, right)
     last = max(end - 4 - width_of(level.text), left + 4)
@@ -564,10 +584,10 @@ def draw_grid(grid: Grid, width: float) -> str:
     """The grid with its names and its title."""
     left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
     wide, count = width - left - 8, len(grid.columns)
-    cell = min(wide / count, (wide - SLANTED * len(grid.columns[-1])) / (count - 0.5))
-    parts = [heading(grid.title, 4, width - 4)]
+    cell = min(wide / count, (wide - SLANTED_LETTER_WIDTH * len(grid.columns[-1])) / (count - 0.5))
+    parts = [panel_heading(grid.title, 4, width - 4)]
     for j in range(0, count, math.ceil(CELL_WITH_NAME / cell)):
-        parts.append(turned(left + (j + 0.5) * cell, top - 6, grid.columns[j], -40, 'font-size="11"'))
+        parts.append(turned_text(left + (j + 0.5) * cell, top - 6, grid.columns[j], -40, 'font-size="11"'))
     for i, name in enumerate(grid.rows):
         y = top + ROW * i
         parts.append(text(left - 8, y + 16, name, 'font-size="11"', anchor="end"))
@@ -580,7 +600,7 @@ def draw_grid(grid: Grid, width: float) -> str:
             parts.append(rectangle(x, y, cell, ROW, f"{_paint(value, grid)} {edge}"))
             if cell >= CELL_WITH_NUMBER:
                 weight = 'font-weight="700"' if grid.bold is not None and grid.bold[i, j] else ""
-                words = three(value) if grid.decimals is None else minus(f"{value:.{grid.decimals}f}")
+                words = three_digits(value) if grid.decimals is None else minus(f"{value:.{grid.decimals}f}")
                 parts.append(text(x + cell / 2, y + 16, words, f'font-size="11" {weight}', anchor="middle"))
     if grid.best is not None:
         i, j = grid.best
@@ -617,15 +637,17 @@ def _over(grid: Grid) -> float:
 
 
 WIDTH = 960.0
-FLAT = 360.0  # of a panel beside a polar one, at most
+MAX_PANEL_HEIGHT = 360.0  # of a panel beside a polar one, at most
 
 
 def svg(chart: Chart, stem: str, title: str) -> str:
     """Text of the SVG with ids of its own."""
     parts, top = _legend(chart)
-    boxes, height = placed(chart)
+    boxes, height = place_panels(chart)
     frames = {
-        k: frame_of(part, boxes[k], _aside(chart)) for k, part in enumerate(chart.panels) if isinstance(part, Panel)
+        k: frame_of(part, boxes[k], _room_aside(chart))
+        for k, part in enumerate(chart.panels)
+        if isinstance(part, Panel)
     }
     for k, part in enumerate(chart.panels):
         x, y, wide, tall = boxes[k]
@@ -635,14 +657,14 @@ def svg(chart: Chart, stem: str, title: str) -> str:
         elif isinstance(part, Grid):
             drawn = draw_grid(part, wide)
         else:
-            drawn = draw_panel(part, boxes[k], _shared(frames, boxes, k), _aside(chart), name)
+            drawn = draw_panel(part, boxes[k], _shared_frame(frames, boxes, k), _room_aside(chart), name)
         parts.append(f'<g transform="translate({x:g} {y + top:g})">{drawn}</g>')
     box = f"0 0 {WIDTH:g} {height + top:g}"
     head = f'<svg role="img" aria-label="{escape(title)}" class="plot" viewBox="{box}" font-size="12">'
     return head + "".join(parts) + "</svg>"
 
 
-def placed(chart: Chart) -> tuple[list[Box], float]:
+def place_panels(chart: Chart) -> tuple[list[Box], float]:
     """Where every panel goes: boxes, and the height of all."""
     boxes: list[Box] = []
     room = WIDTH - GAP * (len(chart.widths) - 1)
@@ -654,7 +676,7 @@ def placed(chart: Chart) -> tuple[list[Box], float]:
         beside_a_circle = any(isinstance(part, Polar) for part in row)
         for part, wide, own in zip(row, widths, natural, strict=False):
             named = isinstance(part, Panel) and part.y.names
-            lower = min(height, FLAT) if beside_a_circle and isinstance(part, Panel) else height
+            lower = min(height, MAX_PANEL_HEIGHT) if beside_a_circle and isinstance(part, Panel) else height
             boxes.append((x, y, wide, own if named else lower))
             x += wide + GAP
         y += height + 10
@@ -668,16 +690,16 @@ def _height(part: Part, wide: float) -> float:
         return grid_height(part)
     if part.y.names:
         return TOP + BOTTOM + 26 * len(part.y.names)
-    return HEIGHT * part.height + BOTTOM + above(part) - TOP
+    return HEIGHT * part.height + BOTTOM + room_above(part) - TOP
 
 
-def _aside(chart: Chart) -> float:
+def _room_aside(chart: Chart) -> float:
     """Room beside the curves at the right: panels below one another end alike."""
     second = any(isinstance(part, Panel) and part.y.also is not None for part in chart.panels)
     return LEFT if second else RIGHT
 
 
-def _shared(frames: dict[int, Frame], boxes: list[Box], k: int) -> Frame:
+def _shared_frame(frames: dict[int, Frame], boxes: list[Box], k: int) -> Frame:
     """The frame of a panel; those below one another begin alike."""
     left = max(frame.left for j, frame in frames.items() if (boxes[j][0], boxes[j][2]) == (boxes[k][0], boxes[k][2]))
     return frames[k].beginning(left)
@@ -750,17 +772,17 @@ def standalone(drawn: str, title: str, caption: str = "", remark: str = "") -> s
             f'font-family="{escape(FONT)}">')  # fmt: skip
     ground = rectangle(0, 0, wide, tall, 'fill="var(--ground)"')
     body = f'{ground}<g transform="translate({EDGE:g} {EDGE:g})">{"".join(words)}<g transform="translate(0 {y:g})">'
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{coloured(head + body + inside)}</g></g></svg>\n'
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{resolve_colours(head + body + inside)}</g></g></svg>\n'
 
 
-def coloured(drawn: str) -> str:
+def resolve_colours(drawn: str) -> str:
     """An SVG with colours as numbers."""
     return re.sub(r"var\(--(\w+)\)", lambda match: PAGE_COLOURS[match[1]], drawn)
 
 
 def png(drawn: str, pixels: float = PIXELS) -> bytes:
     """An SVG file as PNG, with so many pixels for one of it. Raises MissingPackage."""
-    ask("a drawing", "figures")
+    require_extras("a drawing", "figures")
     from resvg_py import svg_to_bytes
 
     family = "DejaVu Sans"

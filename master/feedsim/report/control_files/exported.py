@@ -9,12 +9,12 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.files.control import Name
 from feedsim.files.control.archive import Archive
-from feedsim.files.control.writing import Written
+from feedsim.files.control.writing import WrittenFiles
 from feedsim.foundation import outputs
 from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, provenance_section
-from feedsim.report.formatting import counted, minus, plain_unit
-from feedsim.report.provenance import hashed, inputs_part
+from feedsim.report.formatting import count_things, minus, plain_unit
+from feedsim.report.provenance import hash_files, inputs_part
 from feedsim.report.results import REPORT, SUMMARY
 from feedsim.scenario.machine import Machine
 
@@ -49,7 +49,7 @@ def sources_section(names: Iterable[Name]) -> Section | None:
 
 SHEET = "sheet.csv"
 MOST_NAMED = 3
-TOUCHED = "No byte of the files differs but those of the values that are listed as written."
+UNTOUCHED_REMARK = "No byte of the files differs but those of the values that are listed as written."
 
 
 def kept_apart(names: Iterable[str]) -> list[str]:
@@ -58,12 +58,12 @@ def kept_apart(names: Iterable[str]) -> list[str]:
     return [f"control_{name}" if name in own else name for name in names]
 
 
-def named(contents: Mapping[str, bytes]) -> dict[str, bytes]:
+def name_contents(contents: Mapping[str, bytes]) -> dict[str, bytes]:
     """Name of the written file -> content."""
     return dict(zip(kept_apart(contents), contents.values(), strict=True))
 
 
-def figures_of(written: Written) -> dict[str, Figure]:
+def figures_of(written: WrittenFiles) -> dict[str, Figure]:
     """How many values differ."""
     done = [change for change in written.changes if change.written]
     return {
@@ -75,7 +75,7 @@ def figures_of(written: Written) -> dict[str, Figure]:
     }
 
 
-def findings(written: Written) -> list[Finding]:
+def findings(written: WrittenFiles) -> list[Finding]:
     """Values to type, and what was not touched."""
     result: list[Finding] = []
     typed = [change for change in written.changes if not change.written]
@@ -85,22 +85,22 @@ def findings(written: Written) -> list[Finding]:
             for change in typed[:MOST_NAMED]
         )
         more = f"; and {len(typed) - MOST_NAMED} more on the sheet" if len(typed) > MOST_NAMED else ""
-        text = f"{counted(len(typed), 'value')} not written: {shown}{more}"
+        text = f"{count_things(len(typed), 'value')} not written: {shown}{more}"
         result.append(Finding("values-to-type", "doubt", text))
     return [*result, *written.notes]
 
 
-def answers(written: Written, axes: Mapping[str, str]) -> list[str]:
+def answers(written: WrittenFiles, axes: Mapping[str, str]) -> list[str]:
     """How many values of each axis were changed."""
     said = []
     for axis, theirs in axes.items():
         own = [change for change in written.changes if change.axis == axis]
         done = sum(change.written for change in own)
-        said.append(f"{axis} ({theirs}): {counted(done, 'value')} changed, {len(own) - done} to type")
+        said.append(f"{axis} ({theirs}): {count_things(done, 'value')} changed, {len(own) - done} to type")
     return said
 
 
-def change_lines(written: Written) -> list[str]:
+def change_lines(written: WrittenFiles) -> list[str]:
     """Every changed value, a line each."""
     return [
         f"{change.axis} {name.number} {name.name}: {change.old} -> {change.new} {plain_unit(name.unit)}".rstrip()
@@ -110,7 +110,7 @@ def change_lines(written: Written) -> list[str]:
     ]
 
 
-def sheet(written: Written) -> str:
+def sheet(written: WrittenFiles) -> str:
     """Old and new values as CSV, in the control's words."""
     heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "written", "reason", "where")
     rows = (
@@ -122,7 +122,11 @@ def sheet(written: Written) -> str:
 
 
 def report_of(
-    archives: Sequence[Archive], written: Written, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path]
+    archives: Sequence[Archive],
+    written: WrittenFiles,
+    machine: Machine,
+    axes: Mapping[str, str],
+    inputs: Sequence[Path],
 ) -> Report:
     """Content of the report."""
     figures = figures_of(written)
@@ -142,18 +146,19 @@ def report_of(
             {"files": [f"{FOLDER}/{archive.name}" for archive in archives], "machine": None},
         ),
         main=[
-            _changes(written, True, "Values that were changed", TOUCHED),
+            _changes(written, True, "Values that were changed", UNTOUCHED_REMARK),
             _changes(written, False, "Values to type", "They are not in the files; the last column says why."),
             sources_section(change.name for change in written.changes),
         ],
         provenance=provenance_section(
-            [("Machine", machine.name), ("Control", archives[0].control)], hashed([("file", path) for path in inputs])
+            [("Machine", machine.name), ("Control", archives[0].control)],
+            hash_files([("file", path) for path in inputs]),
         ),
         footer="The same as a table: sheet.csv. Names and their sources: docs/controls.md.",
     )
 
 
-def _changes(written: Written, done: bool, title: str, note: str) -> Section | None:
+def _changes(written: WrittenFiles, done: bool, title: str, note: str) -> Section | None:
     rows: list[tuple[Text, ...]] = [
         (
             change.axis,
@@ -173,7 +178,9 @@ def _changes(written: Written, done: bool, title: str, note: str) -> Section | N
     return Section(title, [Table("lllrrlllp", heads, rows, note)]) if rows else None
 
 
-def details(written: Written, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path]) -> Mapping[str, Any]:
+def details(
+    written: WrittenFiles, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path]
+) -> Mapping[str, Any]:
     """What summary.json has besides the figures."""
     return {
         "machine": machine.name,
@@ -184,5 +191,5 @@ def details(written: Written, machine: Machine, axes: Mapping[str, str], inputs:
              "where": change.where}
             for change in written.changes
         ],
-        "inputs": inputs_part(hashed([("file", path) for path in inputs])),
+        "inputs": inputs_part(hash_files([("file", path) for path in inputs])),
     }  # fmt: skip

@@ -10,14 +10,14 @@ import numpy as np
 
 from feedsim.analysis import Figure
 from feedsim.files.control.archive import Archive
-from feedsim.files.control.reading import Reading, Refused, Taken
+from feedsim.files.control.reading import Reading, RefusedValue, TakenValue
 from feedsim.foundation import outputs
 from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.control_files.exported import sources_section
-from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
-from feedsim.report.provenance import hashed, inputs_part
-from feedsim.scenario.imported import Imported, place_of, written
+from feedsim.report.formatting import Scale, count_things, minus, plain_unit, scale
+from feedsim.report.provenance import hash_files, inputs_part
+from feedsim.scenario.imported import ImportedMachine, machine_file_value, place_of
 from feedsim.scenario.machine import Machine
 
 SHEET = "sheet.csv"
@@ -26,12 +26,12 @@ MOST_ODD = 20  # lines that were not understood are shown as examples
 MOST_NAMED = 3
 
 
-def doubtful(reading: Reading, made: Imported) -> list[Refused]:
+def doubtful(reading: Reading, made: ImportedMachine) -> list[RefusedValue]:
     """Values that were not taken although they may act."""
     return [entry for entry in (*reading.refused, *made.refused) if entry.weight == "doubt"]
 
 
-def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) -> dict[str, Figure]:
+def figures_of(archives: Sequence[Archive], reading: Reading, made: ImportedMachine) -> dict[str, Figure]:
     """How much of the files was understood."""
     read = sum(len(archive.entries) for archive in archives)
     odd = sum(archive.odd_count for archive in archives)
@@ -48,7 +48,7 @@ def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) ->
     }
 
 
-def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[Finding]:
+def findings(archives: Sequence[Archive], reading: Reading, made: ImportedMachine) -> list[Finding]:
     """What is to be known before the machine file is used."""
     result: list[Finding] = []
     if not made.values:
@@ -57,15 +57,15 @@ def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> l
     result += reading.doubts
     open_ones = doubtful(reading, made)
     if open_ones:
-        shown = "; ".join(_named(open_one) for open_one in open_ones[:MOST_NAMED])
+        shown = "; ".join(_refused_text(open_one) for open_one in open_ones[:MOST_NAMED])
         more = f"; and {len(open_ones) - MOST_NAMED} more in the report" if len(open_ones) > MOST_NAMED else ""
-        text = f"{counted(len(open_ones), 'value')} not taken: {shown}{more}"
+        text = f"{count_things(len(open_ones), 'value')} not taken: {shown}{more}"
         result.append(Finding("values-not-taken", "doubt", text))
     if made.missing:
         first_key = made.missing[0].partition(":")[0]
         result.append(Finding(
             "machine-file-draft", "doubt",
-            f"the machine file is a draft: {counted(len(made.missing), 'key')} missing, the first "
+            f"the machine file is a draft: {count_things(len(made.missing), 'key')} missing, the first "
             f"{first_key}; the head of the file has them all",
             first_key,
         ))  # fmt: skip
@@ -74,7 +74,7 @@ def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> l
             first = archive.odd[0]
             result.append(Finding(
                 "lines-not-understood", "note",
-                f"{archive.name}: {counted(archive.odd_count, 'line')} not understood, the first in line "
+                f"{archive.name}: {count_things(archive.odd_count, 'line')} not understood, the first in line "
                 f"{first.line}: {first.reason}",
                 f"{archive.name}:{first.line}",
             ))  # fmt: skip
@@ -84,42 +84,52 @@ def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> l
     return [*result, *reading.notes]
 
 
-def answers(reading: Reading, made: Imported) -> list[str]:
+def answers(reading: Reading, made: ImportedMachine) -> list[str]:
     """How many values each axis has from the files."""
     per_axis = {axis: [value for value in made.values if value.axis == axis] for axis in reading.axes}
     said = [
-        f"{axis}: {counted(len(own), 'value')} of {_theirs(reading, axis)}"
-        + (f", {_leading(own)}" if _leading(own) else "")
+        f"{axis}: {count_things(len(own), 'value')} of {_control_axis_text(reading, axis)}"
+        + (f", {_leading_values_text(own)}" if _leading_values_text(own) else "")
         for axis, own in per_axis.items()
     ]
     return said
 
 
-def _theirs(reading: Reading, axis: str) -> str:
+def _control_axis_text(reading: Reading, axis: str) -> str:
     lists = ", ".join(reading.places.get(axis, ()))
     return f"{reading.axes[axis]}{f' and {lists}' if lists else ''}"
 
 
-def _leading(own: Sequence[Taken]) -> str:
+def _leading_values_text(own: Sequence[TakenValue]) -> str:
     names = ("drive.K_v", "drive.K_p", "drive.T_n")
     shown = [taken for name in names for taken in own if taken.parameter == name and taken.entry is not None]
     return ", ".join(f"{taken.number} = {taken.text}{f' ({unit})' if (unit := plain_unit(taken.unit)) else ''}"
                      for taken in shown)  # fmt: skip
 
 
-def _named(refused: Refused) -> str:
+def _refused_text(refused: RefusedValue) -> str:
     axis = f"{refused.axis} " if refused.axis else ""
     return f"{axis}{refused.name.number} {refused.name.name} {refused.text[:24]} ({refused.reason})".replace("  ", " ")
 
 
-def sheet(reading: Reading, made: Imported) -> str:
+def sheet(reading: Reading, made: ImportedMachine) -> str:
     """Every value as CSV: taken or not, in the control's words and in ours."""
     heads = ("axis", "number", "name", "value", "unit", "ours", "value in the machine file", "taken", "reason", "where")
     taken = (
-        (value.axis, value.number, value.called, value.text, value.unit, value.parameter, _ours(value), "yes", "",
-         value.where)
+        (
+            value.axis,
+            value.number,
+            value.called,
+            value.text,
+            value.unit,
+            value.parameter,
+            _machine_value_text(value),
+            "yes",
+            "",
+            value.where,
+        )
         for value in made.values
-    )  # fmt: skip
+    )
     refused = (
         (gone.axis, gone.name.number, gone.name.name, gone.text, gone.name.unit, gone.name.parameter, "", "no",
          gone.reason, gone.where)
@@ -128,7 +138,7 @@ def sheet(reading: Reading, made: Imported) -> str:
     return outputs.text_of((heads, *taken, *refused))
 
 
-def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inputs: Sequence[Path]) -> Report:
+def report_of(archives: Sequence[Archive], reading: Reading, made: ImportedMachine, inputs: Sequence[Path]) -> Report:
     """Content of the report."""
     figures = figures_of(archives, reading, made)
     return Report(
@@ -139,30 +149,35 @@ def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inp
         tiles=[
             Tile(f"{int(figures[name].value)}", label, figures[name].meaning)
             for name, label in (
-                ("values.taken", "values taken"), ("values.not_taken", "values not taken"),
+                ("values.taken", "values taken"),
+                ("values.not_taken", "values not taken"),
                 ("lines.not_understood", "lines not understood"),
             )
         ],
         next_step=Step("Look at the machine, then simulate with it", "machine info", {"machine": FOLDER}),
-        main=[_taken(made), _refused(reading, made), _missing(made), _odd(archives), _sources(reading, made)],
-        provenance=provenance_section(
-            [("Control", reading.control)], hashed([("file", path) for path in inputs])
-        ),
+        main=[
+            _taken_section(made),
+            _refused_section(reading, made),
+            _missing_section(made),
+            _unread_lines_section(archives),
+            _sources(reading, made),
+        ],
+        provenance=provenance_section([("Control", reading.control)], hash_files([("file", path) for path in inputs])),
         footer="Every value with its place: sheet.csv and the remarks in machine.yaml. Names: docs/controls.md.",
-    )  # fmt: skip
+    )
 
 
-def _sources(reading: Reading, made: Imported) -> Section | None:
+def _sources(reading: Reading, made: ImportedMachine) -> Section | None:
     refused = (*reading.refused, *made.refused)
     return sources_section([*(value.name for value in made.values), *(entry.name for entry in refused)])
 
 
-def _taken(made: Imported) -> Section | None:
+def _taken_section(made: ImportedMachine) -> Section | None:
     rows: list[tuple[Text, ...]] = [
         (
             value.axis or "machine", code(value.number), value.called,
             minus(f"{value.text} {value.unit}".strip()), code(value.parameter),
-            minus(_ours(value)), _before(made, value), value.where or "–",
+            minus(_machine_value_text(value)), _previous_value_text(made, value), value.where or "–",
             "–" if value.condition else "confirmed" if value.name.confirmed else "not confirmed",
         )
         for value in made.values
@@ -171,9 +186,9 @@ def _taken(made: Imported) -> Section | None:
     return Section("Values that were taken", [Table("lllrlrrll", heads, rows)], "taken") if rows else None
 
 
-def _ours(taken: Taken) -> str:
+def _machine_value_text(taken: TakenValue) -> str:
     """A value as the machine file has it, rounded, and in a unit that reads well."""
-    value = written(taken)
+    value = machine_file_value(taken)
     if isinstance(value, bool):
         return str(value).lower()
     if not isinstance(taken.value, float):
@@ -183,14 +198,14 @@ def _ours(taken: Taken) -> str:
     return f"{taken.value * usual.factor:.6g} {usual.unit}".rstrip()
 
 
-def _before(made: Imported, taken: Taken) -> str:
+def _previous_value_text(made: ImportedMachine, taken: TakenValue) -> str:
     value = made.before.get(place_of(taken))
     if value is None or isinstance(value, dict | list):
         return "–"
     return str(value).lower() if isinstance(value, bool) else minus(str(value))
 
 
-def _refused(reading: Reading, made: Imported) -> Section | None:
+def _refused_section(reading: Reading, made: ImportedMachine) -> Section | None:
     rows: list[tuple[Text, ...]] = [
         (
             entry.axis or "machine",
@@ -208,11 +223,11 @@ def _refused(reading: Reading, made: Imported) -> Section | None:
     return Section("Values that were not taken", [Table("lllrpl", heads, rows)], "not-taken") if rows else None
 
 
-def _missing(made: Imported) -> Section | None:
+def _missing_section(made: ImportedMachine) -> Section | None:
     return Section("What the machine file needs besides", [Bullets(made.missing)], "missing") if made.missing else None
 
 
-def _odd(archives: Sequence[Archive]) -> Section | None:
+def _unread_lines_section(archives: Sequence[Archive]) -> Section | None:
     rows = [(f"{archive.name}:{value.line}", value.reason, code(value.text)) for archive, value in _examples(archives)]
     total = sum(archive.odd_count for archive in archives)
     note = f"The first {len(rows)} of {total}, of each file by turns." if total > len(rows) else ""
@@ -227,7 +242,9 @@ def _examples(archives: Sequence[Archive]) -> Iterator[tuple[Archive, Any]]:
             yield archive, entry
 
 
-def details(archives: Sequence[Archive], reading: Reading, made: Imported, inputs: Sequence[Path]) -> Mapping[str, Any]:
+def details(
+    archives: Sequence[Archive], reading: Reading, made: ImportedMachine, inputs: Sequence[Path]
+) -> Mapping[str, Any]:
     """What summary.json has besides the figures."""
     return {
         "control": reading.control,
@@ -248,5 +265,5 @@ def details(archives: Sequence[Archive], reading: Reading, made: Imported, input
             {"file": archive.name, "line": value.line, "text": value.text, "reason": value.reason}
             for archive, value in _examples(archives)
         ],
-        "inputs": inputs_part(hashed([("file", path) for path in inputs])),
+        "inputs": inputs_part(hash_files([("file", path) for path in inputs])),
     }  # fmt: skip

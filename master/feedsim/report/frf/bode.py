@@ -19,14 +19,14 @@ from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN
 from feedsim.linear.margins import Bandwidth, Margins, Pair
 from feedsim.report import chart
 from feedsim.report.chart import Axis, Chart, Level, Mark, Panel
-from feedsim.report.formatting import GREEN, INK, OTHERWISE, PURPLE, RECORDED, SIMULATED, Array
+from feedsim.report.formatting import ALTERNATIVE_COLOUR, GREEN, INK, PURPLE, RECORDED_COLOUR, SIMULATED_COLOUR, Array
 
 Complexes = NDArray[np.complex128]
 Kind = Literal["closed form", "measured", "overlaid"]
 
 HIGH_COHERENCE = 0.99
-COLOURS = {"closed form": SIMULATED, "measured": OTHERWISE}
-OTHERS = (RECORDED, GREEN, PURPLE)  # of several overlaid curves
+COLOURS = {"closed form": SIMULATED_COLOUR, "measured": ALTERNATIVE_COLOUR}
+OVERLAY_COLOURS = (RECORDED_COLOUR, GREEN, PURPLE)  # of several overlaid curves
 LOWEST_DB = -400.0  # what is exactly zero
 CROSSING_RATIO = 1.01  # crossings closer than this ratio are one
 EDGE = 1e-9  # of a frequency: quotients of times carry rounding
@@ -114,7 +114,7 @@ def bode_chart(
     lowest magnitude shown, in display units.
     """
     span = span or span_of(columns)
-    columns = [within(column, *span) for column in columns]
+    columns = [limit_column(column, *span) for column in columns]
     frequency = Axis("frequency", "Hz", log=True, span=span)
     heights = [(column, curve, ordinate.of(curve.value)) for column in columns for curve in column.curves]
     low_high = chart.spans([height[curve.sure & (height > -300.0)] for _, curve, height in heights])
@@ -130,7 +130,7 @@ def bode_chart(
         turns.append(Panel("", frequency, Axis("phase", "°"), curves, own.phase_levels, marks=own.phase_marks,
                            linked="f", height=0.75))  # fmt: skip
         curves = [
-            _styled(curve, column, curve.frequency, curve.coherence)
+            _style_curve(curve, column, curve.frequency, curve.coherence)
             for curve in column.curves
             if curve.coherence is not None
         ]
@@ -180,12 +180,12 @@ def pair_marks(curve: Curve, pairs: Sequence[Pair]) -> Marks:
     marks = []
     for pair in pairs:
         peak, dip = pair.resonance.frequency, pair.antiresonance.frequency
-        marks.append(Mark(dip, 20 * math.log10(abs(at(curve, dip))), "", INK, hollow=True))
-        marks.append(Mark(peak, 20 * math.log10(abs(at(curve, peak))), f"{dip:.1f} / {peak:.1f}", INK))
+        marks.append(Mark(dip, 20 * math.log10(abs(curve_value(curve, dip))), "", INK, hollow=True))
+        marks.append(Mark(peak, 20 * math.log10(abs(curve_value(curve, peak))), f"{dip:.1f} / {peak:.1f}", INK))
     return Marks([Level(0.0)], marks)
 
 
-def at(curve: Curve, frequency: float) -> complex:
+def curve_value(curve: Curve, frequency: float) -> complex:
     """Value of a curve at a frequency: magnitude interpolated in its logarithm, phase continuously."""
     x = math.log(frequency)
     grid = np.log(curve.frequency)
@@ -227,7 +227,7 @@ def visible(phase: Array, magnitude: Array, floor: float | None) -> Array:
     return np.where(np.arange(len(phase)) <= above[-1], phase, np.nan)
 
 
-def within(column: Column, low: float, high: float) -> Column:
+def limit_column(column: Column, low: float, high: float) -> Column:
     """The parts of the curves between two frequencies; curves that have none are left out."""
     curves = []
     for curve in column.curves:
@@ -262,17 +262,19 @@ def _split(curve: Curve, column: Column, y: Array) -> list[chart.Curve]:
     """A curve, and paler what of it is not sure."""
     sure = curve.sure
     if sure.all():
-        return [_styled(curve, column, curve.frequency, y)]
+        return [_style_curve(curve, column, curve.frequency, y)]
     parts = ((sure, False), (~sure, True))
-    return [_styled(curve, column, curve.frequency[rows], y[rows], faint) for rows, faint in parts if rows.any()]
+    return [_style_curve(curve, column, curve.frequency[rows], y[rows], faint) for rows, faint in parts if rows.any()]
 
 
-def _styled(curve: Curve, column: Column, x: Array, y: Array, faint: bool = False) -> chart.Curve:
+def _style_curve(curve: Curve, column: Column, x: Array, y: Array, faint: bool = False) -> chart.Curve:
     overlaid = [curve for curve in column.curves if curve.kind == "overlaid"]
     if curve.kind == "measured":
         name = f"{curve.label}, low coherence" if faint else curve.label
         return chart.Curve(name, x, y, COLOURS["measured"], width=2.2, dots=True, faint=faint)
-    colour = OTHERS[overlaid.index(curve) % len(OTHERS)] if curve in overlaid else COLOURS["closed form"]
+    colour = (
+        OVERLAY_COLOURS[overlaid.index(curve) % len(OVERLAY_COLOURS)] if curve in overlaid else COLOURS["closed form"]
+    )
     return chart.Curve(curve.label, x, y, colour, "dashed" if curve in overlaid else "", 1.4, faint=faint)
 
 

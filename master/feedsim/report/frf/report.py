@@ -32,12 +32,12 @@ from feedsim.report.formatting import (
     display_unit,
     minus,
     number,
-    remarked,
+    remark_charts,
     typeset,
 )
 from feedsim.report.frf.bode import Ordinate, answers
 from feedsim.report.frf.bode_plots import nearest_to_its_limit, pictures_of
-from feedsim.report.provenance import InputFile, hashed, inputs_part, machine_part, quantity
+from feedsim.report.provenance import InputFile, hash_files, inputs_part, machine_part, quantity
 from feedsim.report.results import Content
 from feedsim.scenario import Drive, Subject
 from feedsim.structure import Modes
@@ -54,7 +54,7 @@ TABLES: tuple[tuple[str, Dash], ...] = (
 )
 MOST_COLUMNS = 3
 SMALLEST_DEVIATION, LARGEST_DEVIATION = 1e-4, 100.0  # dB, of the axis of deviations
-AGREED = 0.1  # dB
+AGREEMENT_TOLERANCE = 0.1  # dB
 PLOTTED_QUANTITIES = (  # stem, title, what is drawn per axis, ordinate
     ("truncation-n_M", "n/M", "{0}.n_a/{0}.M_a", Ordinate("|n_a/M_a|", "dB re 1 (rad/s)/(N·m)")),
     ("truncation-x_M", "x/M", "{0}.x_a/{0}.M_a", Ordinate("|x_a/M_a|", "µm/(N·m)", decibel=False, scale=1e6)),
@@ -122,7 +122,15 @@ def _picture(
         above.append(Panel(heading, frequency, axis, curves, [dropped], linked="f"))
         axis = Axis("deviation", "dB", log=True, span=(SMALLEST_DEVIATION, LARGEST_DEVIATION))
         below.append(
-            Panel("", frequency, axis, off, [dropped, Level(AGREED, f"{AGREED:g} dB")], linked="f", height=0.8)
+            Panel(
+                "",
+                frequency,
+                axis,
+                off,
+                [dropped, Level(AGREEMENT_TOLERANCE, f"{AGREEMENT_TOLERANCE:g} dB")],
+                linked="f",
+                height=0.8,
+            )
         )
     caption = (
         "The structure alone, motors giving torque whatever the speed. Below: deviation of the magnitude from the "
@@ -162,7 +170,7 @@ def draw(responses: Responses) -> list[Picture]:
     """The pictures; each says machine, pose and what its numbers are worth."""
     machine = responses.machine
     pose = ", ".join(f"{axis} {position * 1e3:.6g} mm" for axis, position in machine.pose.items())
-    with remarked(f"{machine.name} at {pose}. {machine.note}"):
+    with remark_charts(f"{machine.name} at {pose}. {machine.note}"):
         pictures = pictures_of(responses)
         if responses.truncation is not None:
             pictures += _truncation_pictures(responses, responses.truncation)
@@ -181,7 +189,7 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         answer=answers(responses),
         tiles=_tiles(responses),
         lead=nearest_to_its_limit(responses),
-        next_step=_next(subject, responses),
+        next_step=_next_step(subject, responses),
         main=[*pictures, _resonances(responses), _agreement(responses), content.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),
         footer=content.figures_footer(
@@ -190,7 +198,7 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
     )
 
 
-def _next(subject: Subject, responses: Responses) -> Step | None:
+def _next_step(subject: Subject, responses: Responses) -> Step | None:
     """The drive tuned within margins, of a scenario; of a machine another gain of the axis nearest to its limit."""
     margins = {
         name.partition(".")[0]: figure.value
@@ -274,7 +282,7 @@ def _provenance(subject: Subject, responses: Responses) -> Section:
         ("Set on the command line", ", ".join(subject.overrides) or "nothing"),
         ("Machine", responses.machine.name),
         ("Closed form", "linear, exact for the sampled system, no friction, no limits"),
-        ("Measurement", _measured(campaign) if campaign else "none"),
+        ("Measurement", _describe_campaign(campaign) if campaign else "none"),
         *(
             (
                 entry.reference,
@@ -290,7 +298,7 @@ def _provenance(subject: Subject, responses: Responses) -> Section:
     )
 
 
-def _measured(campaign: Campaign) -> str:
+def _describe_campaign(campaign: Campaign) -> str:
     plan = campaign.plan
     friction = "friction on" if plan.friction else "friction off"
     moving = f"axis moving at {plan.offset_speed:g} rad/s" if plan.offset_speed else "axes at rest"
@@ -313,7 +321,7 @@ def _truncation_pictures(responses: Responses, truncation: Truncation) -> list[P
 
 def input_files(subject: Subject, responses: Responses) -> list[InputFile]:
     """Files of the scenario or machine, and the curves laid over."""
-    return hashed([*subject.files, *(("overlay", overlay.file) for overlay in responses.overlays)])
+    return hash_files([*subject.files, *(("overlay", overlay.file) for overlay in responses.overlays)])
 
 
 def details(subject: Subject, responses: Responses) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from feedsim.estimation.identify import Identified, friction_file
+from feedsim.estimation.identify import IdentifiedFriction, friction_file
 from feedsim.estimation.identify.friction_file import FRICTION_FILE
 from feedsim.estimation.identify.result import Balance, Correlation, Dynamic, Estimate, Identification, Stretch
 from feedsim.estimation.least_squares import NORMAL_95
@@ -29,21 +29,21 @@ from feedsim.report.content import (
     provenance_section,
 )
 from feedsim.report.formatting import (
+    ALTERNATIVE_COLOUR,
     BLUE,
     GREEN,
     MUTED,
     ORANGE,
-    OTHERWISE,
     PURPLE,
-    RECORDED,
-    SIMULATED,
+    RECORDED_COLOUR,
+    SIMULATED_COLOUR,
     VERMILLION,
     Array,
-    counted,
+    count_things,
     display_unit,
     minus,
     powers,
-    remarked,
+    remark_charts,
     typeset,
 )
 from feedsim.report.identify import stribeck_plots as quantities
@@ -69,10 +69,10 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, MUTED)
 ZEROS = (ZERO, Level(0.0, upright=True, dash=""))
 MOST_RECORDS = 3  # in open loop, side by side
 STRONG = 0.9  # correlation that is printed bold
-Over = Literal["speed", "position"]
+Abscissa = Literal["speed", "position"]
 
 
-def pictures_of(identified: Identified) -> list[Picture]:
+def pictures_of(identified: IdentifiedFriction) -> list[Picture]:
     """All pictures that the stages give."""
     identification = identified.found
     pictures: list[Picture | None] = []
@@ -93,14 +93,14 @@ def pictures_of(identified: Identified) -> list[Picture]:
     return [picture for picture in pictures if picture is not None]
 
 
-def loops_picture(identification: Identification, stage: Dynamic, over: Over) -> Picture | None:
+def loops_picture(identification: Identification, stage: Dynamic, over: Abscissa) -> Picture | None:
     """Measured and model torque of each move, over speed or over position; None where there is no stretch."""
     shown = _distinct(stage.stretches)
     if not shown:
         return None
     columns = 2 if len(shown) == 4 else min(COLUMNS, len(shown))
     remaining = len(stage.stretches) - len(shown)
-    more = f" {counted(remaining, 'further stretch is', 'further stretches are')} not shown." if remaining else ""
+    more = f" {count_things(remaining, 'further stretch is', 'further stretches are')} not shown." if remaining else ""
     about = ", about its middle" if over == "position" else ""
     caption = (
         f"Axis {identification.axis}: motor torque less inertia and known load{about}, with the friction model driven "
@@ -110,15 +110,15 @@ def loops_picture(identification: Identification, stage: Dynamic, over: Over) ->
     for stretch in shown:
         x, axis = _abscissa(stretch, identification.I_P, over)
         curves = [
-            Curve("measured", x, stretch.measured, RECORDED, width=1.9, dots=True, most=2000),
-            Curve("model", x, stretch.model, SIMULATED, width=1.2, most=2000),
+            Curve("measured", x, stretch.measured, RECORDED_COLOUR, width=1.9, dots=True, most=2000),
+            Curve("model", x, stretch.model, SIMULATED_COLOUR, width=1.2, most=2000),
         ]
         panels.append(Panel(describe(stretch, identification.I_P), axis, TORQUE_AXIS, curves, ZEROS))
     chart = Chart(panels, (1.0,) * columns)
     return Picture(f"loops-{over}", f"Friction torque over {over}", caption, chart)
 
 
-def _abscissa(stretch: Stretch, I_P: float, over: Over) -> tuple[Array, Axis]:
+def _abscissa(stretch: Stretch, I_P: float, over: Abscissa) -> tuple[Array, Axis]:
     if over == "speed":
         return stretch.speed, SPEED_AXIS
     scale, unit = _length([stretch], I_P)
@@ -167,7 +167,7 @@ def open_loop_picture(identification: Identification, balance: Balance) -> Pictu
     mm = 1e3 * identification.I_P
     before, end = (mm * rms for rms in balance.position)
     remaining = len(balance.drifts) - len(drifts)
-    more = f" {counted(remaining, 'further record is', 'further records are')} not shown." if remaining else ""
+    more = f" {count_things(remaining, 'further record is', 'further records are')} not shown." if remaining else ""
     fate = "" if balance.applied else " What was tried was not taken."
     caption = (
         f"Axis {identification.axis}: position from the start on, recorded and of a rigid axis that the recorded "
@@ -178,13 +178,15 @@ def open_loop_picture(identification: Identification, balance: Balance) -> Pictu
     above, below = [], []
     for k, drift in enumerate(drifts):
         position = [
-            Curve("recorded", drift.time, mm * drift.angle, RECORDED, width=1.6),
-            Curve("open loop, before", drift.time, mm * (drift.angle - drift.before), OTHERWISE, "dashed", 1.1),
-            Curve(after, drift.time, mm * (drift.angle - drift.after), SIMULATED, width=1.1),
+            Curve("recorded", drift.time, mm * drift.angle, RECORDED_COLOUR, width=1.6),
+            Curve(
+                "open loop, before", drift.time, mm * (drift.angle - drift.before), ALTERNATIVE_COLOUR, "dashed", 1.1
+            ),
+            Curve(after, drift.time, mm * (drift.angle - drift.after), SIMULATED_COLOUR, width=1.1),
         ]
         error = [
-            Curve("open loop, before", drift.time, mm * drift.before, OTHERWISE, "dashed", 1.1),
-            Curve(after, drift.time, mm * drift.after, SIMULATED, width=1.1),
+            Curve("open loop, before", drift.time, mm * drift.before, ALTERNATIVE_COLOUR, "dashed", 1.1),
+            Curve(after, drift.time, mm * drift.after, SIMULATED_COLOUR, width=1.1),
         ]
         above.append(Panel(drift.record, TIME_AXIS, Axis("position", "mm"), position, linked=f"t{k}"))
         below.append(
@@ -243,7 +245,7 @@ def _length(stretches: Sequence[Stretch], I_P: float) -> tuple[float, str]:
 PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
 FILES = (FRICTION_FILE, PLATEAUS, RESIDUALS, OPEN_LOOP)  # besides report.html and summary.json
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
-LEADING = ("F_C", "F_S", "sigma_0", "v_s", "F_log", "sigma_2", "sigma_1", "W", "gamma", "M_0", "J", "delay")
+LEADING_PARAMETERS = ("F_C", "F_S", "sigma_0", "v_s", "F_log", "sigma_2", "sigma_1", "W", "gamma", "M_0", "J", "delay")
 HEADS = ("Parameter", "Meaning", "Value", "Unit", "95 % interval", "±", "At the slide", "Unit", "Remark")
 METHOD = (
     "Stage 1 fits the stationary friction to mean torques at constant speed; stage 2 drives the friction model with "
@@ -257,7 +259,7 @@ OPEN_LOOP_METHOD = (
 )
 
 
-def files_of(identified: Identified) -> dict[str, Content]:
+def files_of(identified: IdentifiedFriction) -> dict[str, Content]:
     """friction.yaml, plateaus.csv, residuals.csv and open_loop.csv, where there are any."""
     identification = identified.found
     files: dict[str, Content] = {FRICTION_FILE: friction_file.friction_yaml(identified, software())}
@@ -270,13 +272,13 @@ def files_of(identified: Identified) -> dict[str, Content]:
     return files
 
 
-def draw(identified: Identified) -> list[Picture]:
+def draw(identified: IdentifiedFriction) -> list[Picture]:
     """The pictures; each says what its numbers are worth."""
-    with remarked(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
+    with remark_charts(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
         return list(pictures_of(identified))
 
 
-def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
+def report_of(identified: IdentifiedFriction, pictures: Sequence[Picture]) -> Report:
     """Content of the report."""
     identification = identified.found
     machine = f"{identified.subject.machine.name} · " if identified.subject is not None else ""
@@ -289,7 +291,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
         warnings=identified.warnings,
         notes=identified.notes,
         tiles=_tiles(identified),
-        next_step=_next(identified),
+        next_step=_next_step(identified),
         main=[
             _use(identification),
             Section("What further moves would determine", [_bullets(identification.advice)])
@@ -308,7 +310,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
     )
 
 
-def _next(identified: Identified) -> Step:
+def _next_step(identified: IdentifiedFriction) -> Step:
     """A run with this friction: of the scenario that was named, else of the example with one axis."""
     subject, axis = identified.subject, identified.found.axis
     if subject is not None and subject.scenario is not None:
@@ -352,11 +354,11 @@ def answers(identification: Identification) -> list[str]:
     return lines
 
 
-def _tiles(identified: Identified) -> list[Tile]:
+def _tiles(identified: IdentifiedFriction) -> list[Tile]:
     """Parameters, those first that most is asked of, and behind them how near the model comes."""
     identification = identified.found
     tiles = []
-    for name in LEADING:
+    for name in LEADING_PARAMETERS:
         estimate = identification.estimates.get(name)
         if estimate is None or estimate.status not in ("estimated", "given"):
             continue
@@ -376,7 +378,7 @@ def _errors(identification: Identification) -> Iterator[Tile]:
             meaning = f"largest half width of the 95 % band of the Stribeck curve{alone}"
             yield Tile(text, f"error of the curve (95 %){alone}", meaning)
         else:
-            count = counted(quantities.speeds_of(stage), "speed")
+            count = count_things(quantities.speeds_of(stage), "speed")
             yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
         meaning = "largest relative deviation of a plateau's friction from the curve"
         yield Tile(f"{powers(f'{100 * stage.worst_curve:.2g}')} %", f"largest deviation of a plateau{alone}", meaning)
@@ -503,7 +505,7 @@ def _stretches(identification: Identification) -> Section | None:
     return Section("Stretches of stage 2", [Table("llrrrr", heads, rows, known)])
 
 
-def _provenance(identified: Identified) -> Section:
+def _provenance(identified: IdentifiedFriction) -> Section:
     rows = []
     for name, source in zip(identified.traces, identified.sources, strict=True):
         columns = ", ".join(f"{role} from {column}" for role, column in source.columns.items())

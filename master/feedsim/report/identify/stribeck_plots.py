@@ -7,15 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from feedsim.estimation.identify import Identified
+from feedsim.estimation.identify import IdentifiedFriction
 from feedsim.estimation.identify.parameters import torque as motor_torque
 from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Estimate, Identification, Plateau, Stationary
 from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Panel
 from feedsim.report.content import Picture
-from feedsim.report.formatting import ORANGE, OTHERWISE, RECORDED, SIMULATED, Array, counted, powers
-from feedsim.report.provenance import InputFile, hashed
+from feedsim.report.formatting import (
+    ALTERNATIVE_COLOUR,
+    ORANGE,
+    RECORDED_COLOUR,
+    SIMULATED_COLOUR,
+    Array,
+    count_things,
+    powers,
+)
+from feedsim.report.provenance import InputFile, hash_files
 
 # --- What the report of an identification shows: error of the curve, values at the slide, units, files read -----------
 
@@ -25,7 +33,7 @@ LEAST_SPEEDS = 3  # that make a curve
 SAME_SPEED = 1.05  # ratio up to which two speeds are one: that of a direction and of the other, or of a repetition
 
 
-def remark(identified: Identified) -> str:
+def remark(identified: IdentifiedFriction) -> str:
     """For the pictures, in one line: axis and traces, and what the numbers are worth."""
     traces = identified.traces
     listed = ", ".join(traces[:4]) + (f" and {len(traces) - 4} more" if len(traces) > 4 else "")
@@ -33,12 +41,12 @@ def remark(identified: Identified) -> str:
     return " ".join(f"{text.rstrip('.')}." for text in sentences)
 
 
-def input_files(identified: Identified) -> list[InputFile]:
+def input_files(identified: IdentifiedFriction) -> list[InputFile]:
     """Traces and mappings (hashed when they were read), and the machine's files."""
     subject, pairs = identified.subject, zip(identified.traces, identified.sources, strict=True)
     files = [InputFile("trace", name, source.sha256) for name, source in pairs]
     named = [("mapping", source.mapping) for source in identified.sources if source.mapping is not None]
-    return files + hashed([*named, *(subject.files if subject is not None else ())])
+    return files + hash_files([*named, *(subject.files if subject is not None else ())])
 
 
 def curve_error(stage: Stationary) -> float:
@@ -120,7 +128,7 @@ def stribeck_title(identification: Identification, stage: Stationary) -> str:
     """What is shown, and how well the curve is known."""
     known = f"known to ±{100 * curve_error(stage):.2g} % (95 %)"
     if not is_curve(stage):
-        known = f"no curve: {counted(speeds_of(stage), 'speed')}"
+        known = f"no curve: {count_things(speeds_of(stage), 'speed')}"
     return (
         f"Axis {identification.axis}: friction over speed{'' if identification.prior else ', stage 1 alone'}, {known}"
     )
@@ -132,11 +140,17 @@ def _curves(identification: Identification, stage: Stationary) -> Chart:
     half = NORMAL_95 * stage.sigma
     bands, below_bands = [], []
     if is_curve(stage):
-        bands = [Band("95 % band", stage.torque - half, stage.torque + half, stage.speeds, SIMULATED)]
+        bands = [Band("95 % band", stage.torque - half, stage.torque + half, stage.speeds, SIMULATED_COLOUR)]
         share = 100 * half / stage.torque
-        below_bands = [Band("95 % band", -share, share, stage.speeds, SIMULATED)]
+        below_bands = [Band("95 % band", -share, share, stage.speeds, SIMULATED_COLOUR)]
     curves = [
-        Curve("curve" if identification.prior else "stage 1 alone", stage.speeds, stage.torque, SIMULATED, width=1.8)
+        Curve(
+            "curve" if identification.prior else "stage 1 alone",
+            stage.speeds,
+            stage.torque,
+            SIMULATED_COLOUR,
+            width=1.8,
+        )
     ]
     below = []
     for sign, word in SPEED_DIRECTIONS:
@@ -153,21 +167,30 @@ def _curves(identification: Identification, stage: Stationary) -> Chart:
         if values["asymmetry"]:
             shown = _of_direction(values, sign, stage.speeds)
             dash: Dash = "dashed" if sign > 0 else "dotted"
-            curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, SIMULATED, dash, 0.9))
+            curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, SIMULATED_COLOUR, dash, 0.9))
     if not identification.prior:
-        curves += _delivered(identification, stage)
+        curves += _delivered_curves(identification, stage)
     axis = Axis(SPEED_AXIS.label, SPEED_AXIS.unit, log=True)
     above = replace(axis, also=("axis speed", "mm/min", identification.I_P * MM_PER_MIN))
     top = max(float(np.nanmax(curve.y)) for curve in curves)
     ordinate = replace(TORQUE_AXIS, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / identification.I_P))
-    return Chart([
-        Panel(stribeck_title(identification, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
-        Panel("Deviation from the curve", axis, Axis("deviation", "%"), below, [Level(0.0, colour=SIMULATED, dash="")],
-              below_bands, linked="n"),
-    ])  # fmt: skip
+    return Chart(
+        [
+            Panel(stribeck_title(identification, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
+            Panel(
+                "Deviation from the curve",
+                axis,
+                Axis("deviation", "%"),
+                below,
+                [Level(0.0, colour=SIMULATED_COLOUR, dash="")],
+                below_bands,
+                linked="n",
+            ),
+        ]
+    )
 
 
-def _delivered(identification: Identification, stage: Stationary) -> list[Curve]:
+def _delivered_curves(identification: Identification, stage: Stationary) -> list[Curve]:
     """The set that is delivered, in both directions.
 
     The plateaus have stage 1's constant load taken off, the set has its own: the difference belongs to the curves, else
@@ -180,7 +203,7 @@ def _delivered(identification: Identification, stage: Stationary) -> list[Curve]
     more = values["M_0"] - first.value if first is not None else 0.0
     return [
         Curve(f"identified set, {mark}", stage.speeds, _of_direction(values, sign, stage.speeds) + sign * more,
-              OTHERWISE, "" if sign > 0 else "dotted", 1.3)
+              ALTERNATIVE_COLOUR, "" if sign > 0 else "dotted", 1.3)
         for sign, mark in ((1, "+"), (-1, "−"))
     ]  # fmt: skip
 
@@ -188,8 +211,8 @@ def _delivered(identification: Identification, stage: Stationary) -> list[Curve]
 def _with_bars(name: str, x: Array, y: Array, spread: Array, faint: bool) -> list[Curve]:
     gaps = np.full(len(x), np.nan)
     bars = Curve(name, np.column_stack([x, x, gaps]).ravel(), np.column_stack([y - spread, y + spread, gaps]).ravel(),
-                 RECORDED, width=0.9, faint=faint)  # fmt: skip
-    return [Curve(name, x, y, RECORDED, width=3.0, dots=True, faint=faint), bars]
+                 RECORDED_COLOUR, width=0.9, faint=faint)  # fmt: skip
+    return [Curve(name, x, y, RECORDED_COLOUR, width=3.0, dots=True, faint=faint), bars]
 
 
 def plateaus_picture(identification: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
@@ -201,7 +224,7 @@ def plateaus_picture(identification: Identification, stage: Stationary, records:
     own = [(record, [p for p in stage.plateaus if p.record == record.name]) for record in shown]
     remaining = sum(1 for number in count.values() if number) - len(shown)
     fate = "is not shown" if remaining == 1 else "are not shown"
-    more = f" {counted(remaining, 'more record')} with plateaus {fate}." if remaining else ""
+    more = f" {count_things(remaining, 'more record')} with plateaus {fate}." if remaining else ""
     caption = (
         "Shaded: stretches at constant speed whose mean torque (line) counts as friction. Speeds of several "
         f"decades are drawn logarithmically in both directions.{more}"
@@ -220,11 +243,11 @@ def _over_time(shown: Sequence[tuple[Record, Sequence[Plateau]]], I_P: float) ->
         ends = np.array([t for plateau in own for t in (plateau.begin, plateau.end, *gap)])
         means = np.array([m for plateau in own for m in (plateau.torque, plateau.torque, *gap)])
         torques = [
-            Curve("motor torque", record.time, record.torque, RECORDED, width=0.9),
-            Curve("mean of a plateau", ends, means, SIMULATED, width=2.2),
+            Curve("motor torque", record.time, record.torque, RECORDED_COLOUR, width=0.9),
+            Curve("mean of a plateau", ends, means, SIMULATED_COLOUR, width=2.2),
         ]
-        speed = Curve("speed", record.time, _speed(record) * I_P * MM_PER_MIN, RECORDED, width=0.9)
-        title = f"{record.name}: {counted(len(own), 'plateau')}"
+        speed = Curve("speed", record.time, _record_speed(record) * I_P * MM_PER_MIN, RECORDED_COLOUR, width=0.9)
+        title = f"{record.name}: {count_things(len(own), 'plateau')}"
         panels += [
             Panel(title, TIME_AXIS, Axis("torque", "N·m"), torques, [ZERO], zones, linked=f"t{k}"),
             Panel("", TIME_AXIS, _speeds(speed.y, own, I_P), [speed], [ZERO], zones, linked=f"t{k}", height=0.8),
@@ -239,7 +262,7 @@ def _speeds(speed: Array, own: Sequence[Plateau], I_P: float) -> Axis:
     return Axis("speed", "mm/min", symlog=slowest if wide else 0.0)
 
 
-def _speed(record: Record) -> Array:
+def _record_speed(record: Record) -> Array:
     if record.speed is not None:
         return record.speed
     assert record.angle is not None

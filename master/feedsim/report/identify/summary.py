@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.estimation.identify import Identified, friction_file
+from feedsim.estimation.identify import IdentifiedFriction, friction_file
 from feedsim.estimation.identify.friction_file import FRICTION_FILE
 from feedsim.estimation.identify.read import recording_day, recording_temperature
 from feedsim.estimation.identify.result import Balance, Estimate, Identification
-from feedsim.files.trace.files import quoted, shortest
+from feedsim.files.trace.files import quote_cell, shortest_numbers
 from feedsim.foundation.errors import Finding
-from feedsim.report.formatting import Array, counted
+from feedsim.report.formatting import Array, count_things
 from feedsim.report.identify import stribeck_plots as quantities
 from feedsim.report.identify.stribeck_plots import MM_PER_MIN
 from feedsim.report.provenance import finite, inputs_part, machine_part, quantity
@@ -26,7 +26,7 @@ FORMAT = 1
 TABLE_COLUMNS = 118  # columns of the terminal's table
 
 
-def details(identified: Identified) -> dict[str, Any]:
+def details(identified: IdentifiedFriction) -> dict[str, Any]:
     """What summary.json has besides the figures; what could not be determined is null."""
     identification = identified.found
     return {
@@ -71,7 +71,7 @@ def details(identified: Identified) -> dict[str, Any]:
     }
 
 
-def terminal_lines(identified: Identified, directory: Path | None = None) -> list[str]:
+def terminal_lines(identified: IdentifiedFriction, directory: Path | None = None) -> list[str]:
     """What the terminal shows: headline, table, what was done besides, advice, and how to use friction.yaml.
 
     directory: where the result is; None: nowhere yet.
@@ -91,7 +91,7 @@ def terminal_lines(identified: Identified, directory: Path | None = None) -> lis
     return [*lines, f"  use: feedsim run SCENARIO.yaml --set {setting}"]
 
 
-def table_lines(identified: Identified) -> list[str]:
+def table_lines(identified: IdentifiedFriction) -> list[str]:
     """Parameter, value, 95 % interval, relative, note: a line each, for the terminal."""
     identification = identified.found
     rows = [("", "value", "95 % interval", "+-", "")]
@@ -110,7 +110,7 @@ def table_lines(identified: Identified) -> list[str]:
     return lines
 
 
-def terminal_warnings(identified: Identified) -> list[Finding]:
+def terminal_warnings(identified: IdentifiedFriction) -> list[Finding]:
     """Warnings without those that say no more than the reason of a parameter, which the table holds."""
     estimates = [estimate for estimate in identified.found.estimates.values() if estimate.reason]
     return [
@@ -124,7 +124,7 @@ def _repeats(finding: Finding, estimate: Estimate) -> bool:
     return estimate.name in names[:1] and finding.text.endswith(f": {estimate.reason}")
 
 
-def headline(identified: Identified) -> str:
+def headline(identified: IdentifiedFriction) -> str:
     """How well curve and pre-sliding are known, in one line."""
     identification, parts = identified.found, []
     if (stage := identification.stationary) is not None:
@@ -132,11 +132,11 @@ def headline(identified: Identified) -> str:
         what = "curve" if identification.prior else "curve of stage 1 alone"
         error = f"within {100 * quantities.curve_error(stage):.2g} % (95 %)"
         within = f"{what} {error} from {float(f'{low:.3g}'):g} to {high:.5g} mm/min"
-        plateaus = counted(len(stage.plateaus), "plateau")
-        no_curve = f"no curve: {counted(quantities.speeds_of(stage), 'speed')}"
+        plateaus = count_things(len(stage.plateaus), "plateau")
+        no_curve = f"no curve: {count_things(quantities.speeds_of(stage), 'speed')}"
         parts.append(f"{within if quantities.is_curve(stage) else no_curve}, {plateaus}")
     if (dynamic := identification.dynamic) is not None:
-        stretches = counted(len(dynamic.stretches), "stretch", "stretches")
+        stretches = count_things(len(dynamic.stretches), "stretch", "stretches")
         parts.append(f"pre-sliding from {stretches}, residual {dynamic.rms:.2g} N.m rms")
     return "; ".join(parts) or "neither plateaus nor reversals"
 
@@ -146,8 +146,8 @@ def plateaus_csv(identification: Identification) -> str:
     assert identification.stationary is not None
     lines = ["record,begin [s],end [s],speed [rad/s],torque [N.m],sigma [N.m],rows"]
     for p in identification.stationary.plateaus:
-        numbers = shortest(np.array([p.begin, p.end, p.speed, p.torque, p.sigma]))
-        lines.append(",".join([quoted(p.record), *numbers, str(p.rows)]))
+        numbers = shortest_numbers(np.array([p.begin, p.end, p.speed, p.torque, p.sigma]))
+        lines.append(",".join([quote_cell(p.record), *numbers, str(p.rows)]))
     return "\n".join(lines) + "\n"
 
 
@@ -157,7 +157,7 @@ def residuals_csv(identification: Identification) -> str:
     lines = ["stretch,record,time [s],angle [rad],speed [rad/s],measured [N.m],model [N.m],residual [N.m]"]
     for number, stretch in enumerate(identification.dynamic.stretches, 1):
         torques = (stretch.measured, stretch.model, stretch.measured - stretch.model)
-        lines += _rows(f"{number},{quoted(stretch.record)}", stretch.time, stretch.angle, stretch.speed, *torques)
+        lines += _rows(f"{number},{quote_cell(stretch.record)}", stretch.time, stretch.angle, stretch.speed, *torques)
     return "\n".join(lines) + "\n"
 
 
@@ -165,13 +165,13 @@ def open_loop_csv(balance: Balance) -> str:
     """Recorded angle from the start on, and its error in open loop before and after, record after record."""
     lines = ["record,time [s],angle [rad],error before [rad],error after [rad]"]
     for drift in balance.drifts:
-        lines += _rows(quoted(drift.record), drift.time, drift.angle, drift.before, drift.after)
+        lines += _rows(quote_cell(drift.record), drift.time, drift.angle, drift.before, drift.after)
     return "\n".join(lines) + "\n"
 
 
 def _rows(head: str, *columns: Array) -> Iterator[str]:
     """Lines of a CSV file: head, and the columns' values."""
-    texts = [shortest(np.asarray(values)) for values in columns]
+    texts = [shortest_numbers(np.asarray(values)) for values in columns]
     return (f"{head},{','.join(row)}" for row in zip(*texts, strict=True))
 
 
@@ -260,7 +260,7 @@ def _matrix(matrix: Any) -> list[list[float | None]]:
     return [[finite(float(value)) for value in row] for row in matrix]
 
 
-def rigid_line(identified: Identified) -> str:
+def rigid_line(identified: IdentifiedFriction) -> str:
     """The simple model in one line; empty where there is none."""
     estimated = [estimate for estimate in identified.found.rigid.values() if estimate.status == "estimated"]
     parts = [f"{estimate.name} {friction_file.value_text(estimate)} {estimate.unit}" for estimate in estimated]

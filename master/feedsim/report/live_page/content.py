@@ -39,7 +39,7 @@ from feedsim.simulation.cosim.roles import controller_parameters
 from feedsim.simulation.cosim.system import plant_parameters
 from feedsim.simulation.cosim.whole import open_whole, parameters
 from feedsim.simulation.judge import check as judged_ahead
-from feedsim.simulation.judge import control, exchange_stability, left_grid
+from feedsim.simulation.judge import exchange_stability, left_grid, warn_control_loops
 from feedsim.simulation.nc import Program
 from feedsim.structure import checked_modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
@@ -60,9 +60,9 @@ DEFAULT_KNOBS = {
 CORRECTION = "backlash_compensation.value"
 # Switches that need nothing else to be given.
 SWITCHES = ("symmetry_lag", "ramp_speed_setpoint", "measuring.indirect")
-SWITCHED = ("false", "true")
+SWITCH_VALUES = ("false", "true")
 # What is worth trying of a parameter that is 0, by its units: a quarter of the slider's reach.
-TRIED = {
+TRIAL_VALUES = {
     ("m", "um"): 5e-6, ("m", "nm"): 50e-9, ("m", "mm"): 0.1, ("N.m", "N.m"): 0.2, ("1", "%"): 0.01, ("1", "1"): 50e-6,
     ("rad", "deg"): math.pi / 4, ("rad", "mrad"): 1e-3, ("s", "ms"): 1e-3, ("1/m", "1/m"): 1e-4,
     ("1/m^2", "1/m^2"): 1e-3,
@@ -73,7 +73,7 @@ SETTINGS = (
     "place_first", "place_spacing",
 )  # fmt: skip
 # Parameters that the machine's cycles and axes fix, and those that are no matter of trying.
-FIXED = ("T_c", "T_pos", "I_P")
+FIXED_PARAMETERS = ("T_c", "T_pos", "I_P")
 # How far a slider goes about the scenario's value; a number may be typed beyond, within the table's range.
 REACH = 4.0
 SHOWN_UNIT = {"1/s": "(m/min)/mm"}
@@ -129,16 +129,16 @@ def chosen(scenario: Scenario, wanted: Sequence[str], *, planned: bool) -> list[
             for name in names
         } | {f"machine.axes.{axis}.drive.{CORRECTION}" for axis in moved}
         return [knob for knob in known if knob.motion or knob.key in usual or _is_on(knob)]
-    lost = [pattern for pattern in wanted if not any(fits(knob, pattern) for knob in known)]
+    lost = [pattern for pattern in wanted if not any(matches_knob(knob, pattern) for knob in known)]
     if lost:
         raise InputError.of(
             "there is no such knob",
             [f"--knobs {pattern}: fits none of {', '.join(knob.key for knob in known)}" for pattern in lost],
         )
-    return [knob for knob in known if any(fits(knob, pattern) for pattern in wanted)]
+    return [knob for knob in known if any(matches_knob(knob, pattern) for pattern in wanted)]
 
 
-def fits(knob: Knob, pattern: str) -> bool:
+def matches_knob(knob: Knob, pattern: str) -> bool:
     """Whether a pattern names a knob, by its key or by the end of its key: "Z.drive.K_v", "K_v", "motions.*"."""
     return fnmatchcase(knob.key, pattern) or fnmatchcase(knob.key, f"*.{pattern}")
 
@@ -168,12 +168,12 @@ def _of_axes(machine: Machine) -> list[Knob]:
                 key, own = f"machine.axes.{axis}.{whole}", ((f"{axis}.{whole}", 1.0),)
                 sets = _friction_sets(described, axis, name) if part == "friction" else own
                 if name in SWITCHES:
-                    knobs.append(Knob(key, group, name, table[name].short, SWITCHED[bool(value)], sets=sets,
-                                      choices=SWITCHED, without=SWITCHED[0]))  # fmt: skip
-                elif name in table and table[name].kind == "REAL" and name not in FIXED:
+                    knobs.append(Knob(key, group, name, table[name].short, SWITCH_VALUES[bool(value)], sets=sets,
+                                      choices=SWITCH_VALUES, without=SWITCH_VALUES[0]))  # fmt: skip
+                elif name in table and table[name].kind == "REAL" and name not in FIXED_PARAMETERS:
                     knobs.append(_number(key, group, name, float(value), table[name], sets))
         if machine.shipped_drive(axis, "machine.fmu").indirect:
-            key, reach = f"machine.axes.{axis}.play", REACH * (described.play or TRIED["m", "um"])
+            key, reach = f"machine.axes.{axis}.play", REACH * (described.play or TRIAL_VALUES["m", "um"])
             knobs.append(Knob(key, group, "play", "play between motor and slide", described.play, "m", "um", 1e6, 0.0,
                               reach, 0.0, 1.0, ((f"{axis}.play", 1.0),)))  # fmt: skip
     return knobs
@@ -229,16 +229,16 @@ def _of_structure(machine: Machine) -> list[Knob]:
 def _number(key: str, group: str, name: str, value: float, table: Variable,
             sets: tuple[tuple[str, float], ...]) -> Knob:  # fmt: skip
     shown = SHOWN_UNIT.get(table.unit, table.display_unit or table.unit)
-    low, high = _ends(value, table)
+    low, high = _slider_ends(value, table)
     return Knob(
         key, group, name, table.short, value, table.unit, shown, units.convert(1.0, table.unit, shown), low, high,
         table.minimum, table.maximum, sets, without=float(table.start),
     )  # fmt: skip
 
 
-def _ends(value: float, table: Variable) -> tuple[float, float]:
+def _slider_ends(value: float, table: Variable) -> tuple[float, float]:
     """Ends of a slider: the table's where the value is not lost between them, else some times the value."""
-    size = abs(value) or abs(float(table.start)) or TRIED.get((table.unit, table.display_unit), 1.0)
+    size = abs(value) or abs(float(table.start)) or TRIAL_VALUES.get((table.unit, table.display_unit), 1.0)
     if math.isfinite(table.minimum) and table.maximum <= 2 * REACH * size:
         return table.minimum, table.maximum
     low = value / REACH if value > 0 else -REACH * size
@@ -289,7 +289,7 @@ SECTION = b"feedsim"
 MAGIC = b"\0asm\1\0\0\0"
 
 
-def read(fmus: Path, guid: str) -> bytes:
+def read_page_module(fmus: Path, guid: str) -> bytes:
     """The module beside the archives in the folder `fmus`, for the unit with this GUID.
 
     Raises:
@@ -353,7 +353,7 @@ CLOSE_DISTANCE, WIDE_DISTANCE, REACH_FACTOR = 0.02, 0.06, 1.6
 NEGLIGIBLE_CHANGE = 0.5
 
 
-def reached(machine: Machine, program: Program) -> dict[str, tuple[float, float]]:
+def reached_positions(machine: Machine, program: Program) -> dict[str, tuple[float, float]]:
     """Positions between which an axis may move while sliders turn [m]: the program's, farther by a slider's reach."""
     result = {}
     for axis in program.x_s:
@@ -364,12 +364,12 @@ def reached(machine: Machine, program: Program) -> dict[str, tuple[float, float]
     return result
 
 
-def described(machine: Machine, program: Program, resources: Path) -> dict[str, Any]:
+def describe_grid(machine: Machine, program: Program, resources: Path) -> dict[str, Any]:
     """Per axis what the page needs: "grid", first and last position of its cells; "over", modes over its positions."""
     grid = _grid(machine, resources)
     return {
         "grid": {axis.axis: list(axis.reach) for axis in grid if len(axis.centres) > 1},
-        "over": dict(_over(machine, program, {axis.axis for axis in grid})), "near": MIN_POSE_DISTANCE,
+        "over": dict(_modes_over_axes(machine, program, {axis.axis for axis in grid})), "near": MIN_POSE_DISTANCE,
         "large": LARGE_SHIFT,
     }  # fmt: skip
 
@@ -387,8 +387,8 @@ def _grid(machine: Machine, resources: Path) -> tuple[GridAxis, ...]:
     return read_grid(file, tuple(machine.axes)) if file.is_file() else ()
 
 
-def _over(machine: Machine, program: Program, followed: set[str]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    for axis, (low, high) in reached(machine, program).items():
+def _modes_over_axes(machine: Machine, program: Program, followed: set[str]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for axis, (low, high) in reached_positions(machine, program).items():
         pose = machine.pose[axis]
         if axis in followed or max(pose - low, high - pose) <= MIN_POSE_DISTANCE:
             continue
@@ -449,22 +449,22 @@ def content(scenario: Scenario, program: Program, wanted: Sequence[str] = (), fm
     machine, folder = scenario.machine, fmus or fmus_directory()
     planned = all(isinstance(motion, Move | Circle | Dwell) for motion in scenario.motions)
     knobs = chosen(scenario, wanted, planned=planned)
-    evaluated = [item for item in scenario.evaluate if _known(item, scenario)]
+    evaluated = [item for item in scenario.evaluate if _is_computable(item, scenario)]
     values = {**plant_parameters(machine, None), **parameters(machine, scenario.coupling, built_in=False)}
     with open_whole(machine, folder) as archive:
-        code = read(folder, archive.guid)
+        code = read_page_module(folder, archive.guid)
         resources = archive.directory / "resources"
         files = {path.name: path.read_bytes() for path in sorted(resources.iterdir()) if path.is_file()}
-        described = _machine(scenario, archive) | _judged(scenario, program, folder, resources)
+        described = _machine(scenario, archive) | _judgement_content(scenario, program, folder, resources)
         data = {
             "name": scenario.name, "note": machine.note, "machine_name": machine.name, "guid": archive.guid,
-            "module": packed(code), "files": {name: packed(file) for name, file in files.items()},
+            "module": pack_bytes(code), "files": {name: pack_bytes(file) for name, file in files.items()},
             "machine": described,
             "parameters": [[*_reference(archive, name), value, name] for name, value in values.items()],
             "knobs": [_knob(knob, archive) for knob in knobs],
             "motions": [motion.model_dump() for motion in scenario.motions] if planned else [],
             "evaluate": [item.model_dump(include={"kind", "axis", "band", "motion", "turn"}) for item in evaluated],
-            "given": None if planned else _given(scenario, program),
+            "given": None if planned else _setpoint_content(scenario, program),
         }  # fmt: skip
     left_out = [f"evaluate: {item.kind} is not shown in a page" for item in scenario.evaluate if item not in evaluated]
     if not planned:
@@ -489,7 +489,7 @@ def check(scenario: Scenario, program: Program) -> None:
         raise InputError.of(f"{scenario.file}: there is no page of it", problems)
 
 
-def _known(item: Any, scenario: Scenario) -> bool:
+def _is_computable(item: Any, scenario: Scenario) -> bool:
     if isinstance(item, CircleTest):
         return any(isinstance(motion, Circle) for motion in scenario.motions) and item.plane is None
     return isinstance(item, Positioning)
@@ -517,12 +517,12 @@ def _machine(scenario: Scenario, archive: Archive) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path) -> dict[str, Any]:
+def _judgement_content(scenario: Scenario, program: Program, folder: Path, resources: Path) -> dict[str, Any]:
     """What the page needs to say what it warns of, and what its knobs have nothing to do with."""
     machine, coupling = scenario.machine, scenario.coupling
     modes = checked_modes(machine)
     said = {
-        *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
+        *warn_control_loops(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
         *pose_findings(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
@@ -533,7 +533,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
                 if axis.guide is not None and axis.guide.share
                 for key, value in machine.shipped_friction(name, "a page").parameters().items()}  # fmt: skip
     return {
-        "friction": friction, "reach": described(machine, program, resources),
+        "friction": friction, "reach": describe_grid(machine, program, resources),
         "warnings": [str(warning) for warning in ahead],
         "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "bounds": bounds},
     }  # fmt: skip
@@ -554,9 +554,9 @@ def _knob(knob: Knob, archive: Archive) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _given(scenario: Scenario, program: Program) -> dict[str, Any]:
+def _setpoint_content(scenario: Scenario, program: Program) -> dict[str, Any]:
     """Setpoints that are carried along."""
-    return {"rows": packed(rows(scenario, program).tobytes()), "segments": segments(program)}
+    return {"rows": pack_bytes(rows(scenario, program).tobytes()), "segments": segments(program)}
 
 
 def rows(scenario: Scenario, program: Program) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -598,6 +598,6 @@ def _circle(circle: Circular) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def packed(file: bytes) -> str:
+def pack_bytes(file: bytes) -> str:
     """Compressed, base64; the same from the same bytes."""
     return base64.b64encode(gzip.compress(file, 9, mtime=0)).decode("ascii")

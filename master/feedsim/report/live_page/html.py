@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import CircleTask, Diagnosis, Figure, PositioningTask, evaluate, tasks
-from feedsim.analysis.circle import answer, swinging
+from feedsim.analysis.circle import describe_vibrations, explain_circle
 from feedsim.analysis.evaluate import cause_figures
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import InputError
 from feedsim.report.content import Picture, Table
-from feedsim.report.formatting import PALETTE, display_unit, duration, shown, typeset
-from feedsim.report.live_page.content import Content, content, packed
-from feedsim.report.page import drawing, style
+from feedsim.report.formatting import PALETTE, display_unit, duration, figure_text, typeset
+from feedsim.report.live_page.content import Content, content, pack_bytes
+from feedsim.report.page import drawing_script, style
 from feedsim.report.run.axis_plots import contour_picture, positioning_picture, torque_picture
 from feedsim.report.run.pose import diagnosis_section
 from feedsim.simulation.judge import JudgedRun
@@ -34,26 +34,26 @@ from feedsim.simulation.judge import JudgedRun
 # --- The scripts and styles of a page: what computes, for a worker, and what shows, for the page itself ---------------
 
 
-COMPUTING = ("packed.js", "unit.js", "plan.js", "figures.js", "warnings.js", "bode.js", "work.js")
-SHOWING = ("packed.js", "figures.js", "signs.js", "pictures.js", "lessons.js", "page.js")
+COMPUTING_SCRIPTS = ("packed.js", "unit.js", "plan.js", "figures.js", "warnings.js", "bode.js", "work.js")
+SHOWING_SCRIPTS = ("packed.js", "figures.js", "signs.js", "pictures.js", "lessons.js", "page.js")
 
 
 @cache
-def computing() -> str:
+def computing_script() -> str:
     """Unit, planner, figures: without anything of a browser, so that node runs it as well."""
-    return "".join(text(name) for name in COMPUTING)
+    return "".join(text(name) for name in COMPUTING_SCRIPTS)
 
 
 @cache
 def worker() -> str:
     """The worker's script."""
-    return '"use strict";\n' + _without_comments(computing() + text("worker.js"))
+    return '"use strict";\n' + _without_comments(computing_script() + text("worker.js"))
 
 
 @cache
-def showing() -> str:
+def showing_script() -> str:
     """The page's own script: charts of reports, and what is about knobs."""
-    script = drawing() + "".join(text(name) for name in SHOWING)
+    script = drawing_script() + "".join(text(name) for name in SHOWING_SCRIPTS)
     return '"use strict";\n(() => {\n' + _without_comments(script) + "})();\n"
 
 
@@ -112,26 +112,32 @@ def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -
     scenario, machine = run.scenario, run.scenario.machine
     shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
     moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
-    figures = _computed(run, shown_tasks)
+    figures = _computed_figures(run, shown_tasks)
     planes = [list(task.turn.axes) for task in shown_tasks if isinstance(task, CircleTask)]
     data = contents.data | {
         "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
-        "signs": contents.data["machine"]["signs"], "written": _written(figures),
+        "signs": contents.data["machine"]["signs"], "written": _figures_as_written(figures),
     }  # fmt: skip
     # The axis whose loop is shown at first stands last: that of the circle's ordinate, or the one that moves.
     order = [axis for axis in machine.axes if axis not in moved] + moved
-    script, cycle = showing(), f"control cycle {duration(machine.cycles.T_c)}"
+    script, cycle = showing_script(), f"control cycle {duration(machine.cycles.T_c)}"
     parts = {
-        "policy": _policy(script), "title": escape(scenario.name), "style": styles(),
+        "policy": _policy(script),
+        "title": escape(scenario.name),
+        "style": styles(),
         "machine": escape(f"{machine.name}: axes {', '.join(machine.axes)}; {cycle}"),
         "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, contents)),
-        "knobs": "\n".join(_groups(contents.data["knobs"])), "pictures": "\n".join(_pictures(run, shown_tasks)),
+        "knobs": "\n".join(_groups(contents.data["knobs"])),
+        "pictures": "\n".join(_pictures(run, shown_tasks)),
         "axes": "".join(f"<option{' selected' * (axis == order[-1])}>{escape(axis)}</option>" for axis in order),
         "keys": "".join(_keys(shown_tasks, figures)),
-        "figures": _table(figures), "footer": _footer(contents), "worker": packed(worker().encode()), "script": script,
+        "figures": _table(figures),
+        "footer": _footer(contents),
+        "worker": pack_bytes(worker().encode()),
+        "script": script,
         "charts": _json({"charts": {}, "arrays": [], "palette": {n: c for n, c, _ in PALETTE} | {"ground": "#ffffff"}}),
         "data": _json(data | {"axes": order}),
-    }  # fmt: skip
+    }
     return re.sub(r"\{(\w+)\}", lambda match: parts[match[1]], text("page.html"))
 
 
@@ -181,7 +187,7 @@ def _row(k: int, knob: Mapping[str, Any]) -> str:
     return f'<div class="knob" id="knob-{k}"><label for="value-{k}"><b>{name}</b> {about}</label>{control}{back}</div>'
 
 
-def _computed(run: JudgedRun, shown_tasks: Sequence[CircleTask | PositioningTask]) -> dict[str, Figure]:
+def _computed_figures(run: JudgedRun, shown_tasks: Sequence[CircleTask | PositioningTask]) -> dict[str, Figure]:
     """Figures that a page computes, too: without those of causes."""
     causes = {task.prefix: task.diagnosis(run.trace) for task in shown_tasks if isinstance(task, CircleTask)}
     left_out = {f"{prefix}.{name}" for prefix, found in causes.items() if found for name in cause_figures(found)}
@@ -195,7 +201,7 @@ def _pictures(run: JudgedRun, shown: Sequence[CircleTask | PositioningTask]) -> 
         if isinstance(task, CircleTask):
             diagnosis = task.diagnosis(run.trace)
             if diagnosis is not None:
-                yield _why(task.prefix, end, diagnosis)
+                yield _explain_circle(task.prefix, end, diagnosis)
             yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back, diagnosis))
             if (torque := torque_picture(run.trace, task.turn, signs, f"torque-{end}")) is not None:
                 yield _figure(torque, bare=True)
@@ -211,7 +217,7 @@ def _slug(prefix: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "-", prefix)
 
 
-def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
+def _explain_circle(prefix: str, end: str, diagnosis: Diagnosis) -> str:
     """Why a circle is not round, of the scenario as written: the answer, and a row for every cause."""
     table = next(part for part in diagnosis_section(prefix, diagnosis).parts if isinstance(part, Table))
     kinds = {"l": "", "r": ' class="number"', "p": ' class="meaning"'}
@@ -221,7 +227,7 @@ def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
         f"<tr>{''.join(f'<td{mark}>{escape(str(cell))}</td>' for mark, cell in zip(marks, row, strict=True))}</tr>"
         for row in table.rows
     )
-    words = typeset(" ".join(filter(None, [answer(diagnosis), swinging(diagnosis)])))
+    words = typeset(" ".join(filter(None, [explain_circle(diagnosis), describe_vibrations(diagnosis)])))
     return (
         f'<section id="why-{end}" aria-labelledby="why-head-{end}"><h2 id="why-head-{end}">{escape(prefix)}: why the '
         f'circle is not round, as written</h2><p class="answer">{escape(words[:1].upper() + words[1:])}</p>'
@@ -253,14 +259,14 @@ def _keys(shown_tasks: Sequence[CircleTask | PositioningTask], figures: Mapping[
                      "peak_torque": f"largest torque of {axis}"}  # fmt: skip
         for name, meaning in words.items():
             key = f"{task.prefix}.{name}"
-            value = " ".join(filter(None, shown(figures[key])))
+            value = " ".join(filter(None, figure_text(figures[key])))
             yield (
                 f'<div class="key" data-figure="{escape(key, quote=True)}"><b>{escape(value)}</b>'
                 f'<span>{escape(meaning)}<br><small class="needs">as written {escape(value)}</small></span></div>'
             )
 
 
-def _written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str]]:
+def _figures_as_written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str]]:
     """Figures of the scenario as written, for the page's comparisons."""
     return {
         name: (figure.value if math.isfinite(figure.value) else None, figure.unit) for name, figure in figures.items()
@@ -269,14 +275,15 @@ def _written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str
 
 def _table(figures: Mapping[str, Figure]) -> str:
     rows = "".join(
-        f'<tr{_aside(name)}><th scope="row">{escape(name)}</th><td class="number">{escape(str(figure))}</td></tr>'
+        f'<tr{_secondary_class(name)}><th scope="row">{escape(name)}</th><td '
+        f'class="number">{escape(str(figure))}</td></tr>'
         for name, figure in figures.items()
     )
     head = '<th scope="col">figure</th><th scope="col" class="number">as written</th>'
     return f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody>"
 
 
-def _aside(name: str) -> str:
+def _secondary_class(name: str) -> str:
     """Of figures that many others stand for: of the tool point, of the other direction, of one quadrant."""
     more = ".tool." in name or ".clockwise." in name or re.search(r"\.glitch_.*[+-]$", name)
     return ' class="more"' if more else ""

@@ -14,7 +14,7 @@ import numpy as np
 
 from feedsim.foundation.errors import InputError
 from feedsim.report.formatting import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Array
-from feedsim.report.provenance import hashed, inputs_part, quantity, software
+from feedsim.report.provenance import hash_files, inputs_part, quantity, software
 from feedsim.scenario import Coupling
 from feedsim.scenario.model import SCHEMES
 from feedsim.scenario.structure import Structure
@@ -71,7 +71,7 @@ def record(info: MachineInfo, files: Sequence[tuple[str, Path]]) -> dict[str, An
             "pseudo_modes": solution.corrections,
             "J_inf_of_all_modes": {axis: quantity(J, "kg.m2") for axis, J in solution.J_inf_full.items()},
         },
-        "inputs": inputs_part(hashed(list(files))),
+        "inputs": inputs_part(hash_files(list(files))),
         "software": software(),
     }
 
@@ -99,8 +99,8 @@ def _lines(info: MachineInfo, most: int | None) -> Iterator[str]:
             (
                 axis.name,
                 f"{2e3 * math.pi * axis.lead:.6g}",
-                *(_shown(value) for value in (axis.moving_mass, axis.J_moving, axis.J_tot, axis.J_inf)),
-                _shown(axis.coupling_limit),
+                *(_number_text(value) for value in (axis.moving_mass, axis.J_moving, axis.J_tot, axis.J_inf)),
+                _number_text(axis.coupling_limit),
             )
             for axis in info.axes
         ],
@@ -117,7 +117,7 @@ def _lines(info: MachineInfo, most: int | None) -> Iterator[str]:
                 str(k),
                 f"{info.modes.frequency[k]:.3f}" if info.modes.frequency[k] else "0",
                 f"{100 * info.modes.damping[k]:.3g}",
-                moves(info, k),
+                describe_mode(info, k),
             )
             for k in range(shown)
         ],
@@ -125,7 +125,7 @@ def _lines(info: MachineInfo, most: int | None) -> Iterator[str]:
     if shown < count:
         yield f"and {count - shown} more up to {info.modes.frequency[-1]:.1f} Hz"
     if info.solution is not None:
-        yield from _dropped(info)
+        yield from _describe_dropped_modes(info)
 
 
 def exchange(info: MachineInfo) -> Iterator[str]:
@@ -144,13 +144,13 @@ def exchange(info: MachineInfo) -> Iterator[str]:
             )
 
 
-def moves(info: MachineInfo, k: int) -> str:
+def describe_mode(info: MachineInfo, k: int) -> str:
     """What moves in mode k, with the shares of the kinetic energy."""
     pseudo = info.solution is not None and k >= len(info.modes.frequency) - info.solution.corrections
     return f"(static correction) {info.moving[k]}" if pseudo else info.moving[k]
 
 
-def _dropped(info: MachineInfo) -> Iterator[str]:
+def _describe_dropped_modes(info: MachineInfo) -> Iterator[str]:
     solution = info.solution
     assert solution is not None
     if solution.dropped > 0:
@@ -170,7 +170,7 @@ def _dropped(info: MachineInfo) -> Iterator[str]:
             yield f"{axis.name}: J_inf with all modes of the model {full:.5g} kg.m2"
 
 
-def _shown(value: float) -> str:
+def _number_text(value: float) -> str:
     return f"{value:.5g}" if math.isfinite(value) else "-"
 
 
@@ -192,7 +192,7 @@ def _table(heads: Sequence[str], units: Sequence[str], rows: Sequence[Sequence[s
 
 Box = tuple[float, float, float, float]  # left, top, width, height [pixels]
 # Towards the eye from the light: faces that look up are the brightest, those to the right the darkest.
-LIGHT = np.array([-0.35, 0.85, 0.55]) / np.linalg.norm([-0.35, 0.85, 0.55])
+LIGHT_DIRECTION = np.array([-0.35, 0.85, 0.55]) / np.linalg.norm([-0.35, 0.85, 0.55])
 OVERLAP = 0.35  # pixels of a face beyond its edges
 SHADE = 0.42  # brightness of a face that looks away from the light, that of one towards it being 1
 
@@ -227,9 +227,9 @@ def view(name: str, towards_eye: Sequence[float], up: Sequence[float] = (0.0, 1.
 
 
 OBLIQUE = view("", (0.62, 0.46, 0.78))
-FRONT = view("front, X–Y", (0, 0, 1))
-SIDE = view("side, Z–Y", (1, 0, 0))
-TOP = view("top, X–Z", (0, 1, 0), (0, 0, -1))
+FRONT_VIEW = view("front, X–Y", (0, 0, 1))
+SIDE_VIEW = view("side, Z–Y", (1, 0, 0))
+TOP_VIEW = view("top, X–Z", (0, 1, 0), (0, 0, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,18 +295,22 @@ class Field:
             size = np.linalg.norm(normal, axis=1)
             normal = normal / np.where(size > 0, size, 1)[:, None]
             seen = (size > 0) & (normal @ self.where.basis[2] > 1e-9)
-            light = np.ones(len(corners)) if flat else SHADE + (1 - SHADE) * np.clip(0.5 + 0.5 * normal @ LIGHT, 0, 1)
-            ways += [f"{_way(each)}Z" for each in _widened(self.at(corners[seen])).tolist()]
+            light = (
+                np.ones(len(corners))
+                if flat
+                else SHADE + (1 - SHADE) * np.clip(0.5 + 0.5 * normal @ LIGHT_DIRECTION, 0, 1)
+            )
+            ways += [f"{_way(each)}Z" for each in _widen_polygons(self.at(corners[seen])).tolist()]
             paints.append((group.colours * light[:, None])[seen])
             depths.append(self.where.depth(corners[seen].mean(axis=1)))
         if ways:
             order = np.argsort(np.concatenate(depths), kind="stable").tolist()  # far ones first
-            self.add(level, _painted([ways[k] for k in order], np.concatenate(paints)[order], "fill"))
+            self.add(level, _painted_paths([ways[k] for k in order], np.concatenate(paints)[order], "fill"))
 
     def lines(self, level: float, lines: Array, colours: Array, width: float) -> None:
         """Paint polylines (L, n, 3) in colours (L, 3), from the back to the front."""
         order = np.argsort(self.where.depth(lines.mean(axis=1)), kind="stable")
-        drawn = _painted([_way(each) for each in self.at(lines[order]).tolist()], colours[order], "stroke")
+        drawn = _painted_paths([_way(each) for each in self.at(lines[order]).tolist()], colours[order], "stroke")
         self.add(level, f'<g stroke-width="{width:g}" stroke-linecap="round" fill="none">{drawn}</g>')
 
 
@@ -314,7 +318,7 @@ def _way(points: Sequence[Sequence[float]]) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
-def _widened(corners: Array) -> Array:
+def _widen_polygons(corners: Array) -> Array:
     """Polygons (F, c, 2) a little larger on all sides: neighbours overlap, and no ground shines through."""
     edges = np.roll(corners, -1, axis=1) - corners
     normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1)
@@ -324,7 +328,7 @@ def _widened(corners: Array) -> Array:
     return np.asarray(corners + OVERLAP * (normals + np.roll(normals, 1, axis=1)))
 
 
-def _painted(ways: Sequence[str], colours: Array, by: str) -> str:
+def _painted_paths(ways: Sequence[str], colours: Array, by: str) -> str:
     """Paths in their colours (N, 3), neighbours of one colour as one path; by: the attribute with the colour."""
     names = [hexadecimal(colour) for colour in colours]
     return "".join(
@@ -450,14 +454,14 @@ def solids(of: Model, moved: Motion | None, phase: float = 1.0) -> list[Faces]:
         rotations = bent.rotations[i]
         if looks.is_round[i]:  # twist is not to be seen on a round bar, and a screw's is many times its deflection
             rotations = rotations - np.outer(rotations @ looks.frames[i][0], looks.frames[i][0])
-        stations = (bent.points[i] + bent.displacements[i])[:, None, :] + turned(corners, rotations)
+        stations = (bent.points[i] + bent.displacements[i])[:, None, :] + turn_vectors(corners, rotations)
         faces += tube(stations, of.colours[geometry.bodies[first]])
     u, phi = node_motion(geometry, shape)
     for body, (node, (low, high)) in looks.blocks.items():
         x, y, z = np.stack([low, high]).T
         base = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
         stations = np.array([np.column_stack([base, np.full(4, depth)]) for depth in z])
-        levers = turned((stations - geometry.nodes[node]).reshape(-1, 3), phi[[node]]).reshape(2, 4, 3)
+        levers = turn_vectors((stations - geometry.nodes[node]).reshape(-1, 3), phi[[node]]).reshape(2, 4, 3)
         faces += tube(geometry.nodes[node] + u[node] + levers, of.colours[body])
     for feature in looks.features:
         if feature.kind == "motor":
@@ -465,7 +469,7 @@ def solids(of: Model, moved: Motion | None, phase: float = 1.0) -> list[Faces]:
     return faces
 
 
-def turned(vectors: Array, rotations: Array) -> Array:
+def turn_vectors(vectors: Array, rotations: Array) -> Array:
     """(S, c, 3) vectors (c, 3) turned by each of the rotation vectors (S, 3); lengths stay (Rodrigues' formula)."""
     angle = np.linalg.norm(rotations, axis=1)[:, None, None]
     axis = rotations[:, None, :] / np.where(angle > 0, angle, 1)

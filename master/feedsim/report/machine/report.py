@@ -28,11 +28,11 @@ from feedsim.report.content import (
 )
 from feedsim.report.formatting import INK, MUTED, PAPER, VERMILLION, Array, display_unit, minus, number, typeset
 from feedsim.report.machine.record import (
-    FRONT,
+    FRONT_VIEW,
     MEANINGS,
     OBLIQUE,
-    SIDE,
-    TOP,
+    SIDE_VIEW,
+    TOP_VIEW,
     USUAL_EXCHANGE,
     Box,
     Faces,
@@ -40,16 +40,16 @@ from feedsim.report.machine.record import (
     Model,
     Motion,
     View,
+    describe_mode,
     exchange,
     extent,
     hexadecimal,
     model,
     motion,
-    moves,
     rotor_disc,
     solids,
 )
-from feedsim.report.provenance import hashed
+from feedsim.report.provenance import hash_files
 from feedsim.report.results import FIGURES, Content
 from feedsim.scenario.structure import Structure
 from feedsim.structure.build import Built
@@ -78,7 +78,7 @@ WORTH_AN_ARROW = 0.08  # of the kinetic energy
 HEAD, LEGEND_ROW = 46.0, 18.0  # pixels above the views, and of a row of names below them
 # Levels, from the back to the front.
 AT_REST, GROUND, BODIES, POINTS, POINTERS, ARMS, FEATURES, ARROWS, NAMES = range(9)
-Named = tuple[str, str]  # of a legend: a shape around (0, 0), and its name
+LegendEntry = tuple[str, str]  # of a legend: a shape around (0, 0), and its name
 
 
 def structure_picture(info: MachineInfo, of: Model) -> Picture:
@@ -86,8 +86,8 @@ def structure_picture(info: MachineInfo, of: Model) -> Picture:
 
     def draw() -> str:
         points = extent(of)
-        views = ((OBLIQUE, (0.0, HEAD, 620.0, 500.0)), (FRONT, (640.0, HEAD + 14, 320.0, 232.0)),
-                 (SIDE, (640.0, HEAD + 268, 320.0, 232.0)))  # fmt: skip
+        views = ((OBLIQUE, (0.0, HEAD, 620.0, 500.0)), (FRONT_VIEW, (640.0, HEAD + 14, 320.0, 232.0)),
+                 (SIDE_VIEW, (640.0, HEAD + 268, 320.0, 232.0)))  # fmt: skip
         fields = []
         for where, box in views:
             field = Field(where, box, points, below=0.2 if where.name else 0.0)
@@ -95,7 +95,7 @@ def structure_picture(info: MachineInfo, of: Model) -> Picture:
             _features(field, of)
             triad(field)
             fields.append(field)
-        return composed(info, "Structure", info.title, "", fields, [*_named_bodies(of), *_named_features(of)])
+        return compose_picture(info, "Structure", info.title, "", fields, [*_named_bodies(of), *_named_features(of)])
 
     mass = f", {info.total_mass:.0f} kg" if np.isfinite(info.total_mass) else ""
     caption = (
@@ -128,7 +128,7 @@ def mode_drawing(info: MachineInfo, of: Model, k: int, moved: Motion, phase: flo
         triad(field)
         fields.append(field)
     title = mode_title(info, k)
-    return composed(info, title, title, info.moving[k], fields, [*_named_bodies(of), _patch(GHOST, "at rest")])
+    return compose_picture(info, title, title, info.moving[k], fields, [*_named_bodies(of), _patch(GHOST, "at rest")])
 
 
 def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0) -> Picture | None:
@@ -149,8 +149,8 @@ def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0
             draw_mode(field, of, moved, 1.0)
             fields.append(field)
             words.append(text(x, y + 14, f"{k}: {frequency(info, k)}", BOLD))
-            words.append(text(x, y + 28, _short(info.moving[k]), 'font-size="9"', MUTED))
-        return composed(
+            words.append(text(x, y + 28, _shorten_words(info.moving[k]), 'font-size="9"', MUTED))
+        return compose_picture(
             info, "The first elastic modes", f"{info.title}: the first elastic modes", "", fields, (), words
         )
 
@@ -161,8 +161,8 @@ def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0
     return Picture("modes", "The first elastic modes", caption, draw)
 
 
-def composed(
-    info: MachineInfo, label: str, title: str, below: str, fields: Sequence[Field], legend: Sequence[Named],
+def compose_picture(
+    info: MachineInfo, label: str, title: str, below: str, fields: Sequence[Field], legend: Sequence[LegendEntry],
     words: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """An SVG of views with title, a line below it, names below the views, and in a corner what the numbers are.
@@ -196,7 +196,7 @@ def telling_view(of: Model, moved: Motion) -> View:
         dofs = of.geometry.dofs[:, d]
         by_direction.append(float(motion_energy[dofs[dofs >= 0]].sum()))
     x, y, z = by_direction
-    return max(((x + y, FRONT), (y + z, SIDE), (x + z, TOP)), key=lambda pair: pair[0])[1]
+    return max(((x + y, FRONT_VIEW), (y + z, SIDE_VIEW), (x + z, TOP_VIEW)), key=lambda pair: pair[0])[1]
 
 
 def draw_mode(field: Field, of: Model, moved: Motion, phase: float) -> None:
@@ -361,7 +361,7 @@ def _arrow(start: Array, end: Array, width: float, tip: float, colour: str = "")
     return f'{shaft}<path d="M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}L{e:.1f} {f:.1f}Z" fill="{paint}"/>'
 
 
-def _named_bodies(of: Model) -> list[Named]:
+def _named_bodies(of: Model) -> list[LegendEntry]:
     """Bodies by their colours."""
     metal = [name for name in of.colours if name.startswith(("screw ", "rotor "))]
     names = [_patch(colour * 0.86, name or "(no body)") for name, colour in list(of.colours.items())[:MOST_BODIES]
@@ -369,16 +369,16 @@ def _named_bodies(of: Model) -> list[Named]:
     return [*names, _patch(of.colours[metal[0]] * 0.86, "screws, motors")] if metal else names
 
 
-def _named_features(of: Model) -> list[Named]:
+def _named_features(of: Model) -> list[LegendEntry]:
     there = {feature.kind for feature in of.looks.features} if of.looks is not None else set()
     return [(_feature(kind, 0.0, 0.0), words) for kind, (_, _, words) in MARKS.items() if kind in there]
 
 
-def _patch(colour: Array, name: str) -> Named:
+def _patch(colour: Array, name: str) -> LegendEntry:
     return rectangle(-7, -5, 14, 10, f'fill="{hexadecimal(colour)}"'), name
 
 
-def _short(words: str) -> str:
+def _shorten_words(words: str) -> str:
     """The first body and how it moves."""
     first = words.partition(", ")[0]
     return first.replace(" (", ": ").rstrip(")")
@@ -423,7 +423,7 @@ class Drawings:
     files: Mapping[str, Content]
 
 
-def drawn(
+def draw_machine(
     structure: Structure, info: MachineInfo, *, modes: Sequence[int] = (), scale: float = 1.0, animate: bool = False
 ) -> Drawings:
     """The structure's picture, and those of `modes`, or without any a sheet of the first ones.
@@ -464,10 +464,10 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         next_step=Step(
             "See how the lowest mode moves",
             "machine view",
-            {"mode": [str(_lowest(info))], "animate": True, "out": FOLDER},
+            {"mode": [str(_lowest_elastic_mode(info))], "animate": True, "out": FOLDER},
         ),
         main=[*pictures, _axes(info), _modes(info)],
-        provenance=provenance_section(rows, hashed(list(files))),
+        provenance=provenance_section(rows, hash_files(list(files))),
         footer="Values in full precision: summary.json. Pictures: figures/.",
     )
 
@@ -475,8 +475,8 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
 def answers(info: MachineInfo) -> list[str]:
     """The lowest mode and what moves in it, and whether the exchange with friction is stable."""
     lines = []
-    if info.modes.frequency[k := _lowest(info)] > 0:
-        lines.append(f"The lowest elastic mode is at {info.modes.frequency[k]:.2f} Hz: {moves(info, k)}.")
+    if info.modes.frequency[k := _lowest_elastic_mode(info)] > 0:
+        lines.append(f"The lowest elastic mode is at {info.modes.frequency[k]:.2f} Hz: {describe_mode(info, k)}.")
     shares = [axis.friction_slope / axis.coupling_limit for axis in info.axes if math.isfinite(axis.friction_slope)]
     if shares and max(shares) <= USUAL_EXCHANGE.stable_share:
         lines.append("The exchange of plant and friction is stable by far (table Axes)." if max(shares) < FAR_BELOW
@@ -484,7 +484,7 @@ def answers(info: MachineInfo) -> list[str]:
     return lines
 
 
-def _lowest(info: MachineInfo) -> int:
+def _lowest_elastic_mode(info: MachineInfo) -> int:
     """Number of the lowest elastic mode; 0 where all are rigid."""
     return next((k for k, f in enumerate(info.modes.frequency.tolist()) if f > 0), 0)
 
@@ -517,6 +517,6 @@ def _axes(info: MachineInfo) -> Section | None:
 
 def _modes(info: MachineInfo) -> Section:
     pairs = zip(info.modes.frequency.tolist(), info.modes.damping.tolist(), strict=True)
-    rows = [(str(k), f"{f:.3f}", f"{100 * d:.3g}", moves(info, k)) for k, (f, d) in enumerate(pairs)]
+    rows = [(str(k), f"{f:.3f}", f"{100 * d:.3g}", describe_mode(info, k)) for k, (f, d) in enumerate(pairs)]
     heads = ("Mode", "Frequency [Hz]", "Damping [%]", "What moves")
     return Section("Modes", [Table("rrrp", heads, rows, "Shares of the kinetic energy.")])

@@ -21,10 +21,10 @@ from feedsim.estimation.replay.moving_lines import in_words
 from feedsim.estimation.replay.tuning import ERROR_RATE, OtherCycle, decision
 from feedsim.files.control import names_of
 from feedsim.files.trace import Mark
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert
-from feedsim.report.changes import asked, control_section
+from feedsim.report.changes import control_section, requested_control
 from feedsim.report.content import (
     FOLDER,
     Paragraph,
@@ -40,8 +40,8 @@ from feedsim.report.content import (
     provenance_section,
     tile_value,
 )
-from feedsim.report.formatting import display_unit, minus, powers, remarked, three, typeset
-from feedsim.report.provenance import finite, hashed, inputs_part, quantity
+from feedsim.report.formatting import display_unit, minus, powers, remark_charts, three_digits, typeset
+from feedsim.report.provenance import finite, hash_files, inputs_part, quantity
 from feedsim.report.replay.report import pictures_of
 from feedsim.scenario import Drive, Friction, Machine, Subject
 from feedsim.scenario.axis_units import ParameterGroup
@@ -58,7 +58,7 @@ OF_THE_AXIS = {"M_0": "constant_load"}
 
 
 @dataclass(frozen=True)
-class Beside:
+class ComparedParameter:
     """A parameter. present: of the machine file, SI. found: identified."""
 
     axis: str
@@ -74,7 +74,7 @@ class Beside:
         return self.found.status == "estimated" and apart and not low <= self.present <= high
 
 
-def beside(machine: Machine, estimates: Mapping[str, Mapping[str, Estimate]]) -> list[Beside]:
+def compare_parameters(machine: Machine, estimates: Mapping[str, Mapping[str, Estimate]]) -> list[ComparedParameter]:
     """Parameters that the machine file has; estimates: axis -> name -> value."""
     result = []
     for axis, own in estimates.items():
@@ -88,15 +88,15 @@ def beside(machine: Machine, estimates: Mapping[str, Mapping[str, Estimate]]) ->
             if name in OF_THE_AXIS:
                 parameter, value = OF_THE_AXIS[name], getattr(known, OF_THE_AXIS[name])
             if isinstance(value, int | float) and not isinstance(value, bool):
-                result.append(Beside(axis, parameter, float(value), estimate))
+                result.append(ComparedParameter(axis, parameter, float(value), estimate))
     return result
 
 
-def beside_section(machine: Machine, result: list[Beside]) -> Section | None:
+def beside_section(machine: Machine, result: list[ComparedParameter]) -> Section | None:
     """All of them, in SI and in the control's words."""
     if not result:
         return None
-    control = asked(machine)
+    control = requested_control(machine)
     names = names_of(control) if control else {}
     rows: list[tuple[Text, ...]] = []
     for entry in result:
@@ -115,7 +115,7 @@ def beside_section(machine: Machine, result: list[Beside]) -> Section | None:
     return Section("Beside the machine file", [Table("llrrlrtl", heads, rows, NOTE)], "beside")
 
 
-def beside_part(result: list[Beside]) -> list[dict[str, Any]]:
+def beside_part(result: list[ComparedParameter]) -> list[dict[str, Any]]:
     """The same in summary.json, in SI."""
     return [
         {
@@ -131,9 +131,9 @@ def beside_part(result: list[Beside]) -> list[dict[str, Any]]:
     ]
 
 
-def beside_lines(machine: Machine, result: list[Beside]) -> list[str]:
+def beside_lines(machine: Machine, result: list[ComparedParameter]) -> list[str]:
     """Values that differ, a line each for the terminal."""
-    control = asked(machine)
+    control = requested_control(machine)
     names = names_of(control) if control else {}
     said = []
     for entry in result:
@@ -148,7 +148,7 @@ def beside_lines(machine: Machine, result: list[Beside]) -> list[str]:
 
 
 MACHINE, MODES_FILE = "machine.yaml", "modes.csv"
-LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, rms"}
+LEADING_ERRORS = {"position_rms": "position error, rms", "torque_rms": "torque error, rms"}
 FRICTION_PARTS = (
     "A part is taken where the record predicts stretches and kinds of its motion better with it that the fit has not "
     "seen (cross-validation): gain of the logarithm of the likelihood."
@@ -236,7 +236,7 @@ class DriveReport:
 
 def _position_cycle(axis: str, one: DriveFound, other: OtherCycle, undecided: bool) -> Finding:
     """What the record of an axis says of the cycle of the position loop."""
-    own, option = 1e3 * one.machine.cycles.T_pos, spelt("position_cycle")
+    own, option = 1e3 * one.machine.cycles.T_pos, spell_argument("position_cycle")
     cycles = f"position cycles of {own:g} ms (taken) and {1e3 * other.cycle:g} ms ({option})"
     decided = 0 if undecided else decision([other])
     if decided > 0:
@@ -296,7 +296,7 @@ def _machine_of_replay(report: DriveReport) -> dict[str, Any]:
 def report_of(report: DriveReport) -> Report:
     """Content of the report."""
     pictures = []
-    with remarked(f"{report.name}, identified from {report.sources[0].file.name}"):
+    with remark_charts(f"{report.name}, identified from {report.sources[0].file.name}"):
         for comparison in report.comparisons:
             pictures += pictures_of(comparison, report.marks)
     drives = report.found.drives
@@ -328,12 +328,16 @@ def report_of(report: DriveReport) -> Report:
             ),
         ]
         + [
-            Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
+            Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING_ERRORS[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()
-            if (key := name.partition(".")[2]) in LEADING
+            if (key := name.partition(".")[2]) in LEADING_ERRORS
         ],
         main=[
-            *([beside_section(report.subject.machine, _beside(report))] if report.subject is not None else []),
+            *(
+                [beside_section(report.subject.machine, _compared_parameters(report))]
+                if report.subject is not None
+                else []
+            ),
             *(_parameters(axis, one) for axis, one in drives.items()),
             *([_limits(report.found.limits)] if report.found.limits else []),
             *pictures,
@@ -343,7 +347,7 @@ def report_of(report: DriveReport) -> Report:
             figures_section(report.figures),
             control_section(machine_of(report)),
         ],
-        provenance=provenance_section(rows, hashed(_files(report))),
+        provenance=provenance_section(rows, hash_files(_files(report))),
         footer=figures_footer(
             f"Values in full precision: summary.json; what machines take: {', '.join(report.found.files)}.",
             "docs/replay.md",
@@ -351,11 +355,13 @@ def report_of(report: DriveReport) -> Report:
     )
 
 
-def _beside(report: DriveReport) -> list[Beside]:
+def _compared_parameters(report: DriveReport) -> list[ComparedParameter]:
     """Identified values beside those of the machine that was given."""
     if report.subject is None:
         return []
-    return beside(report.subject.machine, {axis: one.estimates for axis, one in report.found.drives.items()})
+    return compare_parameters(
+        report.subject.machine, {axis: one.estimates for axis, one in report.found.drives.items()}
+    )
 
 
 def _parameters(axis: str, one: DriveFound) -> Section:
@@ -454,8 +460,13 @@ def details(report: DriveReport) -> dict[str, Any]:
         "axes": {
             axis: {
                 "parameters": {
-                    name: {"value": estimate.value, "unit": estimate.unit, "sigma": finite(estimate.sigma),
-                           "status": estimate.status, "reason": estimate.reason}
+                    name: {
+                        "value": estimate.value,
+                        "unit": estimate.unit,
+                        "sigma": finite(estimate.sigma),
+                        "status": estimate.status,
+                        "reason": estimate.reason,
+                    }
                     for name, estimate in one.estimates.items()
                 },
                 "parts": {
@@ -471,10 +482,22 @@ def details(report: DriveReport) -> dict[str, Any]:
                 },
                 "position_cycle": {"value": one.machine.cycles.T_pos, "unit": "s"},
                 "modes": [
-                    {"frequency": mode.frequency, "damping": mode.damping, "motor": mode.motor, "scale": mode.scale,
-                     "sigma": [finite(sigma) for sigma in mode.sigma],
-                     **({"other_axes": {other.axis: {"shape": other.shape, "sigma": other.sigma}
-                                        for other in mode.beside}} if mode.beside else {})}
+                    {
+                        "frequency": mode.frequency,
+                        "damping": mode.damping,
+                        "motor": mode.motor,
+                        "scale": mode.scale,
+                        "sigma": [finite(sigma) for sigma in mode.sigma],
+                        **(
+                            {
+                                "other_axes": {
+                                    other.axis: {"shape": other.shape, "sigma": other.sigma} for other in mode.beside
+                                }
+                            }
+                            if mode.beside
+                            else {}
+                        ),
+                    }
                     for mode in one.modes
                 ],
                 "modes_predicted": {str(count): value for count, value in one.modes_predicted.items()},
@@ -485,9 +508,11 @@ def details(report: DriveReport) -> dict[str, Any]:
             for axis, one in report.found.drives.items()
         },
         **({"refused": dict(report.found.refused)} if report.found.refused else {}),
-        **({"beside_the_machine_file": beside_part(_beside(report))} if report.subject is not None else {}),
-        "inputs": inputs_part(hashed(_files(report))),
-    }  # fmt: skip
+        **(
+            {"beside_the_machine_file": beside_part(_compared_parameters(report))} if report.subject is not None else {}
+        ),
+        "inputs": inputs_part(hash_files(_files(report))),
+    }
 
 
 def _limits_part(limits: AxisLimits | None) -> dict[str, Any] | None:
@@ -512,7 +537,7 @@ LEADING_PARAMETERS = {
 def _value(estimate: Estimate) -> str:
     """To three digits, in the unit that people type."""
     unit = {"1/s": "(m/min)/mm", "s": "ms"}.get(estimate.unit, estimate.unit)
-    return f"{three(convert(estimate.value, estimate.unit, unit))} {unit}"
+    return f"{three_digits(convert(estimate.value, estimate.unit, unit))} {unit}"
 
 
 def _half(estimate: Estimate) -> str:
@@ -567,4 +592,7 @@ def summary_lines(report: DriveReport) -> list[str]:
             f"{''.join(f', scale of {at_other}' for at_other in _at_others(mode))}"
             for mode in one.modes
         ]
-    return [*lines, *(beside_lines(report.subject.machine, _beside(report)) if report.subject is not None else ())]
+    return [
+        *lines,
+        *(beside_lines(report.subject.machine, _compared_parameters(report)) if report.subject is not None else ()),
+    ]

@@ -32,8 +32,8 @@ from feedsim.report.content import (
     provenance_section,
     tile_value,
 )
-from feedsim.report.formatting import RECORDED, RESIDUAL_COLOUR, SIMULATED, Array, remarked, typeset
-from feedsim.report.provenance import hashed, inputs_part, machine_part, quantity
+from feedsim.report.formatting import RECORDED_COLOUR, RESIDUAL_COLOUR, SIMULATED_COLOUR, Array, remark_charts, typeset
+from feedsim.report.provenance import hash_files, inputs_part, machine_part, quantity
 from feedsim.scenario import Subject
 
 # --- The pictures of a replay: an axis beside its record, and what is left --------------------------------------------
@@ -102,11 +102,15 @@ def names_of(marks: Sequence[Mark], time: Array) -> list[str]:
 
 
 # Colour and width: the record lies on the simulation, which is wider.
-LOOKS = {"recorded": (RECORDED, 1.0), "simulated": (SIMULATED, 2.2), "what is left": (RESIDUAL_COLOUR, 1.2)}
+CURVE_LOOKS = {
+    "recorded": (RECORDED_COLOUR, 1.0),
+    "simulated": (SIMULATED_COLOUR, 2.2),
+    "what is left": (RESIDUAL_COLOUR, 1.2),
+}
 
 
 def _panel(title: str, ordinate: str, unit: str, time: Array, **curves: Array) -> Panel:
-    looks = [(name.replace("_", " "), y, *LOOKS[name]) for name, y in curves.items()]
+    looks = [(name.replace("_", " "), y, *CURVE_LOOKS[name]) for name, y in curves.items()]
     own = [Curve(name, time, y, colour, width=width) for name, y, colour, width in looks]
     axis = Axis("time of the record", "s")
     return Panel(title, axis, Axis(ordinate, unit), own, [Level(0.0, dash="")], linked="t", height=0.9)
@@ -154,7 +158,7 @@ def _residuals(comparison: Comparison) -> Picture:
 
 REPLAY = "replay.csv"
 FILES = (REPLAY,)  # besides report.html and summary.json
-LEADING = {
+LEADING_ERRORS = {
     "position_rms": "position error, rms", "torque_rms": "torque error, rms",
     "share_of_lag": "position error, share of the lag",
 }  # fmt: skip
@@ -162,7 +166,7 @@ MOST_MARKS = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Replayed:
+class ReplayReport:
     """A replay with what it rests on.
 
     comparisons: of the axes. subject: the machine. sources: of the records. marks: events of the record, such as NC
@@ -202,11 +206,11 @@ def trace_of(comparisons: Sequence[Comparison]) -> Trace:
     return Trace(comparisons[0].each.record.time[rows], columns, units)
 
 
-def report_of(replayed: Replayed) -> Report:
+def report_of(replayed: ReplayReport) -> Report:
     """Content of the report."""
     machine = replayed.subject.machine
     pictures = []
-    with remarked(f"{machine.name}. {machine.note}"):
+    with remark_charts(f"{machine.name}. {machine.note}"):
         for comparison in replayed.comparisons:
             pictures += pictures_of(comparison, replayed.marks)
     record = replayed.sources[0].file.name
@@ -227,7 +231,7 @@ def report_of(replayed: Replayed) -> Report:
             control_section(machine),
             parameters_section(machine),
         ],
-        provenance=provenance_section(rows, hashed(_files(replayed))),
+        provenance=provenance_section(rows, hash_files(_files(replayed))),
         footer=figures_footer("Values in full precision: summary.json; time series: replay.csv.", "docs/replay.md"),
     )
 
@@ -236,12 +240,12 @@ def _tiles(figures: Mapping[str, Figure]) -> list[Tile]:
     tiles = []
     for name, figure in figures.items():
         axis, _, key = name.partition(".")
-        if key in LEADING:
-            tiles.append(Tile(tile_value(figure), f"{axis}: {LEADING[key]}", typeset(figure.meaning)))
+        if key in LEADING_ERRORS:
+            tiles.append(Tile(tile_value(figure), f"{axis}: {LEADING_ERRORS[key]}", typeset(figure.meaning)))
     return tiles
 
 
-def _events(replayed: Replayed) -> Section | None:
+def _events(replayed: ReplayReport) -> Section | None:
     time = replayed.comparisons[0].each.record.time[replayed.comparisons[0].each.rows]
     rows = [(f"{mark.time:.3f}", mark.text) for mark in replayed.marks if time[0] <= mark.time <= time[-1]]
     if not rows:
@@ -250,13 +254,13 @@ def _events(replayed: Replayed) -> Section | None:
     return Section("Events in the record", [Table("rp", ("time [s]", "what"), rows[:MOST_MARKS], note)])
 
 
-def _files(replayed: Replayed) -> list[tuple[str, Path]]:
+def _files(replayed: ReplayReport) -> list[tuple[str, Path]]:
     result = [("record", source.file) for source in replayed.sources]
     result += [("mapping", source.mapping) for source in replayed.sources if source.mapping is not None]
     return [*result, *replayed.subject.files, ("modes", replayed.subject.machine.modes)]
 
 
-def details(replayed: Replayed) -> dict[str, Any]:
+def details(replayed: ReplayReport) -> dict[str, Any]:
     """What summary.json has besides the figures."""
     axis_record = replayed.comparisons[0].each
     time = axis_record.record.time[axis_record.rows]
@@ -266,14 +270,14 @@ def details(replayed: Replayed) -> dict[str, Any]:
         "settings": dict(replayed.settings),
         "window": [quantity(float(time[0]), "s"), quantity(float(time[-1]), "s")],
         **({"changes": changes_part(replayed.proposals)} if replayed.proposals else {}),
-        "inputs": inputs_part(hashed(_files(replayed))),
+        "inputs": inputs_part(hash_files(_files(replayed))),
     }
 
 
 SAME_POSITION = 1e-6  # [um] of a position, below which records show nothing but rounding
 
 
-def answers(replayed: Replayed) -> list[str]:
+def answers(replayed: ReplayReport) -> list[str]:
     """What is left, a line per axis."""
     lines = []
     for comparison in replayed.comparisons:
@@ -296,6 +300,6 @@ def answers(replayed: Replayed) -> list[str]:
     return lines
 
 
-def lines(replayed: Replayed) -> list[str]:
+def lines(replayed: ReplayReport) -> list[str]:
     """For the terminal: the answers, and what to change."""
     return [f"  {line}" for line in (*answers(replayed), *change_lines(replayed.proposals))]

@@ -7,9 +7,9 @@ Start with files.py, then report.py, the page; pose.py has the plant's pose.
 from feedsim.report.changes import action
 from feedsim.report.page import PARTIAL
 from feedsim.report.provenance import input_paths
-from feedsim.report.run.files import FILES, details, files_of, growing, page_of
-from feedsim.report.run.files import needed as workbook_needed
-from feedsim.report.run.report import answers, changes, first_proposals, summary_line
+from feedsim.report.run.files import FILES, details, files_of, growing_result, page_of
+from feedsim.report.run.files import require_workbooks as workbook_needed
+from feedsim.report.run.report import answers, first_proposals, proposed_changes, summary_line
 from feedsim.report.run.sheet import in_workbook
 
 __all__ = [
@@ -17,14 +17,14 @@ __all__ = [
     "PARTIAL",
     "action",
     "answers",
-    "changes",
     "details",
     "files_of",
     "first_proposals",
-    "growing",
+    "growing_result",
     "in_workbook",
     "input_paths",
     "page_of",
+    "proposed_changes",
     "summary_line",
     "workbook_needed",
 ]

@@ -16,19 +16,19 @@ from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Mark, Panel, Polar, column_of
 from feedsim.report.content import Picture, Section, Table
 from feedsim.report.formatting import (
-    ALLOWED,
+    ALLOWED_COLOUR,
+    ALTERNATIVE_COLOUR,
     AT_TOOL,
     BLUE,
     CLOCKWISE,
-    FRICTION,
+    FRICTION_COLOUR,
     GREEN,
     INK,
     ORANGE,
-    OTHERWISE,
     PURPLE,
     RESIDUAL_COLOUR,
-    SETPOINT,
-    SIMULATED,
+    SETPOINT_COLOUR,
+    SIMULATED_COLOUR,
     SKY,
     VERMILLION,
     Array,
@@ -69,26 +69,28 @@ def positioning_picture(
     )
     caption += "; motor torque and friction torque over time" if has_torque else ""
     caption += ", both drawn with reversed sign." if has_torque and torque_sign < 0 else "."
-    return Picture(stem, title, caption, _positioning(trace, approach, figures, band, torque_sign))
+    return Picture(stem, title, caption, _positioning_chart(trace, approach, figures, band, torque_sign))
 
 
-def _positioning(trace: Trace, approach: Approach, figures: Figures, band: float, sign: int) -> Chart:
+def _positioning_chart(trace: Trace, approach: Approach, figures: Figures, band: float, sign: int) -> Chart:
     """Position over time, distance beyond the target about the end of the motion, torque over time."""
     axis = approach.axis
     part = trace.between(approach.start, approach.until)
     end = Level(approach.end, "end of NC motion", upright=True, dash="dotted")
     position = []
     if f"{axis}.x_s" in part.columns:
-        position.append(Curve("setpoint x_s", part.time, part[f"{axis}.x_s"] * 1e3, SETPOINT, "dashed", 1.6))
+        position.append(Curve("setpoint x_s", part.time, part[f"{axis}.x_s"] * 1e3, SETPOINT_COLOUR, "dashed", 1.6))
     position.append(Curve(SCALE, part.time, part[f"{axis}.x_a"] * 1e3))
     panels = [
         Panel(f"Position of axis {axis}", TIME, Axis("position", "mm"), position, [end], linked="t"),
-        _beyond(trace, approach, figures, band),
+        _overshoot_panel(trace, approach, figures, band),
     ]
     if f"{axis}.M_a" in trace.columns:
         curves = [Curve("motor torque M_a", part.time, sign * part[f"{axis}.M_a"])]
         if f"{axis}.M_fr" in part.columns:
-            curves.append(Curve("friction torque M_fr", part.time, sign * part[f"{axis}.M_fr"], FRICTION, width=1.2))
+            curves.append(
+                Curve("friction torque M_fr", part.time, sign * part[f"{axis}.M_fr"], FRICTION_COLOUR, width=1.2)
+            )
         levels = [end, Level(0.0, dash="")]
         if approach.steady is not None and math.isfinite(level := _value(figures, "plateau_torque")):
             ends = tuple(approach.steady[0] + share * (approach.steady[1] - approach.steady[0]) for share in PLATEAU)
@@ -100,12 +102,12 @@ def _positioning(trace: Trace, approach: Approach, figures: Figures, band: float
     return Chart(panels)
 
 
-def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> Panel:
+def _overshoot_panel(trace: Trace, approach: Approach, figures: Figures, band: float) -> Panel:
     curves = []
     reach = [2.2 * band * 1e6]
     looks: tuple[tuple[str, str, str, Dash], ...] = (
         (TOOL_TITLE, f"tcp.x_{approach.axis}", AT_TOOL, "dashed"),
-        (SCALE, f"{approach.axis}.x_a", SIMULATED, ""),
+        (SCALE, f"{approach.axis}.x_a", SIMULATED_COLOUR, ""),
     )
     for name, signal, colour, dash in looks:
         if signal in trace.columns:
@@ -133,7 +135,7 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
              span=(-1.45 * max(reach), 1.45 * max(reach))),
         curves,
         [Level(0.0, dash=""), Level(0.0, upright=True, dash="dotted")],
-        [Band("", -band * 1e6, band * 1e6, colour=ALLOWED)],
+        [Band("", -band * 1e6, band * 1e6, colour=ALLOWED_COLOUR)],
         marks,
         note=note,
         height=1.15,
@@ -232,9 +234,9 @@ def signals_picture(trace: Trace, title: str) -> Picture:
 #     speed
 
 
-RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
+RING_SCALE = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
 GAP = 5.0  # deg of a turn that is not recorded; curves break there
-COLOURS = {1: SIMULATED, -1: CLOCKWISE}  # by the sense of the turn, where there are two
+COLOURS = {1: SIMULATED_COLOUR, -1: CLOCKWISE}  # by the sense of the turn, where there are two
 HIGHER = 10e-9  # m; a peak that is higher by less has the same height for a reader
 
 
@@ -261,16 +263,16 @@ def contour_picture(
     tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
     if all(name in trace.columns for name in tool):
         by_tool = contour(trace, turn, tool)
-        curves.append(turned(TOOL_TITLE, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
+        curves.append(turn_curve(TOOL_TITLE, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
     dash: Dash
     over, seen = "", {turn.sense: by_scale}
     if back is None:
-        curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
+        curves.append(turn_curve("linear scales", SIMULATED_COLOUR, by_scale.angle, by_scale.deviation, width=1.6))
     else:
         seen[back.sense] = other = contour(trace, back)
         for sense, own, dash, width in ((turn.sense, by_scale, "", 1.6), (back.sense, other, "dashed", 1.2)):
             name = f"linear scales, {SENSE_WORDS[sense]}"
-            curves.append(turned(name, COLOURS[sense], own.angle, own.deviation, dash, width))
+            curves.append(turn_curve(name, COLOURS[sense], own.angle, own.deviation, dash, width))
         over = f" Dashed: {SENSE_WORDS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (
@@ -342,9 +344,9 @@ def _torques(part: Trace, axes: Sequence[str], signs: Mapping[str, int]) -> Char
     panels = []
     for axis in axes:
         sign, speed = signs.get(axis, 1), part[f"{axis}.n_a"]
-        torques = [("motor M_a", sign * part[f"{axis}.M_a"], SIMULATED)]
+        torques = [("motor M_a", sign * part[f"{axis}.M_a"], SIMULATED_COLOUR)]
         if f"{axis}.M_fr" in part.columns:
-            torques.append(("friction M_fr", sign * part[f"{axis}.M_fr"], FRICTION))
+            torques.append(("friction M_fr", sign * part[f"{axis}.M_fr"], FRICTION_COLOUR))
         ordinate = torque_axis(sign)
         n_a = Axis("motor speed n_a", "rad/s")
         near = Axis(n_a.label, n_a.unit, span=_about_zero(0.12 * float(np.abs(speed).max() or 1.0)))
@@ -368,13 +370,13 @@ def circle(on: OnCircle, largest: float) -> Polar:
 
 def ring_step(largest: float) -> float:
     """Distance of the scale rings [um] for an error of up to ``largest`` [um]: 10 um as long as that is readable."""
-    if RING / 5 <= largest <= 2 * RING:
-        return RING
+    if RING_SCALE / 5 <= largest <= 2 * RING_SCALE:
+        return RING_SCALE
     decade = 10.0 ** math.floor(math.log10(max(largest, 0.1)))
     return next(step for step in (decade, 2 * decade, 5 * decade, 10 * decade) if max(largest, 0.1) <= 1.5 * step)
 
 
-def turned(name: str, colour: str, angle: Array, off: Array, dash: Dash = "", width: float = 1.4) -> Curve:
+def turn_curve(name: str, colour: str, angle: Array, off: Array, dash: Dash = "", width: float = 1.4) -> Curve:
     """A turn [rad, m] as a curve of a polar panel."""
     return Curve(name, angle, off * 1e6, colour, dash, width)
 
@@ -385,10 +387,12 @@ def circle_chart(
 ) -> Chart:  # fmt: skip
     """Turns about the circle and, beside it, over the angle. on: the circle, without curves."""
     polar = Polar(on.title, on.axes, on.radius, on.ring, on.rings, curves, marks, sense, note)
-    return Chart([polar, unrolled(on.axes, curves, marks, levels)], (1.2, 1.0))
+    return Chart([polar, unrolled_panel(on.axes, curves, marks, levels)], (1.2, 1.0))
 
 
-def unrolled(axes: tuple[str, str], curves: Sequence[Curve], marks: Sequence[Mark], levels: Sequence[Level]) -> Panel:
+def unrolled_panel(
+    axes: tuple[str, str], curves: Sequence[Curve], marks: Sequence[Mark], levels: Sequence[Level]
+) -> Panel:
     """Turns over the angle [deg]."""
     over = []
     for curve in curves:
@@ -425,7 +429,7 @@ NOTE = (
     "approaches from below (upwards) and from above (downwards), reversal value B and bidirectional repeatability R. "
     "Letters after ISO 230-2."
 )
-SIDES = (("approached upwards", SIMULATED), ("approached downwards", OTHERWISE))
+SIDES = (("approached upwards", SIMULATED_COLOUR), ("approached downwards", ALTERNATIVE_COLOUR))
 
 
 def accuracy_picture(prefix: str, accuracy: Accuracy, stem: str) -> Picture:

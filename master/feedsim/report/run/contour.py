@@ -17,16 +17,16 @@ from feedsim.report.chart.model import extremes
 from feedsim.report.content import Picture, Section, Table, Text, code
 from feedsim.report.formatting import (
     AT_TOOL,
-    FRICTION,
+    FRICTION_COLOUR,
     GREEN,
     ORANGE,
     PURPLE,
-    SETPOINT,
-    SIMULATED,
+    SETPOINT_COLOUR,
+    SIMULATED_COLOUR,
     SKY,
     VERMILLION,
     Array,
-    counted,
+    count_things,
     minus,
     number,
 )
@@ -34,8 +34,8 @@ from feedsim.report.provenance import quantity
 from feedsim.report.run.axis_plots import TIME, TOOL_TITLE
 
 BLOCKS_FILE = "blocks.csv"
-WORST = 12  # blocks of the report's table
-SHARE_COLOURS = {"plan": GREEN, "servo": SIMULATED, "friction": FRICTION, "structure": ORANGE}
+WORST_BLOCK_COUNT = 12  # blocks of the report's table
+SHARE_COLOURS = {"plan": GREEN, "servo": SIMULATED_COLOUR, "friction": FRICTION_COLOUR, "structure": ORANGE}
 # Classes of the path's picture, as shares of the largest distance, and their colours.
 CLASSES = ((0.25, GREEN), (0.5, SKY), (0.75, PURPLE), (1.0, VERMILLION))
 # Of the picture: rows of the path, share of its width that the largest distance is magnified to, and its height.
@@ -115,7 +115,9 @@ def _path_picture(error: ContourError, stem: str) -> Picture:
         kind="stable",
     )
     programmed = whole[order] * 1e3
-    curves = [Curve("programmed path", programmed[:, 0], programmed[:, 1], SETPOINT, "dotted", 1.0, most=3 * MOST_ROWS)]
+    curves = [
+        Curve("programmed path", programmed[:, 0], programmed[:, 1], SETPOINT_COLOUR, "dotted", 1.0, most=3 * MOST_ROWS)
+    ]
     # Rapids are left out: what comes before one and behind it is not joined.
     left_out = np.cumsum(~error.cutting[deviations.row])[rows]
     gaps = np.flatnonzero(np.diff(left_out)) + 1
@@ -163,7 +165,7 @@ def _course_picture(error: ContourError, stem: str) -> Picture:
     curves = []
     if "tool" in error.by:
         curves.append(Curve(TOOL_TITLE, error.time, error.by["tool"].distance * 1e6, AT_TOOL, "dashed", 1.0))
-    curves.append(Curve("linear scales", error.time, scale.distance * 1e6, SIMULATED, width=1.4))
+    curves.append(Curve("linear scales", error.time, scale.distance * 1e6, SIMULATED_COLOUR, width=1.4))
     shares = [
         Curve(name, error.time, values * 1e6, SHARE_COLOURS[name], width=1.2) for name, values in scale.shares.items()
     ]
@@ -183,8 +185,8 @@ def _course_picture(error: ContourError, stem: str) -> Picture:
     feeds = np.nan_to_num(programmed.moves.feed, nan=0.0) * 6e4
     starts = programmed.begin + np.column_stack([programmed.plan.start_time, programmed.plan.end_time]).ravel()
     planned = [
-        Curve("programmed feed", starts, np.repeat(feeds, 2), SETPOINT, "dotted", 1.0),
-        Curve("planned speed", time[1:], speed, SIMULATED, width=1.2),
+        Curve("programmed feed", starts, np.repeat(feeds, 2), SETPOINT_COLOUR, "dotted", 1.0),
+        Curve("planned speed", time[1:], speed, SIMULATED_COLOUR, width=1.2),
     ]
     zero = [Level(0.0, dash="")]
     panels = [
@@ -226,7 +228,7 @@ def _worst_table(error: ContourError) -> Table:
     blocks, tool = error.blocks["scale"], error.blocks.get("tool")
     several = len(moves.files) > 1
     rows: list[tuple[Text, ...]] = []
-    for row in error.worst(WORST):
+    for row in error.worst(WORST_BLOCK_COUNT):
         at = int(blocks.at[row])
         where = error.programmed.place(row) if several else str(moves.line[row])
         rows.append(
@@ -234,7 +236,7 @@ def _worst_table(error: ContourError) -> Table:
                 where, code(moves.text(row)), _um(blocks.largest[row]), _um(blocks.rms[row]), _um(blocks.p95[row]),
                 *(_um(float(share[at])) for share in scale.shares.values()),
                 _um(tool.largest[row]) if tool is not None else "–",
-                f"{plan.end_time[row] - plan.start_time[row]:.4f}", number(_speed(error, row) * 6e4),
+                f"{plan.end_time[row] - plan.start_time[row]:.4f}", number(_block_speed(error, row) * 6e4),
                 error.programmed.limits[row],
             )
         )  # fmt: skip
@@ -243,13 +245,14 @@ def _worst_table(error: ContourError) -> Table:
         "Tool [µm]", "Time [s]", "Speed [mm/min]", "Limit",
     )  # fmt: skip
     note = (
-        f"The {counted(len(rows), 'block')} with the largest distance of the axes; shares of that distance, which add "
+        f"The {count_things(len(rows), 'block')} with the largest distance of the axes; shares of that distance, "
+        f"which add "
         f"up to it. Tool: largest distance of the tool point in the block. All blocks: {BLOCKS_FILE}."
     )
     return Table("ll" + "r" * (len(heads) - 3) + "l", heads, rows, note)
 
 
-def _speed(error: ContourError, row: int) -> float:
+def _block_speed(error: ContourError, row: int) -> float:
     """Mean speed of a block along the programmed path [m/s]."""
     path, plan = error.programmed.path, error.programmed.plan
     length = float(np.diff(path.s)[path.row == row].sum())
@@ -338,7 +341,7 @@ def blocks_csv(error: ContourError) -> str:
 def contour_part(error: ContourError) -> dict[str, Any]:
     """The contour error in summary.json, in SI."""
     moves, plan = error.programmed.moves, error.programmed.plan
-    worst = {by: np.array(error.worst(WORST, by), dtype=np.int64) for by in error.by}
+    worst = {by: np.array(error.worst(WORST_BLOCK_COUNT, by), dtype=np.int64) for by in error.by}
     vectors = {by: error.vectors(by, error.blocks[by].at[rows]) for by, rows in worst.items()}
     return {
         "delay": quantity(error.delay, "s"),

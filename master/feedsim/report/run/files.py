@@ -23,7 +23,7 @@ from feedsim.analysis import (
 )
 from feedsim.design.tune import Proposal
 from feedsim.files.trace import Trace, write_csv
-from feedsim.foundation.installation import ask
+from feedsim.foundation.installation import require_extras
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.changes import action, changes_part
 from feedsim.report.content import Report
@@ -39,14 +39,14 @@ from feedsim.report.run import sheet
 from feedsim.report.run.contour import BLOCKS_FILE, blocks_csv, contour_part
 from feedsim.report.run.pose import diagnosis_part, pose_part
 from feedsim.report.run.report import (
-    COUPLING,
+    COUPLING_MEANINGS,
     LOG,
     PAGE,
     RESULT,
-    changes,
     draw,
     first_proposals,
-    leading,
+    leading_names,
+    proposed_changes,
     real_time_factor,
     report_of,
     signal_unit,
@@ -57,7 +57,7 @@ from feedsim.simulation.judge import JudgedRun
 
 if TYPE_CHECKING:
     from feedsim.design.uncertainty import Uncertainty
-    from feedsim.report.run.sheet import Filled
+    from feedsim.report.run.sheet import FilledSheet
 
 
 # --- Acceptance sheets as an Excel workbook: numbers as numbers, whatever the decimal sign of the reader's country ----
@@ -66,26 +66,28 @@ if TYPE_CHECKING:
 
 MAX_SHEET_NAME = 31  # of a worksheet, which Excel also forbids these characters in
 FORBIDDEN = re.compile(r"[\[\]:*?/\\']")
-CREATED = datetime(1980, 1, 1, tzinfo=UTC)  # the same result has the same bytes
+CREATION_DATE = datetime(1980, 1, 1, tzinfo=UTC)  # the same result has the same bytes
 WIDTHS = (24, 44, 14, 14, 14, 14)  # of the first columns, in characters
 LONGEST_TEXT = 32767  # of a cell
 
 
-def needed() -> None:
+def require_workbooks() -> None:
     """Raise MissingPackage unless workbooks can be written."""
-    ask("sheet.xlsx (sheet: {xlsx: true})", "xlsx")
+    require_extras("sheet.xlsx (sheet: {xlsx: true})", "xlsx")
 
 
-def workbook(sheets: Sequence[Filled], rule: str) -> bytes:
+def workbook(sheets: Sequence[FilledSheet], rule: str) -> bytes:
     """Content of sheet.xlsx. rule: how a figure is judged. Raises MissingPackage without XlsxWriter."""
-    needed()
+    require_workbooks()
     import xlsxwriter
 
     content = io.BytesIO()
     # A text of the user that looks like a formula or an address stays a text.
     options = {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
     with xlsxwriter.Workbook(content, options) as book:
-        book.set_properties({"title": "Acceptance sheet", "created": CREATED, "comments": "Written by feedsim run."})
+        book.set_properties(
+            {"title": "Acceptance sheet", "created": CREATION_DATE, "comments": "Written by feedsim run."}
+        )
         names: set[str] = set()
         for sheet in sheets:
             _fill(book, book.add_worksheet(_name(sheet.title, names)), sheet, rule)
@@ -104,7 +106,7 @@ def _name(title: str, taken: set[str]) -> str:
     return name
 
 
-def _fill(book: Any, page: Any, sheet: Filled, rule: str) -> None:
+def _fill(book: Any, page: Any, sheet: FilledSheet, rule: str) -> None:
     title = book.add_format({"bold": True, "font_size": 14})
     head = book.add_format({"bold": True, "bottom": 1, "text_wrap": True, "valign": "top"})
     verdict = book.add_format({"bold": True, "border": 2, "align": "center"})
@@ -166,7 +168,7 @@ FORMAT = 1
 FILES = (RESULT, LOG, PAGE, BANDS, BLOCKS_FILE, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL)  # besides the report
 
 
-def growing(directory: Path | str) -> Partial:
+def growing_result(directory: Path | str) -> Partial:
     """What takes a run's rows while it goes on, for :func:`files_of`."""
     return Partial(directory, RESULT)
 
@@ -182,7 +184,7 @@ def page_of(
 ) -> Report:
     """Content of the report, with the intervals where there are some."""
     report = report_of(run, figures, draw(run, figures, causes), causes, page=page, proposals=proposals)
-    return report if uncertainty is None else with_intervals(report, uncertainty, figures, leading(figures))
+    return report if uncertainty is None else with_intervals(report, uncertainty, figures, leading_names(figures))
 
 
 def files_of(
@@ -228,7 +230,7 @@ def details(
     """What summary.json has besides the figures; a figure that could not be determined has the value null."""
     causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
-    proposals = changes(run, figures, causes) if proposals is None else proposals
+    proposals = proposed_changes(run, figures, causes) if proposals is None else proposals
     return {
         "format": FORMAT,
         "action": action(first_proposals(proposals, causes), machine),
@@ -277,7 +279,7 @@ def details(
         "inputs": inputs_part(input_files(scenario)),
         "units": {name: dict(unit) for name, unit in run.units.items()},
         "coupling": {
-            name: {"value": value, "unit": "J", "meaning": COUPLING[name.partition(".")[2]]}
+            name: {"value": value, "unit": "J", "meaning": COUPLING_MEANINGS[name.partition(".")[2]]}
             for name, value in run.coupling.items()
         },
         "performance": {

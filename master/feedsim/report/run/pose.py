@@ -6,11 +6,21 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, separating_radius, swinging
+from feedsim.analysis.circle import (
+    Diagnosis,
+    Peak,
+    Term,
+    cause_sentence,
+    describe_vibrations,
+    explain_circle,
+    separating_radius,
+    suggest_circles,
+    term_name,
+)
 from feedsim.analysis.evaluate import FIGURE_UNITS
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.content import Paragraph, Part, Section, Table, Tile, pairs_table
-from feedsim.report.formatting import counted, minus, number, three, typeset
+from feedsim.report.formatting import count_things, minus, number, three_digits, typeset
 from feedsim.report.provenance import finite, quantity
 from feedsim.simulation.judge import PoseUse
 from feedsim.structure.pose_change import (
@@ -30,7 +40,7 @@ def pose_section(pose: PoseUse | None) -> Section | None:
         return None
     change = pose.change
     axes = [_axis(axis) for axis in change.axes if axis.modes]
-    return Section("Pose of the plant", [*_followed(pose), *_distances(change), _unknown(change), *axes], "pose")
+    return Section("Pose of the plant", [*_describe_cells(pose), *_distances(change), _unknown(change), *axes], "pose")
 
 
 def pose_part(pose: PoseUse | None) -> dict[str, Any] | None:
@@ -92,11 +102,11 @@ def _compliance_part(item: Compliance) -> Mapping[str, Any]:
     return {"of": item.name, "unit": item.unit, "at_lowest": low, "at_pose": here, "at_highest": high}
 
 
-def _followed(pose: PoseUse) -> list[Part]:
+def _describe_cells(pose: PoseUse) -> list[Part]:
     if not pose.grid:
         return []
     cells = ", ".join(
-        f"{axis.axis}: {counted(len(axis.centres), 'cell')}, centres {axis.limits[0] * 1e3:.5g} to "
+        f"{axis.axis}: {count_things(len(axis.centres), 'cell')}, centres {axis.limits[0] * 1e3:.5g} to "
         f"{axis.limits[1] * 1e3:.5g} mm"
         for axis in pose.grid
     )
@@ -133,13 +143,13 @@ def _distances(change: PoseChange) -> list[Part]:
     heads = ("Axis", "Pose [mm]", "Lowest [mm]", "Highest [mm]", "Distance [mm]", "Largest change of a frequency")
     rows = [
         (axis.axis, *(f"{at * 1e3:.6g}" for at in (axis.pose, axis.low, axis.high)), f"{axis.distance * 1e3:.4g}",
-         _largest(axis))
+         _largest_change(axis))
         for axis in change.axes
     ]  # fmt: skip
     return [Paragraph(text), Table("lrrrrr", heads, rows)]
 
 
-def _largest(axis: AxisChange) -> str:
+def _largest_change(axis: AxisChange) -> str:
     if axis.largest is None:
         return "below 0.1 %" if axis.distance <= MIN_POSE_DISTANCE else "not known"
     return f"{_percent(axis.largest.change)} %"
@@ -192,11 +202,11 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     """Every cause with its interval, what it makes alone, its share of G and what it means; and the reversal peaks."""
     rows = [
         (
-            name(term)[:1].upper() + name(term)[1:],
+            term_name(term)[:1].upper() + term_name(term)[1:],
             _value(term),
             _um(term.size),
             _share(term),
-            typeset(sentence(diagnosis, term)),
+            typeset(cause_sentence(diagnosis, term)),
         )
         for term in diagnosis.terms
     ]
@@ -211,9 +221,9 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
             f"\nA circle of {1e3 * separating_radius(diagnosis.circle, diagnosis.left_out):.3g} mm or more separates "
             f"errors that repeat with the pitch of {axes}; this one is too small."
         )
-    if words := swinging(diagnosis):
+    if words := describe_vibrations(diagnosis):
         note += f"\n{typeset(words)}"
-    note += "".join(f"\n{typeset(words)}" for words in further(diagnosis))
+    note += "".join(f"\n{typeset(words)}" for words in suggest_circles(diagnosis))
     heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
     peaks = [(minus(peak.name), SENSE_WORDS[peak.sense], *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
@@ -229,25 +239,25 @@ def cause_tile(diagnosis: Diagnosis, term: Term) -> Tile:
     own = [peak.height for peak in diagnosis.peaks if term.key == "peaks" and peak.axis == term.axis]
     factor, unit = FIGURE_UNITS[term.unit]
     value = 1e6 * max(own, key=abs) if own else factor * abs(term.value)
-    label = f"reversal peak, {term.axis} reverses" if own else name(term)
-    return Tile(f"{three(value)} {typeset(unit)}", label, typeset(sentence(diagnosis, term)))
+    label = f"reversal peak, {term.axis} reverses" if own else term_name(term)
+    return Tile(f"{three_digits(value)} {typeset(unit)}", label, typeset(cause_sentence(diagnosis, term)))
 
 
 def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis in summary.json, in SI."""
     return {
-        "answer": answer(diagnosis),
+        "answer": explain_circle(diagnosis),
         "directions": [SENSE_WORDS[sense] for sense in diagnosis.senses],
         **({"G": quantity(diagnosis.G, "m")} if diagnosis.arc is None else {"arc_range": quantity(diagnosis.G, "m")}),
         "causes": [
             {
-                "name": name(term),
+                "name": term_name(term),
                 **quantity(term.value, term.unit),
                 "half_interval": finite(term.half),
                 "alone": quantity(term.size, "m"),
                 "share": term.share,
                 "told_from_zero": term.shows,
-                "meaning": sentence(diagnosis, term),
+                "meaning": cause_sentence(diagnosis, term),
             }
             for term in diagnosis.terms
         ],
@@ -288,7 +298,7 @@ def _of_records(diagnosis: Diagnosis) -> dict[str, Any]:
             "standard_deviation": diagnosis.angles.deviation,
             "seen": diagnosis.angles.seen,
         },
-        "further": further(diagnosis),
+        "further": suggest_circles(diagnosis),
     }
 
 

@@ -17,15 +17,15 @@ from feedsim.analysis import (
     Figure,
     Figures,
     PositioningTask,
-    answer,
     contours,
-    doubts,
+    doubt_figures,
+    explain_circle,
     program_notes,
     tasks,
 )
 from feedsim.analysis.circle import worth_telling
 from feedsim.design.tune import Proposal, of_run
-from feedsim.design.tune.proposals import rings
+from feedsim.design.tune.proposals import waits_for_ringing
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import show
@@ -34,7 +34,7 @@ from feedsim.report.changes import action, change_words, changes_section, contro
 from feedsim.report.chart import Chart, Panel
 from feedsim.report.content import FOLDER, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
 from feedsim.report.content import TILES as TILES_SHOWN
-from feedsim.report.formatting import NARROW, counted, duration, number, remarked, two, typeset
+from feedsim.report.formatting import NARROW, count_things, duration, number, remark_charts, two_digits, typeset
 from feedsim.report.provenance import (
     friction_origins,
     input_files,
@@ -59,7 +59,7 @@ from feedsim.simulation.judge import JudgedRun
 
 # Of A, what repeats is worth compensating from this share of it on.
 SYSTEMATIC = 0.5
-STIRRED = 0.02  # share of the largest travel, up to which an axis has been stirred rather than moved
+STIRRED_TRAVEL_SHARE = 0.02  # share of the largest travel, up to which an axis has been stirred rather than moved
 
 
 def stop_words(figures: Figures, band: float, remedy: str = "") -> str:
@@ -75,20 +75,20 @@ def stop_words(figures: Figures, band: float, remedy: str = "") -> str:
     if math.isfinite(overshoot.value) and not math.isfinite(settled.value) and math.isfinite(frequency):
         return (
             f"is not yet at rest within {within} at the end: it oscillates at {frequency:.3g} Hz, up to "
-            f"{two(overshoot.value)} um past its target.{advice}"
+            f"{two_digits(overshoot.value)} um past its target.{advice}"
         )
     if not math.isfinite(overshoot.value) or not math.isfinite(settled.value):
         return f"may have settled within {within} or not: too little of the rest is recorded. Add a dwell."
     settles = (
-        f"settles within {within} in {two(settled.value)} ms"
+        f"settles within {within} in {two_digits(settled.value)} ms"
         if settled.value > 0
         else f"is settled within {within} at the end of the motion"
     )
-    said = f"overshoots by {two(overshoot.value)} um and {settles}."
+    said = f"overshoots by {two_digits(overshoot.value)} um and {settles}."
     if (mounts := figures.get("settling_of_mounts")) is not None and math.isfinite(mounts.value):
-        said += f" On mounts that hold still it settles in {two(settled.value - mounts.value)} ms"
+        said += f" On mounts that hold still it settles in {two_digits(settled.value - mounts.value)} ms"
         said += f": the mounts make {100 * mounts.value / settled.value:.0f} % of it." if mounts.value > 0 else "."
-    if rings(settled.value * 1e-3, frequency):
+    if waits_for_ringing(settled.value * 1e-3, frequency):
         said += f" It rings at {frequency:.3g} Hz{'.' if remedy else '; lower the jerk.'}"
     return f"{said}{advice}"
 
@@ -156,7 +156,7 @@ def wrong_ones(run: JudgedRun) -> list[Finding]:
 def travels(trace: Trace) -> dict[str, float]:
     """Axis -> its travel [m], of those that have been moved rather than stirred; the largest first."""
     result = {name.partition(".")[0]: float(np.ptp(y)) for name, y in trace.columns.items() if name.endswith(".x_a")}
-    result = {axis: travel for axis, travel in result.items() if travel > STIRRED * max(result.values())}
+    result = {axis: travel for axis, travel in result.items() if travel > STIRRED_TRAVEL_SHARE * max(result.values())}
     return dict(sorted(result.items(), key=lambda entry: -entry[1]))
 
 
@@ -211,7 +211,7 @@ HEADER = (
     "rms",
     "speed",
 )
-COUPLING = {
+COUPLING_MEANINGS = {
     "residual": "interface energy residual: what the plant gave to the friction bond less what friction took from it",
     "residual_peak": "largest magnitude of the interface energy residual during the run",
     "friction_work": "work of the friction torque, to hold the residual against",
@@ -251,17 +251,19 @@ def report_of(
     scenario, machine = run.scenario, run.scenario.machine
     unstable = bool(wrong_ones(run))
     causes = {} if unstable else causes or {}
-    proposals = changes(run, figures, causes) if proposals is None else proposals
+    proposals = proposed_changes(run, figures, causes) if proposals is None else proposals
     footer = f"Values in full precision: summary.json; time series: result.csv. {speed_line(run).capitalize()}."
     return Report(
         scenario.name,
-        f"{machine.name} · {counted(len(scenario.motions), 'motion')}, {run.program.duration:.4g} s",
+        f"{machine.name} · {count_things(len(scenario.motions), 'motion')}, {run.program.duration:.4g} s",
         answer=answers(run, figures, causes, proposals) or ([] if unstable else moved_words(run.trace)),
         action=action(first_proposals(proposals, causes), machine),
-        warnings=run.warnings if unstable else (*run.warnings, *doubts(figures, causes), *program_notes(run.program)),
+        warnings=run.warnings
+        if unstable
+        else (*run.warnings, *doubt_figures(figures, causes), *program_notes(run.program)),
         notes=(machine.note, scenario.note),
         tiles=[] if unstable else [*cause_tiles(causes), *tiles(figures, sheet.limits_of(run), list(causes)[:1])],
-        lead=lead(run, pictures),
+        lead=lead_picture(run, pictures),
         next_step=next_step(run, causes, proposals),
         main=[
             TRY_IT if page else None,
@@ -292,7 +294,7 @@ def accuracy_sections(run: JudgedRun) -> list[Section]:
     ]
 
 
-def changes(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Proposal]:
+def proposed_changes(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Proposal]:
     """What to change; nothing of a run that is wrong, which shows nothing else."""
     return [] if wrong_ones(run) else of_run(run, causes, figures)
 
@@ -312,10 +314,12 @@ def answers(
     """What circles, stops and positioning cycles are, why, and what to do: a line each; none of a run that is wrong."""
     if wrong_ones(run):
         return []
-    proposals = changes(run, figures, causes) if proposals is None else proposals
+    proposals = proposed_changes(run, figures, causes) if proposals is None else proposals
     first = first_proposals(proposals, causes)
     remedies = {prefix: first[0].what for prefix in list(causes)[:1] if first}
-    result = [f"{prefix}: {answer(diagnosis, remedies.get(prefix, ''))}" for prefix, diagnosis in causes.items()]
+    result = [
+        f"{prefix}: {explain_circle(diagnosis, remedies.get(prefix, ''))}" for prefix, diagnosis in causes.items()
+    ]
     for task in tasks(run.scenario, run.program):
         own = {
             name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
@@ -367,7 +371,7 @@ def _has_peak(name: str, figures: Mapping[str, Figure]) -> bool:
     return ".glitch_" in name and name.replace(".glitch_", ".peak_") in figures
 
 
-def lead(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
+def lead_picture(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
     """The picture of the first screen, where it is not the first one: a stop without the way to it."""
     for task in tasks(run.scenario, run.program)[:1]:
         if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
@@ -393,11 +397,11 @@ def tile(name: str, figure: Figure, limit: float | None = None) -> Tile:
 def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:
     """The figures of a report: those of every evaluation, and an overview of all axes. causes: as of report_of()."""
     machine = run.scenario.machine
-    with remarked(f"{machine.name}. {machine.note}", *NARROW):
-        return _drawn(run, figures, causes or {})
+    with remark_charts(f"{machine.name}. {machine.note}", *NARROW):
+        return _draw_tasks(run, figures, causes or {})
 
 
-def _drawn(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Picture]:
+def _draw_tasks(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Picture]:
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     pictures: list[Picture] = []
     for task in tasks(run.scenario, run.program):
@@ -471,15 +475,15 @@ def provenance(run: JudgedRun) -> Section:
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
         (
             "Coupling",
-            f"{coupling.scheme}, {counted(coupling.steps(machine), 'exchange step')} per control cycle"
+            f"{coupling.scheme}, {count_things(coupling.steps(machine), 'exchange step')} per control cycle"
             + (", inside one unit" if coupling.units == "one" else ""),
         ),
     ]
     used, parameters = content.archives_table(run.units), content.parameters_section(machine)
-    return content.provenance_section(rows, input_files(scenario), used, _coupling(run.coupling), parameters)
+    return content.provenance_section(rows, input_files(scenario), used, _coupling_section(run.coupling), parameters)
 
 
-def _coupling(coupling: Mapping[str, float]) -> Section | None:
+def _coupling_section(coupling: Mapping[str, float]) -> Section | None:
     rows = []
     for axis in dict.fromkeys(name.partition(".")[0] for name in coupling):
         work, residual = (coupling.get(f"{axis}.{name}", math.nan) for name in ("friction_work", "residual"))
@@ -504,11 +508,11 @@ def speed_line(run: JudgedRun) -> str:
 
 def summary_line(run: JudgedRun, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
-    shown = [] if wrong_ones(run) else [f"{name} {figures[name]}" for name in leading(figures)]
+    shown = [] if wrong_ones(run) else [f"{name} {figures[name]}" for name in leading_names(figures)]
     return ", ".join([*shown, speed_line(run)])
 
 
-def leading(figures: Mapping[str, Figure]) -> list[str]:
+def leading_names(figures: Mapping[str, Figure]) -> list[str]:
     """Names of the figures that say most, a reversal by one height."""
     return [name for name in figures if is_leading(name, LINE) and not _has_peak(name, figures)]
 

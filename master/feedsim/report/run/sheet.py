@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from feedsim.simulation.cosim import Run
 
 HTML, CSV, XLSX = "sheet.html", "sheet.csv", "sheet.xlsx"
-SIMULATED = "Simulated by feedsim. Nothing was measured on a machine."
+SIMULATED_REMARK = "Simulated by feedsim. Nothing was measured on a machine."
 RULE = (
     "A figure passes where its magnitude and the uncertainty U (k = 2) together keep within the limit, and fails where "
     "it exceeds the limit by more than U; between these it is not decided (ISO 14253-1)."
@@ -62,7 +62,7 @@ class Result:
 
 
 @dataclass(frozen=True, eq=False)
-class Filled:
+class FilledSheet:
     """A sheet: title, standard, conditions, uncertainty [um], table of readings, figures, picture.
 
     Attributes:
@@ -87,7 +87,7 @@ class Filled:
         """The table of readings as it is printed."""
         return [
             [
-                cell if isinstance(cell, str) else _printed(cell, ".3f" if column else ".6g")
+                cell if isinstance(cell, str) else _print_value(cell, ".3f" if column else ".6g")
                 for column, cell in enumerate(row)
             ]
             for row in self.numbers[:: self.every]
@@ -100,12 +100,12 @@ class Filled:
         return next((name for name in (FAILS, OPEN, PASSES) if name in outcome), "")
 
 
-def sheets_of(run: Run) -> list[Filled]:
+def sheets_of(run: Run) -> list[FilledSheet]:
     """The sheets that the scenario asks for, one per evaluation with the key `sheet`."""
-    result: list[Filled] = []
+    result: list[FilledSheet] = []
     for item, task in zip(run.scenario.evaluate, tasks(run.scenario, run.program), strict=True):
         if isinstance(item, PositioningAccuracy) and item.sheet is not None and isinstance(task, AccuracyTask):
-            result.append(_positioning(run, task, item.sheet))
+            result.append(_fill_positioning_sheet(run, task, item.sheet))
         elif isinstance(item, CircleTest) and item.sheet is not None and isinstance(task, CircleTask):
             result.append(_circle(run, task, item.sheet))
     return result
@@ -128,7 +128,7 @@ def limits_of(run: Run) -> dict[str, float]:
     }
 
 
-def verdict_line(sheet: Filled) -> str:
+def verdict_line(sheet: FilledSheet) -> str:
     """ "Z: pass after ISO 230-2: A 1.31 um of 6 um"; "" without limits."""
     if not sheet.verdict:
         return ""
@@ -139,7 +139,7 @@ def verdict_line(sheet: Filled) -> str:
     return f"{sheet.title} {words} ({sheet.standard}): {', '.join(parts)}."
 
 
-def judged(value: float, limit: float, uncertainty: float) -> str:
+def judge_figure(value: float, limit: float, uncertainty: float) -> str:
     """Verdict on a figure; all in one unit. A figure that could not be determined is not decided."""
     if math.isnan(limit):
         return NO_LIMIT_TEXT
@@ -158,13 +158,13 @@ def _results(
         if (figure := figures.get(name)) is None:
             continue
         limit = 1e6 * sheet.limits.get(name, math.nan)
-        verdict = judged(figure.value, limit, 1e6 * sheet.uncertainty)
+        verdict = judge_figure(figure.value, limit, 1e6 * sheet.uncertainty)
         meaning = figure.meaning.replace(" (ISO 230-2)", "").replace("ISO 230-4 ", "")
         results.append(Result(symbols[name], meaning, figure.value, limit, verdict))
     return results
 
 
-def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
+def _fill_positioning_sheet(run: Run, task: AccuracyTask, sheet: Sheet) -> FilledSheet:
     accuracy, visits = task.accuracies(run.trace)[""], task.visits
     prefix = task.prefix
     rests = [visit.end - visit.begin for visit in visits.visits]
@@ -175,7 +175,7 @@ def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
         ("Targets", f"{len(visits.targets)}, from {1e3 * visits.targets[0]:.6g} to {1e3 * visits.targets[-1]:.6g} mm"),
         ("Approaches", f"{visits.runs} of each side of each target"),
         ("Rest at a target", f"{min(rests):.3g} s; read at its end"),
-        *_given(sheet),
+        *_given_conditions(sheet),
     ]
     readings = 1e6 * accuracy.deviations
     heads = ("Target [mm]", "Approach", *(f"{k + 1}" for k in range(visits.runs)), "x\u0305 [µm]", "s [µm]", "B [µm]")
@@ -191,11 +191,20 @@ def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
                      for k, value in enumerate(own)]  # fmt: skip
     results = _results(accuracy.figures, STANDARD_SYMBOLS, sheet, OF_POSITIONING)
     picture = accuracy_picture(prefix, accuracy, f"sheet-{prefix.replace('#', '-')}")
-    return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, 1e6 * sheet.uncertainty, heads, numbers, results,
-                  picture, csv_rows)  # fmt: skip
+    return FilledSheet(
+        f"Positioning of {prefix}",
+        "ISO 230-2",
+        conditions,
+        1e6 * sheet.uncertainty,
+        heads,
+        numbers,
+        results,
+        picture,
+        csv_rows,
+    )
 
 
-def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
+def _circle(run: Run, task: CircleTask, sheet: Sheet) -> FilledSheet:
     turn, figures = task.turn, task.figures(run.trace)
     first, second = turn.axes
     plane = "".join(turn.axes) if turn.sense > 0 else "".join(reversed(turn.axes))
@@ -209,7 +218,7 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
         ("Centre", ", ".join(f"{axis} {1e3 * at:.6g} mm" for axis, at in zip(turn.axes, turn.centre, strict=True))),
         ("Direction", " and ".join(SENSE_WORDS[turn.sense] for turn in task.turns)),
         ("Position by", "linear scales"),
-        *_given(sheet),
+        *_given_conditions(sheet),
     ]
     names = [SENSE_WORDS[turn.sense] for turn in task.turns]
     grid = np.arange(0.0, 360.0, EVERY)
@@ -221,8 +230,18 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
     stem = f"sheet-{task.prefix.replace('#', '-')}"
     picture = contour_picture(run.trace, turn, stem, task.back, task.diagnosis(run.trace))
     heads = ("Angle [°]", *(f"{name} [µm]" for name in names))
-    return Filled(f"Circle {task.prefix}", "ISO 230-4", conditions, 1e6 * sheet.uncertainty, heads, numbers, results,
-                  picture, csv_rows, every=round(PRINTED / EVERY))  # fmt: skip
+    return FilledSheet(
+        f"Circle {task.prefix}",
+        "ISO 230-4",
+        conditions,
+        1e6 * sheet.uncertainty,
+        heads,
+        numbers,
+        results,
+        picture,
+        csv_rows,
+        every=round(PRINTED / EVERY),
+    )
 
 
 def _deviation(trace: Trace, turn: Turn, grid: np.ndarray) -> np.ndarray:
@@ -234,18 +253,18 @@ def _deviation(trace: Trace, turn: Turn, grid: np.ndarray) -> np.ndarray:
 
 
 def _common(run: Run) -> list[tuple[str, str]]:
-    return [("Machine", run.scenario.machine.name), ("Kind of test", SIMULATED), ("Scenario", run.scenario.name)]
+    return [("Machine", run.scenario.machine.name), ("Kind of test", SIMULATED_REMARK), ("Scenario", run.scenario.name)]
 
 
-def _given(sheet: Sheet) -> list[tuple[str, str]]:
+def _given_conditions(sheet: Sheet) -> list[tuple[str, str]]:
     return [*sheet.conditions.items(), ("Uncertainty U (k = 2)", f"{1e6 * sheet.uncertainty:g} µm")]
 
 
-def _printed(value: float, digits: str) -> str:
+def _print_value(value: float, digits: str) -> str:
     return "" if math.isnan(value) else minus(f"{value:{digits}}")
 
 
-def table(filled: Sequence[Filled]) -> str:
+def table(filled: Sequence[FilledSheet]) -> str:
     """sheet.csv: conditions, readings and figures, a row each, with the columns HEADS."""
     rows: list[Sequence[str]] = [HEADS]
     for sheet in filled:

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.design.sweep.sensitivity import CONFIDENCE, Indices, Sensitivities, Trends, sensitivities
-from feedsim.design.sweep.table import Failure, Where, failures, in_one_line, kinds, levels
+from feedsim.design.sweep.table import Failure, SeparatingParameter, failures, in_one_line, kinds, levels
 from feedsim.foundation.errors import Finding
 from feedsim.report.formatting import Array, Scale, number, scale
-from feedsim.report.provenance import InputFile, finite, hashed, inputs_part
+from feedsim.report.provenance import InputFile, finite, hash_files, inputs_part
 
 if TYPE_CHECKING:
     from feedsim.design.sweep.design import Design
@@ -41,7 +41,7 @@ CAPTIONS = {
     "of a parameter's range shows 0; words cannot be ranked and stay empty.",
 }
 MIN_INDEX_RUNS = 4
-NOTHING = 0.005  # share below which two digits say 0.00
+ZERO_SHARE = 0.005  # share below which two digits say 0.00
 NEGLIGIBLE_INDEX = 0.02  # a total index below which a parameter may be held where it is
 
 
@@ -253,7 +253,7 @@ class Account:
         """Where runs that failed alike lie; empty where no parameter shows."""
         return "; ".join(map(self._place, failure.where))
 
-    def _place(self, where: Where) -> str:
+    def _place(self, where: SeparatingParameter) -> str:
         entry = self.inputs[where.parameter]
         shown = (", " if where.by_level else " to ").join(entry.text(entry.scale.factor * v) for v in where.values)
         text = f"{entry.name} {shown} {entry.scale.shown_unit}".rstrip()
@@ -321,14 +321,14 @@ class Measure:
         """Parameters, the strongest first."""
         return sorted(range(len(self.values)), key=lambda k: (-self.size(k), k))
 
-    def telling(self) -> list[int]:
+    def notable_parameters(self) -> list[int]:
         """The same without those that do nothing, but MIN_INDEX_RUNS of them at least; none where nothing is known."""
         if not self.known:
             return []
         ranked = self.ranked()
         if self.kind == RANK:  # 0 may hide a minimum in the middle
             return ranked
-        return [k for place, k in enumerate(ranked) if place < MIN_INDEX_RUNS or self.size(k) >= NOTHING]
+        return [k for place, k in enumerate(ranked) if place < MIN_INDEX_RUNS or self.size(k) >= ZERO_SHARE]
 
 
 def measures(account: Account) -> Mapping[str, Measure]:
@@ -359,7 +359,7 @@ def study_files(account: Account) -> list[InputFile]:
     named = [("study", study.file)]
     named += [(place or "scenario", path) for place, path in scenario.files]
     named += [("data", path) for path in study.files]
-    return hashed(named)
+    return hash_files(named)
 
 
 def details(account: Account) -> dict[str, Any]:

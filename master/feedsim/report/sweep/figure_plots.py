@@ -41,12 +41,12 @@ def distribution_picture(
     """
     if not len(output.known):
         return None
-    telling = measure.telling()[:MOST_BARS]
+    telling = measure.notable_parameters()[:MOST_BARS]
     bars = len(telling)
     caption = "The runs' values with 5 %, 50 % and 95 % quantile"
     caption += ", and the share of the runs that lie above a value." if exceedance else "."
     if bars:
-        caption += f" What moves it: {_moving(measure, len(inputs) - bars)}"
+        caption += f" What moves it: {_measure_caption(measure, len(inputs) - bars)}"
     chart = _distribution(output, inputs, measure, telling, exceedance)
     return Picture(f"distribution-{stem}", f"Distribution of {output.name}", caption, chart, worded=True)
 
@@ -128,7 +128,7 @@ def _bar(name: str, rows: Array, values: Array, interval: Array | None, colour: 
     return curves
 
 
-def _moving(measure: Measure, left_out: int) -> str:
+def _measure_caption(measure: Measure, left_out: int) -> str:
     text = {
         TOTAL: "the share of its scatter that each parameter makes alone (first order) and with all its joint "
         "effects (total), with 95 % intervals. Where both are alike, the parameter acts on its own.",
@@ -149,7 +149,7 @@ def scatter_picture(
 
     best: the row that is looked for, which is marked.
     """
-    shown = [inputs[k] for k in measure.telling()[:MOST_PANELS] or range(len(inputs))[:MOST_PANELS]]
+    shown = [inputs[k] for k in measure.notable_parameters()[:MOST_PANELS] or range(len(inputs))[:MOST_PANELS]]
     shown = [entry for entry in shown if len(np.unique(entry.values)) > 1]
     if not len(output.known) or not shown:
         return None
@@ -172,13 +172,13 @@ def _panel(output: Output, entry: Input, best: int | None = None) -> Panel:
     curves, marks = [], []
     if len(entry.levels):
         at = np.searchsorted(entry.levels, x)
-        curves.append(Curve("a run", at + _beside(len(at)), y, BLUE, width=1.4, dots=True, most=3000))
+        curves.append(Curve("a run", at + _spread_offsets(len(at)), y, BLUE, width=1.4, dots=True, most=3000))
         marks = [
             Mark(float(k), float(np.median(y[at == k])), "", VERMILLION)
             for k in range(len(entry.levels))
             if np.any(at == k)
         ]
-        without = np.searchsorted(entry.levels, without) + _beside(len(without))
+        without = np.searchsorted(entry.levels, without) + _spread_offsets(len(without))
         axis = Axis(
             entry.name,
             entry.scale.shown_unit,
@@ -202,7 +202,7 @@ def _panel(output: Output, entry: Input, best: int | None = None) -> Panel:
                  note=f"{int((~known).sum())} without a value" if not known.all() else "")  # fmt: skip
 
 
-def _beside(count: int) -> Array:
+def _spread_offsets(count: int) -> Array:
     """How far points stand beside their level, spread evenly."""
     return np.asarray(0.5 * ((np.arange(count) * GOLDEN) % 1 - 0.5))
 

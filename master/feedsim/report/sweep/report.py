@@ -29,15 +29,25 @@ from feedsim.report.content import (
     parameters_section,
     provenance_section,
 )
-from feedsim.report.formatting import NARROW, Array, counted, minus, number, remarked, rounded, three, with_interval
+from feedsim.report.formatting import (
+    NARROW,
+    Array,
+    count_things,
+    minus,
+    number,
+    remark_charts,
+    round_to_doubt,
+    three_digits,
+    with_interval,
+)
 from feedsim.report.results import write_report
 from feedsim.report.run.report import HEADER, is_leading
 from feedsim.report.sweep.account import (
-    NOTHING,
     QUANTILES,
     RANK,
     SHARE_HEADING,
     TOTAL,
+    ZERO_SHARE,
     Account,
     Input,
     Measure,
@@ -61,14 +71,14 @@ MOST_FIGURES = 8  # drawn one by one; the tables hold all
 MOST_ROWS, MOST_COLUMNS = 30, 20  # of the overview
 
 
-def varying(account: Account) -> list[Output]:
+def varying_outputs(account: Account) -> list[Output]:
     """Figures that are not the same in all runs."""
     return [output for output in account.outputs if len(output.known) and not is_constant(output.known)]
 
 
-def drawn(account: Account) -> list[Output]:
+def drawn_outputs(account: Account) -> list[Output]:
     """Figures that are drawn one by one: those that differ from run to run, the leading ones first."""
-    known = varying(account)
+    known = varying_outputs(account)
     leading = [output for output in known if is_leading(output.name, HEADER)]
     return [*leading, *(output for output in known if output not in leading)][:MOST_FIGURES]
 
@@ -79,7 +89,7 @@ def pictures_of(account: Account) -> tuple[list[Picture], list[Picture]]:
     result = measures(account)
     single: list[Picture] = []
     taken: set[str] = set()
-    for output in drawn(account):
+    for output in drawn_outputs(account):
         stem = _stem(output.name, taken)
         over_grid = grid_picture(account, output, stem)
         single += [over_grid] if over_grid is not None else of_account(account, output, result[output.name], stem)
@@ -110,7 +120,7 @@ def overview_picture(account: Account) -> Picture | None:
     values = np.array([[float(measure.values[k]) for k in columns] for measure in result])
     bold = np.array([[measure.significant(k) for k in columns] for measure in result])
     if result[0].kind == TOTAL:
-        values = np.where(np.abs(values) < NOTHING, np.nan, values)
+        values = np.where(np.abs(values) < ZERO_SHARE, np.nan, values)
     names, figures = [account.inputs[k].name for k in columns], [measure.figure for measure in result]
     span = (-1.0, 1.0) if result[0].kind == RANK else (0.0, 1.0)
     chart = Chart([Grid("", names, figures, values, span, 2, bold)])
@@ -149,7 +159,7 @@ FAILURES_NOTE = (
     "how many of all runs there failed so; empty where no parameter does, or too few runs are done."
 )
 # What the record of a study holds of how it was made, and in words.
-RECORDED = {
+PROVENANCE_NAMES = {
     "command": "Command", "workers": "Made by", "began": "Began", "ended": "Ended", "machine": "Computer",
     "versions": "Software of the runs", "fingerprint": "Fingerprint",
 }  # fmt: skip
@@ -175,7 +185,7 @@ def drawn_report(account: Account) -> Report:
     """Content of the report, with its pictures."""
     study = account.study
     machine = study.base.scenario.machine
-    with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), *NARROW):
+    with remark_charts(f"{study.name}. {machine.name}. {machine.note}".strip(), *NARROW):
         whole, single = pictures_of(account)
     return report_of(account, whole, single)
 
@@ -186,13 +196,13 @@ def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Pictu
     method = METHODS.get(study.sampling.method, study.sampling.method)
     return Report(
         study.name,
-        f"{scenario.name} · {scenario.machine.name} · {counted(len(study.parameters), 'parameter')} · {method}",
+        f"{scenario.name} · {scenario.machine.name} · {count_things(len(study.parameters), 'parameter')} · {method}",
         answer=answers(account),
         warnings=account.warnings,
         notes=(scenario.machine.note, scenario.note, study.note),
         tiles=[*_goal_tiles(account), *_range_tiles(account), *_tiles(account)],
-        lead=lead(account, whole, single),
-        next_step=_next(account),
+        lead=lead_picture(account, whole, single),
+        next_step=_next_step(account),
         main=[
             _statistics(account),
             *whole,
@@ -209,12 +219,14 @@ def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Pictu
 
 def _range_tiles(account: Account) -> Iterator[Tile]:
     """Of a study without a goal: least and greatest value of the figure that it asks about, or of the first one."""
-    if account.best is not None or not (outputs := drawn(account)):
+    if account.best is not None or not (outputs := drawn_outputs(account)):
         return
     output = next((output for output in outputs if output.name == account.study.explain), outputs[0])
     unit = output.scale.shown_unit
     for key, what in (("min", "smallest"), ("max", "largest")):
-        yield Tile(f"{three(output.statistics[key])} {unit}".rstrip(), f"{what} {output.name}", f"{what} of all runs")
+        yield Tile(
+            f"{three_digits(output.statistics[key])} {unit}".rstrip(), f"{what} {output.name}", f"{what} of all runs"
+        )
 
 
 def _tiles(account: Account) -> Iterator[Tile]:
@@ -232,9 +244,11 @@ def _goal_tiles(account: Account) -> Iterator[Tile]:
     output, row = result
     unit, value = output.scale.shown_unit, float(output.values[row])
     way = account.study.goal[0] if account.study.goal else ""
-    yield Tile(f"{three(value)} {unit}".rstrip(), f"{way} {output.name}, run {account.runs[row]}", "the run looked for")
+    yield Tile(
+        f"{three_digits(value)} {unit}".rstrip(), f"{way} {output.name}, run {account.runs[row]}", "the run looked for"
+    )
     if math.isfinite(output.nominal):
-        yield Tile(f"{three(output.nominal)} {unit}".rstrip(), "the scenario unchanged", "value without changes")
+        yield Tile(f"{three_digits(output.nominal)} {unit}".rstrip(), "the scenario unchanged", "value without changes")
         more = minus(f"{100 * (value / output.nominal - 1):+.1f} %") if output.nominal else ""
         yield Tile(more or "–", "against the scenario", "difference of the two")
 
@@ -255,11 +269,11 @@ def goal_words(account: Account) -> list[str]:
     unit = output.scale.shown_unit
     at = ", ".join(f"{entry.name} {entry.text(float(entry.values[row]))} {entry.scale.shown_unit}".rstrip()
                    for entry in account.inputs)  # fmt: skip
-    nominal = f"; the scenario unchanged has {three(output.nominal)} {unit}".rstrip()
+    nominal = f"; the scenario unchanged has {three_digits(output.nominal)} {unit}".rstrip()
     own = nominal if math.isfinite(output.nominal) else ""
     edge = [entry.name for entry in account.inputs if _at_edge(entry, row)]
     more = f". It lies at the end of what was tried of {' and '.join(edge)}: try further" if edge else ""
-    return [f"{way.capitalize()} {name}: {three(float(output.values[row]))} {unit}".rstrip()
+    return [f"{way.capitalize()} {name}: {three_digits(float(output.values[row]))} {unit}".rstrip()
             + f" in run {account.runs[row]}, with {at}{own}{more}."]  # fmt: skip
 
 
@@ -271,7 +285,7 @@ def _at_edge(entry: Input, row: int) -> bool:
     return min(value - float(entry.values.min()), float(entry.values.max()) - value) <= EDGE * reach
 
 
-def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Picture | None:
+def lead_picture(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Picture | None:
     """The picture that belongs to the study's question: its figure over the parameters, or what moves it."""
     asked = account.study.explain or (account.study.goal[1] if account.study.goal else "")
     titles = (f"{asked} over the parameters", f"Distribution of {asked}")
@@ -281,12 +295,12 @@ def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) 
     return first.first_rows(LEAD_ROWS) if first is not None else None
 
 
-def _next(account: Account) -> Step | None:
+def _next_step(account: Account) -> Step | None:
     study = account.study
     if (result := account.best) is not None:
         row = {"scenario": study.file, "row": account.runs[result[1]]}
         return Step("See the command that makes this run by itself", "check", row)
-    if not (outputs := drawn(account)):
+    if not (outputs := drawn_outputs(account)):
         return None
     name = study.explain or outputs[0].name
     return Step(
@@ -299,17 +313,17 @@ def answers(account: Account) -> list[str]:
     result, grid = measures(account), account.study.sampling.method == "grid"
     lines = goal_words(account)
     asked = account.study.explain
-    shown = sorted(drawn(account), key=lambda output: output.name != asked)
+    shown = sorted(drawn_outputs(account), key=lambda output: output.name != asked)
     for output in shown[:MOST_ANSWERS]:
         reported, unit = output.statistics, output.scale.shown_unit
-        low, high = (three(reported[key]) for key in (("min", "max") if grid else ("q5", "q95")))
+        low, high = (three_digits(reported[key]) for key in (("min", "max") if grid else ("q5", "q95")))
         spread = f"{low} to {high} {unit}".rstrip() + (" over the grid" if grid else " in nine of ten runs")
-        middle = "" if grid else f"{three(reported['q50'])} {unit}".rstrip() + " in the median, "
-        lines.append(f"{output.name}: {middle}{spread}; {_strongest(account, result[output.name])}.")
+        middle = "" if grid else f"{three_digits(reported['q50'])} {unit}".rstrip() + " in the median, "
+        lines.append(f"{output.name}: {middle}{spread}; {_strongest_parameters_text(account, result[output.name])}.")
     return lines
 
 
-def _strongest(account: Account, measure: Measure) -> str:
+def _strongest_parameters_text(account: Account, measure: Measure) -> str:
     """The parameters that move a figure most, with their measure."""
     leading = [
         k
@@ -318,12 +332,12 @@ def _strongest(account: Account, measure: Measure) -> str:
     ]
     if not leading:
         return "no parameter moves it by more than chance"
-    first, *further = (f"{account.inputs[k].name} ({_two(float(measure.values[k]))})" for k in leading[:3])
+    first, *further = (f"{account.inputs[k].name} ({_two_digits(float(measure.values[k]))})" for k in leading[:3])
     more = f", then {' and '.join(further)}" if further else ""
     return f"{first} moves it most{more} ({measure.kind})"
 
 
-def _speed(account: Account) -> Iterator[tuple[str, str]]:
+def _speed_rows(account: Account) -> Iterator[tuple[str, str]]:
     """How fast the runs were made."""
     rows, reported = len(account.table), []
     if (wall := account.wall_time) is not None:
@@ -331,7 +345,7 @@ def _speed(account: Account) -> Iterator[tuple[str, str]]:
     if rows:
         reported.append(f"{1e3 * account.busy / rows:.3g} ms per run")
     if (processes := account.processes) is not None:
-        reported.append(counted(processes, "process", "processes"))
+        reported.append(count_things(processes, "process", "processes"))
     if (efficiency := account.efficiency) is not None:
         reported.append(f"{100 * efficiency:.0f} % of their time went into runs")
     if reported:
@@ -339,8 +353,8 @@ def _speed(account: Account) -> Iterator[tuple[str, str]]:
 
 
 def _not_drawn(account: Account) -> Paragraph | None:
-    left_out = len(varying(account)) - len(drawn(account))
-    count = f"{counted(left_out, 'figure')} more in the tables and in summary.json, not drawn; "
+    left_out = len(varying_outputs(account)) - len(drawn_outputs(account))
+    count = f"{count_things(left_out, 'figure')} more in the tables and in summary.json, not drawn; "
     return Paragraph((count, code("figures:"), " in the study file chooses."), "muted") if left_out > 0 else None
 
 
@@ -350,9 +364,9 @@ def _statistics(account: Account) -> Section | None:
     rows: list[tuple[Text, ...]] = []
     for entry in account.outputs:
         statistics = entry.statistics
-        cells = [three(entry.nominal)] if nominal else []
+        cells = [three_digits(entry.nominal)] if nominal else []
         mean, std = statistics["mean"], statistics["std"]
-        cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(entry.known), 1)))]
+        cells += [number(mean) if grid else round_to_doubt(mean, std / math.sqrt(max(len(entry.known), 1)))]
         cells.append(number(std, 4 if grid else 3))
         for share in QUANTILES:
             value, ends = statistics[f"q{share}"], entry.quantile_intervals[f"q{share}"]
@@ -380,7 +394,7 @@ def _sensitivities(account: Account) -> Section | None:
     """A table per drawn figure of what moves it; None where there is nothing."""
     result = account.sensitivities
     parts: list[Part] = []
-    for output in drawn(account):
+    for output in drawn_outputs(account):
         sobol, trend = result.sobol.get(output.name), result.trends[output.name]
         if sobol is not None and not sobol.reason:
             body: list[Part] = [_sobol(result.parameters, sobol, trend)]
@@ -395,11 +409,11 @@ def _sensitivities(account: Account) -> Section | None:
 def _sobol(names: tuple[str, ...], indices: Indices, trend: Trends) -> Table:
     order = sorted(range(len(names)), key=lambda k: (-indices.total[k], k))
     rows = [
-        (names[k], _two(indices.first[k]), _span(indices.first_interval[k]), _two(indices.total[k]),
-         _span(indices.total_interval[k]), _two(trend.rank_correlation[k]), _two(trend.regression[k]))
+        (names[k], _two_digits(indices.first[k]), _span(indices.first_interval[k]), _two_digits(indices.total[k]),
+         _span(indices.total_interval[k]), _two_digits(trend.rank_correlation[k]), _two_digits(trend.regression[k]))
         for k in order
     ]  # fmt: skip
-    rows.append(("all", _two(indices.first.sum()), "", _two(indices.total.sum()), "", "", ""))
+    rows.append(("all", _two_digits(indices.first.sum()), "", _two_digits(indices.total.sum()), "", "", ""))
     heads = ("Parameter", "First order", "95 %", "Total", "95 %", "Rank correlation", "Regression")
     points = f"{indices.used} base points" + (f", {indices.left_out} left out" if indices.left_out else "")
     return Table("lrrrrrr", heads, rows, f"{points}. Of the samples A and B: {_fit(trend)}")
@@ -410,7 +424,7 @@ def _trends(names: tuple[str, ...], trends: Trends) -> Part:
         return Paragraph(f"No measures: {trends.reason}.")
     order = sorted(range(len(names)), key=lambda k: (-_size(trends, k), k))
     columns = (trends.rank_correlation, trends.regression, trends.share)
-    rows = [(names[k], *(_two(column[k]) for column in columns)) for k in order]
+    rows = [(names[k], *(_two_digits(column[k]) for column in columns)) for k in order]
     return Table("lrrr", ("Parameter", "Rank correlation", "Regression", "Share"), rows, _fit(trends))
 
 
@@ -431,12 +445,12 @@ def _size(trends: Trends, k: int) -> float:
     return float(sizes[0]) if sizes else 0.0
 
 
-def _two(value: float) -> str:
+def _two_digits(value: float) -> str:
     return minus(f"{value:.2f}").replace("−0.00", "0.00") if math.isfinite(value) else "–"
 
 
 def _span(interval: Array) -> str:
-    return " to ".join(_two(float(end)) for end in interval)
+    return " to ".join(_two_digits(float(end)) for end in interval)
 
 
 def _failures(account: Account) -> Section | None:
@@ -496,17 +510,17 @@ def _provenance(account: Account) -> Section:
         ("Set on the command line", ", ".join(study.overrides) or "nothing"),
         ("Sampling", f"{study.sampling.method}, {account.design.runs} runs, seed {study.sampling.seed}"),
         ("Machine", scenario.machine.name),
-        *_recorded(account.record),
-        *_speed(account),
+        *_provenance_rows(account.record),
+        *_speed_rows(account),
     ]
     note = Paragraph("The parameters are the scenario's; each run changes those above.", "muted")
     parameters = parameters_section(scenario.machine)
     return provenance_section(rows, study_files(account), parameters, note, software_of="Software of this page")
 
 
-def _recorded(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _provenance_rows(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """What is on record of how the table was made."""
-    for key, name in RECORDED.items():
+    for key, name in PROVENANCE_NAMES.items():
         value = record.get(key)
         if value in (None, "", {}, []):
             continue

@@ -9,17 +9,27 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
-from feedsim.design.tune.drive import NOISE, TORQUE, WORSE, Case, Changed, Margins, Point, Tuned, decibels
+from feedsim.design.tune.drive import (
+    NOISE,
+    TORQUE,
+    WORSE_ERROR_RATIO,
+    Case,
+    ChangedParameter,
+    Margins,
+    Point,
+    TunedDrive,
+    decibels,
+)
 from feedsim.design.tune.knobs import EFFECTS
 from feedsim.design.uncertainty import interval, share_of
 from feedsim.estimation.replay.machine_files import drive_file, drive_text
 from feedsim.files.control import Name, names_of
 from feedsim.foundation import outputs
-from feedsim.foundation.arguments import spelt
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
-from feedsim.report.changes import asked
+from feedsim.report.changes import requested_control
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import (
     FOLDER,
@@ -36,7 +46,17 @@ from feedsim.report.content import (
     code,
     tile_value,
 )
-from feedsim.report.formatting import AFTER, ALLOWED, BEFORE, MUTED, NARROW, RESIDUAL_COLOUR, minus, remarked, typeset
+from feedsim.report.formatting import (
+    AFTER_COLOUR,
+    ALLOWED_COLOUR,
+    BEFORE_COLOUR,
+    MUTED,
+    NARROW,
+    RESIDUAL_COLOUR,
+    minus,
+    remark_charts,
+    typeset,
+)
 from feedsim.report.provenance import input_files, inputs_part, machine_part
 from feedsim.report.uncertainty import drawn_values
 from feedsim.scenario import Scenario
@@ -50,7 +70,7 @@ def reductions(case: Case, name: str) -> Any:
     return 100 * (1 - after / before)
 
 
-def drawn_intervals(tuned: Tuned) -> dict[str, tuple[float, float]]:
+def drawn_intervals(tuned: TunedDrive) -> dict[str, tuple[float, float]]:
     """Figure -> interval over draws of the machine: margins, and reductions of a drive that changes; empty without."""
     drawn = tuned.drawn
     if drawn is None:
@@ -68,13 +88,13 @@ def drawn_intervals(tuned: Tuned) -> dict[str, tuple[float, float]]:
     }
 
 
-def share_text(tuned: Tuned) -> str:
+def share_text(tuned: TunedDrive) -> str:
     """Share of further draws that an interval holds."""
     assert tuned.drawn is not None
     return f"{100 * share_of(tuned.drawn.count):.0f} %"
 
 
-def drawn_findings(tuned: Tuned) -> list[Finding]:
+def drawn_findings(tuned: TunedDrive) -> list[Finding]:
     """What draws of the machine lack: margins, and motions that get worse."""
     drawn, limits = tuned.drawn, tuned.limits
     if drawn is None:
@@ -96,7 +116,7 @@ def drawn_findings(tuned: Tuned) -> list[Finding]:
     return result
 
 
-def drawn_answer(tuned: Tuned) -> list[str]:
+def drawn_answer(tuned: TunedDrive) -> list[str]:
     """What the intervals of identified values make of it."""
     words = {"peak_reduction": "peaks fall by {} to {} %", "overshoot_reduction": "overshoot by {} to {} %",
              "gain_margin_after": "the gain margin is {} to {} dB",
@@ -110,7 +130,7 @@ def drawn_answer(tuned: Tuned) -> list[str]:
     ]
 
 
-def drawn_section(tuned: Tuned, figures: Mapping[str, Figure]) -> Iterator[Section]:
+def drawn_section(tuned: TunedDrive, figures: Mapping[str, Figure]) -> Iterator[Section]:
     """Intervals over draws of the machine, and what was drawn."""
     if tuned.drawn is None:
         return
@@ -133,20 +153,20 @@ def drawn_section(tuned: Tuned, figures: Mapping[str, Figure]) -> Iterator[Secti
 SETTINGS, SHEET = "settings.yaml", "sheet.csv"
 
 
-def names_for(tuned: Tuned, control: str) -> Mapping[str, Name]:
+def names_for(tuned: TunedDrive, control: str) -> Mapping[str, Name]:
     """Our parameter -> its name in the control that is asked for, or that the machine has; empty without one."""
-    known = control or asked(tuned.scenario.machine)
+    known = control or requested_control(tuned.scenario.machine)
     return names_of(known) if known else {}
 
 
-def settings(tuned: Tuned) -> str:
+def settings(tuned: TunedDrive) -> str:
     """The `set` group of a scenario with the values."""
     head = "# Values of feedsim tune drive, for the group `set` of a scenario.\n"
     lines = [f"  {change.key}: {change.text}" for change in tuned.changes]
     return head + ("set:\n" + "\n".join(lines) + "\n" if lines else "set: {}\n")
 
 
-def drives(tuned: Tuned) -> dict[str, str]:
+def drives(tuned: TunedDrive) -> dict[str, str]:
     """Name -> text of a drive file for the tuned axis, changed or not, and for every other that has changed.
 
     A machine file or --set takes them.
@@ -161,13 +181,13 @@ def drives(tuned: Tuned) -> dict[str, str]:
     }
 
 
-def sheet(tuned: Tuned, control: str = "") -> str:
+def sheet(tuned: TunedDrive, control: str = "") -> str:
     """Values to type: old and new, in the control's unit where its name is known."""
     heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter")
     return outputs.text_of((heads, *rows(tuned, control)))
 
 
-def rows(tuned: Tuned, control: str = "") -> Iterator[tuple[str, ...]]:
+def rows(tuned: TunedDrive, control: str = "") -> Iterator[tuple[str, ...]]:
     """Axis, number, name, old, new, unit, whether the unit is confirmed, and our parameter."""
     names = names_for(tuned, control)
     for change in tuned.changes:
@@ -176,7 +196,7 @@ def rows(tuned: Tuned, control: str = "") -> Iterator[tuple[str, ...]]:
             shown = (_in_control(name, change.old), _in_control(name, change.new))
             cells = (name.number, name.name, *shown, name.unit, "yes" if name.confirmed else "no")
         else:
-            cells = ("", "", *_shown(change), "")
+            cells = ("", "", *_change_texts(change), "")
         yield (change.axis, *cells, change.parameter.removeprefix("drive."))
 
 
@@ -184,7 +204,7 @@ def _in_control(name: Name, value: Any) -> str:
     return value if isinstance(value, str) else "" if value is None else f"{name.shown(float(value)):.6g}"
 
 
-def _shown(change: Changed) -> tuple[str, str, str]:
+def _change_texts(change: ChangedParameter) -> tuple[str, str, str]:
     """Old and new value in the unit that is shown, and the unit."""
     row = parameters("controller").get(change.parameter.removeprefix("drive."))
     unit = row.display_unit if row is not None and change.unit else ""
@@ -215,14 +235,16 @@ RIGID_WARNING = (
     "T_n raises the gain by 1 dB at most: a resonance that nobody has measured nearly keeps its margin. Measure the "
     "frequency response of the speed loop and take its modes in (feedsim identify modes) for more"
 )
-COMPENSATED = "its friction compensation was set for the present drive: tune that anew (feedsim tune compensation)"
+COMPENSATION_ADVICE = (
+    "its friction compensation was set for the present drive: tune that anew (feedsim tune compensation)"
+)
 CHECK = (
     "The values are as good as the machine file. At the machine: type them, measure the frequency response of the "
     "speed loop, then run one circle"
 )
 
 
-def figures_of(tuned: Tuned) -> dict[str, Figure]:
+def figures_of(tuned: TunedDrive) -> dict[str, Figure]:
     """Errors, margins and torque before and after."""
     axis, first = tuned.axis, tuned.judged[0]
     figures: dict[str, Figure] = {}
@@ -265,7 +287,7 @@ def figures_of(tuned: Tuned) -> dict[str, Figure]:
     return figures
 
 
-def worse(tuned: Tuned, *, effects: bool = False) -> list[str]:
+def worse_motions(tuned: TunedDrive, *, effects: bool = False) -> list[str]:
     """Motions that get worse by more than 5 %, in words: of the machine and its modes, or with other effects."""
     names = {effect.words for effect in EFFECTS}
     return [
@@ -276,13 +298,13 @@ def worse(tuned: Tuned, *, effects: bool = False) -> list[str]:
     ]
 
 
-def findings(tuned: Tuned) -> list[Finding]:
+def findings(tuned: TunedDrive) -> list[Finding]:
     """What is to be known before the values are typed."""
     found: list[Finding] = []
-    if bad := worse(tuned):
+    if bad := worse_motions(tuned):
         text = f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"
         found.append(Finding("tuning-worse", "wrong", text, tuned.axis))
-    if bad := worse(tuned, effects=True):
+    if bad := worse_motions(tuned, effects=True):
         text = f"worse than before where the machine has other effects: {'; '.join(bad)}"
         found.append(Finding("tuning-worse-with-effects", "doubt", text, tuned.axis))
     found += present_misses(tuned)
@@ -292,14 +314,14 @@ def findings(tuned: Tuned) -> list[Finding]:
         found.append(Finding("machine-rigid", "doubt" if tuned.changes else "note", RIGID_WARNING, tuned.axis, remedy))
     drive = tuned.machine.shipped_drive(tuned.axis, "a report")
     if tuned.changes and (getattr(drive, "friction_pulse", None) or getattr(drive, "friction_table", None)):
-        text = f"{tuned.axis}: {COMPENSATED}"
+        text = f"{tuned.axis}: {COMPENSATION_ADVICE}"
         found.append(Finding("compensation-stale", "doubt", text, tuned.axis, "feedsim tune compensation"))
     if tuned.changes:
         found.append(Finding("values-to-check", "note", CHECK, tuned.axis))
     return found
 
 
-def present_misses(tuned: Tuned) -> list[Finding]:
+def present_misses(tuned: TunedDrive) -> list[Finding]:
     """A finding for each margin that the present drive lacks, with the loop that has it."""
     limits, before, axis = tuned.limits, tuned.before, tuned.axis
     if not math.isfinite(before.phase) and before.phase < 0:
@@ -308,7 +330,7 @@ def present_misses(tuned: Tuned) -> list[Finding]:
         Finding(
             "present-margins-thin", "doubt",
             f"{axis}: the {name} margin of the present drive is {shown}; {limit:g} {unit} are required "
-            f"({spelt(f'{name}_margin')}). {_capital(loop)}.",
+            f"({spell_argument(f'{name}_margin')}). {_capital(loop)}.",
             axis,
         )
         for name, value, shown, limit, unit, loop in (
@@ -323,7 +345,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def answers(tuned: Tuned) -> list[str]:
+def answers(tuned: TunedDrive) -> list[str]:
     """What the tuned drive does, or why there is none."""
     axis, after, figures = tuned.axis, tuned.after, figures_of(tuned)
     margins = f"{decibels(after.gain)} and {after.phase:.3g} deg"
@@ -346,14 +368,14 @@ def _percent(figure: Figure) -> str:
     return f"{figure.value:.0f} %"
 
 
-def why(tuned: Tuned) -> list[str]:
+def explain_values(tuned: TunedDrive) -> list[str]:
     """Why these values: what they were chosen from, and what limits them."""
     limits, after = tuned.limits, tuned.after
     allowed = [point for point in tuned.points if point.allowed]
     judged, ran = tuned.evaluations
     met = (
         f"{ran} of them were simulated. {len(allowed)} met all limits and made no error larger by more than "
-        f"{100 * (WORSE - 1):.0f} %."
+        f"{100 * (WORSE_ERROR_RATIO - 1):.0f} %."
     )
     found = [f"{judged} candidates were judged by their margins and noise, {met if ran else 'none was simulated.'}"]
     if tuned.kept:
@@ -371,7 +393,7 @@ def why(tuned: Tuned) -> list[str]:
         if touched
         else "No limit is reached: higher gains do not make the errors smaller on every motion."
     )
-    if further := _beyond(tuned):
+    if further := _explain_margins(tuned):
         found.append(further)
     found.append(
         f"Least gain margin: {decibels(after.gain)}, {after.gain_of}. Least phase margin: {after.phase:.3g}°, "
@@ -380,7 +402,7 @@ def why(tuned: Tuned) -> list[str]:
     return found
 
 
-def _beyond(tuned: Tuned) -> str:
+def _explain_margins(tuned: TunedDrive) -> str:
     """What less margin would give."""
     past = [
         point for point in tuned.points
@@ -398,7 +420,7 @@ def _beyond(tuned: Tuned) -> str:
     )
 
 
-def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
+def report_of(tuned: TunedDrive, control: str = "", folder: str = "") -> Report:
     """Content of the report. folder: where it stands, for command lines; "": not known."""
     figures, machine, axis = figures_of(tuned), tuned.scenario.machine, tuned.axis
     tiles = [
@@ -421,7 +443,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
         ("Encoder noise", f"{1e6 * limits.encoder_noise:g} µrad, standard deviation per control cycle"),
         ("Judged in closed form, run", f"{tuned.evaluations[0]}, {tuned.evaluations[1]}"),
     ]  # fmt: skip
-    with remarked(f"{machine.name}. {machine.note}", *NARROW):
+    with remark_charts(f"{machine.name}. {machine.note}", *NARROW):
         response = picture(tuned)
     return Report(
         f"Drive of {axis}, tuned within margins" if not tuned.kept else f"Drive of {axis}, kept as it is",
@@ -433,7 +455,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
         main=[
             response,
             *values(tuned, control),
-            Section("Why these values", [Bullets(list(why(tuned)))]),
+            Section("Why these values", [Bullets(list(explain_values(tuned)))]),
             _margins(tuned),
             *drawn_section(tuned, figures),
             *(_errors(case) for case in tuned.judged if not tuned.kept),
@@ -450,7 +472,7 @@ def new_values(scenario: Scenario) -> dict[str, Any]:
     return {"scenario": scenario.file, "set": [*scenario.overrides, f"{FOLDER}/{SETTINGS}"], "out": f"{FOLDER}_run"}
 
 
-def values(tuned: Tuned, control: str = "") -> Iterator[Part]:
+def values(tuned: TunedDrive, control: str = "") -> Iterator[Part]:
     """The values to type, which are not folded: they are what the report is for."""
     lines: list[tuple[Text, ...]] = []
     for axis, number, name, old, new, unit, confirmed, parameter in rows(tuned, control):
@@ -464,7 +486,7 @@ def values(tuned: Tuned, control: str = "") -> Iterator[Part]:
     yield Table("llrrllll"[:count], heads[:count], [line[:count] for line in lines])
 
 
-def _margins(tuned: Tuned) -> Section:
+def _margins(tuned: TunedDrive) -> Section:
     lines: list[tuple[Text, ...]] = []
     for name, own in (
         (("before", tuned.before), ("after", tuned.after)) if not tuned.kept else (("present", tuned.before),)
@@ -500,7 +522,7 @@ def _errors(case: Case) -> Section:
     return Section(minus(f"Motions not used for tuning, {case.name}"), [stops, reversals])
 
 
-def picture(tuned: Tuned) -> Picture:
+def picture(tuned: TunedDrive) -> Picture:
     """Peaks of the candidates over their margin: how much each dB costs."""
     panels = []
     for title, label, unit, of, limit in (
@@ -511,15 +533,15 @@ def picture(tuned: Tuned) -> Picture:
         curves = [
             Curve(name, *_xy(chosen, of), colour, dots=True, faint=faint)
             for name, chosen, colour, faint in (
-                ("within all limits", [p for p in points if p.allowed], ALLOWED, False),
+                ("within all limits", [p for p in points if p.allowed], ALLOWED_COLOUR, False),
                 ("outside of a limit, or worse somewhere", [p for p in points if not p.allowed], RESIDUAL_COLOUR, True),
             )
             if chosen
         ]
         marks = []
         for name, margins, peak, colour in (
-            ("before", tuned.before, _largest(tuned, "before"), BEFORE),
-            ("chosen", tuned.after, _largest(tuned, "after"), AFTER),
+            ("before", tuned.before, _largest_error(tuned, "before"), BEFORE_COLOUR),
+            ("chosen", tuned.after, _largest_error(tuned, "after"), AFTER_COLOUR),
         ):
             if math.isfinite(of(margins)) and not (tuned.kept and name == "chosen"):
                 marks.append(Mark(of(margins), peak, name, colour, hollow=True))
@@ -548,11 +570,11 @@ def _xy(points: Sequence[Point], of: Any) -> tuple[Any, Any]:
     return np.array([of(p.margins) for p in order]), np.array([1e6 * p.peak for p in order])
 
 
-def _largest(tuned: Tuned, when: str) -> float:
+def _largest_error(tuned: TunedDrive, when: str) -> float:
     return 1e6 * float(np.max(getattr(tuned.searched, when).peak))
 
 
-def details(tuned: Tuned, asked: Mapping[str, str]) -> Mapping[str, Any]:
+def details(tuned: TunedDrive, asked: Mapping[str, str]) -> Mapping[str, Any]:
     """What summary.json has besides the figures. asked: name -> text of what was asked for besides changes."""
     limits = tuned.limits
     return {
@@ -570,7 +592,7 @@ def details(tuned: Tuned, asked: Mapping[str, str]) -> Mapping[str, Any]:
             "gain_margin": limits.gain_margin, "phase_margin": limits.phase_margin,
             "encoder_noise": limits.encoder_noise,
         },
-        "why": why(tuned),
+        "why": explain_values(tuned),
         "evaluations": {"closed_form": tuned.evaluations[0], "runs": tuned.evaluations[1]},
         **({"uncertain": {"draws": tuned.drawn.count}} if tuned.drawn is not None else {}),
         "motions": [

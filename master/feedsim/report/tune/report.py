@@ -11,7 +11,7 @@ import numpy as np
 from feedsim.analysis import Figure
 from feedsim.analysis.figures import Array
 from feedsim.design.tune.circles import Pair
-from feedsim.design.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, Judged, amplitude
+from feedsim.design.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, JudgedCompensation, amplitude
 from feedsim.design.uncertainty import interval, share_of
 from feedsim.files.control import Name, names_of
 from feedsim.foundation import outputs
@@ -20,7 +20,7 @@ from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
 from feedsim.report.content import Paragraph, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value
-from feedsim.report.formatting import AFTER, BEFORE, NARROW, minus, remarked, typeset
+from feedsim.report.formatting import AFTER_COLOUR, BEFORE_COLOUR, NARROW, minus, remark_charts, typeset
 from feedsim.report.provenance import input_files, inputs_part, machine_part
 from feedsim.report.tune.drive import new_values
 from feedsim.report.uncertainty import drawn_values
@@ -46,7 +46,7 @@ LIMITS_UNKNOWN = (
 )
 
 
-def figures_of(judged: Judged) -> dict[str, Figure]:
+def figures_of(judged: JudgedCompensation) -> dict[str, Figure]:
     """How much errors at the reversals fall, on the circles that were not used for tuning."""
     whole = "reduction of the error at the reversals"
     own = "reduction of the part of the error at the reversals that friction makes"
@@ -76,7 +76,7 @@ def figures_of(judged: Judged) -> dict[str, Figure]:
     return figures
 
 
-def drawn_intervals(judged: Judged) -> dict[str, tuple[float, float]]:
+def drawn_intervals(judged: JudgedCompensation) -> dict[str, tuple[float, float]]:
     """Intervals [%] of the median and of the least reduction over draws of the machine; empty without."""
     if judged.drawn is None:
         return {}
@@ -85,7 +85,7 @@ def drawn_intervals(judged: Judged) -> dict[str, tuple[float, float]]:
     return {name: tuple(map(float, interval(values))) for name, values in result.items()}  # type: ignore[misc]
 
 
-def findings(judged: Judged) -> list[Finding]:
+def findings(judged: JudgedCompensation) -> list[Finding]:
     """What is to be known before the values are typed."""
     worse = ", ".join(
         f"{axis} on {pair.text}: {1e6 * before:.3g} -> {1e6 * after:.3g} um"
@@ -122,7 +122,7 @@ def findings(judged: Judged) -> list[Finding]:
     return result
 
 
-def answers(judged: Judged) -> list[str]:
+def answers(judged: JudgedCompensation) -> list[str]:
     """What the compensation does to circles that it was not found on."""
     figures = figures_of(judged)
     where = f"{judged.plane[0]}-{judged.plane[1]}"
@@ -141,7 +141,7 @@ def _percent(figure: Figure) -> str:
     return f"{figure.value:.2g} %" if math.isfinite(figure.value) else "an unknown share"
 
 
-def _drawn_answer(judged: Judged) -> list[str]:
+def _drawn_answer(judged: JudgedCompensation) -> list[str]:
     """What the intervals of identified values make of it."""
     result = drawn_intervals(judged)
     if not result or judged.drawn is None:
@@ -151,7 +151,7 @@ def _drawn_answer(judged: Judged) -> list[str]:
     return [f"With what identification leaves open: median {median}, least {worst} ({share})."]
 
 
-def rows(judged: Judged) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
+def rows(judged: JudgedCompensation) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
     """Axis, parameter, its name in a control, old and new value in SI."""
     if judged.found.kind not in GROUP_OF_KIND:
         return
@@ -165,7 +165,7 @@ def rows(judged: Judged) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
             yield axis, f"{group}.{name}", names.get(f"drive.{group}.{name}"), old, value
 
 
-def settings(judged: Judged) -> str:
+def settings(judged: JudgedCompensation) -> str:
     """The `set` group of a scenario with the values."""
     lines = ["# Values of feedsim tune compensation, for the group `set` of a scenario.", "set:"]
     table = parameters("controller")
@@ -178,7 +178,7 @@ def settings(judged: Judged) -> str:
     return "\n".join(lines) + "\n"
 
 
-def sheet(judged: Judged) -> str:
+def sheet(judged: JudgedCompensation) -> str:
     """Values to type: old and new, in the control's unit where its name is known."""
     sheet_rows = [["axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter"]]
     for axis, parameter, name, old, value in rows(judged):
@@ -187,7 +187,7 @@ def sheet(judged: Judged) -> str:
             cells = [name.number, name.name, *(f"{name.shown(float(x)):.6g}" for x in (old, value)), name.unit, known]
         else:
             unit, display = _units(parameter)
-            cells = ["", "", *(_shown(x, unit, display) for x in (old, value)), display, ""]
+            cells = ["", "", *(_value_text(x, unit, display) for x in (old, value)), display, ""]
         sheet_rows.append([axis, *cells, parameter])
     return outputs.text_of(sheet_rows)
 
@@ -197,13 +197,13 @@ def _units(parameter: str) -> tuple[str, str]:
     return row.unit, row.display_unit
 
 
-def _shown(value: Any, unit: str, display: str) -> str:
+def _value_text(value: Any, unit: str, display: str) -> str:
     if isinstance(value, bool) or not unit:
         return str(int(value))
     return f"{convert(float(value), unit, display):.6g}"
 
 
-def report_of(judged: Judged) -> Report:
+def report_of(judged: JudgedCompensation) -> Report:
     """Content of the report."""
     figures, machine = figures_of(judged), judged.scenario.machine
     tiles = [
@@ -222,7 +222,7 @@ def report_of(judged: Judged) -> Report:
         ("Minimised", OBJECTIVES[judged.objective]),
         ("Runs to find it", str(judged.found.runs)),
     ]
-    with remarked(f"{machine.name}. {machine.note}", *NARROW):
+    with remark_charts(f"{machine.name}. {machine.note}", *NARROW):
         pictures = pictures_of(judged)
     return Report(
         f"Friction compensation of {', '.join(judged.axes)}",
@@ -247,7 +247,7 @@ def report_of(judged: Judged) -> Report:
     )
 
 
-def _values(judged: Judged) -> Section | None:
+def _values(judged: JudgedCompensation) -> Section | None:
     lines: list[tuple[Text, ...]] = [
         tuple(code(cell) if i == 7 else minus(cell) for i, cell in enumerate(line.split(",")))
         for line in sheet(judged).splitlines()[1:]
@@ -259,10 +259,10 @@ def _values(judged: Judged) -> Section | None:
     return Section("Values to type", [table, Paragraph(LIMITS_UNKNOWN + ".", "muted")], unfolded=True)
 
 
-def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:
+def _effects(judged: JudgedCompensation, figures: Mapping[str, Figure]) -> Section:
     """What the same values do where the machine is another one."""
-    lines: list[tuple[Text, ...]] = [("as the machine file has it", *_four(figures, "held_out"))]
-    lines += [(effect.words, *_four(figures, effect.name)) for effect in judged.changed]
+    lines: list[tuple[Text, ...]] = [("as the machine file has it", *_four_figures(figures, "held_out"))]
+    lines += [(effect.words, *_four_figures(figures, effect.name)) for effect in judged.changed]
     for name, (low, high) in drawn_intervals(judged).items():
         if name == "median":
             worst = drawn_intervals(judged)["worst"]
@@ -284,13 +284,13 @@ def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:
     return Section("With other effects of the machine", [Table("lrrrr", heads, lines, note), *drawn], "effects")
 
 
-def _four(figures: Mapping[str, Figure], name: str) -> tuple[str, ...]:
+def _four_figures(figures: Mapping[str, Figure], name: str) -> tuple[str, ...]:
     keys = ("median", "worst", "friction_median", "friction_worst")
     return tuple(minus(f"{figures[f'{name}.{key}'].value:.0f}") for key in keys)
 
 
 def _errors(
-    title: str, pairs: Sequence[Pair], errors: Errors, judged: Judged, free: Array | None = None
+    title: str, pairs: Sequence[Pair], errors: Errors, judged: JudgedCompensation, free: Array | None = None
 ) -> Section:  # fmt: skip
     """free: errors without friction, where they are known."""
     lines: list[tuple[Text, ...]] = []
@@ -311,19 +311,25 @@ def _errors(
     return Section(title, [Table("r" * len(heads), heads, lines)])
 
 
-def pictures_of(judged: Judged) -> list[Picture]:
+def pictures_of(judged: JudgedCompensation) -> list[Picture]:
     """Errors over the acceleration without and with, and the characteristic as the control's manual draws it."""
     accelerations = np.array([pair.acceleration for pair in judged.held_out])
     across = Axis("acceleration at the reversal, v²/r", "m/s²", log=True)
     panels = [
         Panel(
-            f"{axis}", across, Axis("error at the reversals", "µm"),
-            [Curve(name, accelerations, 1e6 * errors[:, k], colour, dots=True)
-             for name, errors, colour in (
-                 ("without", judged.held_errors.before, BEFORE), ("with", judged.held_errors.after, AFTER))],
+            f"{axis}",
+            across,
+            Axis("error at the reversals", "µm"),
+            [
+                Curve(name, accelerations, 1e6 * errors[:, k], colour, dots=True)
+                for name, errors, colour in (
+                    ("without", judged.held_errors.before, BEFORE_COLOUR),
+                    ("with", judged.held_errors.after, AFTER_COLOUR),
+                )
+            ],
         )
         for axis, k in zip(judged.axes, judged.columns, strict=True)
-    ]  # fmt: skip
+    ]
     pictures = [
         Picture(
             "tune-errors", "Errors at the reversals, circles not used for tuning",
@@ -334,7 +340,7 @@ def pictures_of(judged: Judged) -> list[Picture]:
     if judged.found.kind == "pulse_characteristic":
         a = np.geomspace(accelerations.min() / 2, accelerations.max() * 1.5, 200)
         curves = [
-            Curve(axis, a, 6e4 * amplitude(values, a), AFTER, dash)
+            Curve(axis, a, 6e4 * amplitude(values, a), AFTER_COLOUR, dash)
             for (axis, values), dash in zip(judged.found.values.items(), DASHES, strict=False)
         ]
         panel = Panel("Amplitude of the pulse", across, Axis("amplitude", "mm/min"), curves)
@@ -345,7 +351,7 @@ def pictures_of(judged: Judged) -> list[Picture]:
     return pictures
 
 
-def details(judged: Judged) -> Mapping[str, Any]:
+def details(judged: JudgedCompensation) -> Mapping[str, Any]:
     """What summary.json has besides the figures."""
     return {
         "kind_of_compensation": judged.found.kind,

@@ -9,7 +9,7 @@ from math import dist, hypot
 from pathlib import Path
 from typing import NamedTuple
 
-from feedsim.files.checked import checked, describe, read_group
+from feedsim.files.checked import check_tree, describe, read_group
 from feedsim.files.fields import brief, did_you_mean, no_axis
 from feedsim.files.source import Place
 from feedsim.foundation.errors import InputError
@@ -45,7 +45,7 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Held:
+class Attachment:
     """What a point is held by: the mean of some nodes, or the place on a rail that it rides on."""
 
     nodes: tuple[Node, ...]
@@ -96,17 +96,17 @@ def rail(structure: GeometryStructure, text: str) -> Line:
     return Line(body, name)
 
 
-def held(structure: GeometryStructure, texts: Sequence[str]) -> Held:
+def resolve_attachment(structure: GeometryStructure, texts: Sequence[str]) -> Attachment:
     """What the words of a place to hold on to mean. InputError: unknown names, a rail among nodes, a node twice."""
     rails = [text.removeprefix("rail ") for text in texts if text.startswith("rail ")]
     if rails and len(texts) > 1:
         raise InputError(f"'rail {rails[0]}' stands alone, not in a list")
     if rails:
-        return Held((), rail(structure, rails[0]))
+        return Attachment((), rail(structure, rails[0]))
     result = tuple(node(structure, text) for text in texts)
     if twice := [item for item in result if result.count(item) > 1]:
         raise InputError(f"{twice[0]} is listed twice")
-    return Held(result, None)
+    return Attachment(result, None)
 
 
 def position(structure: GeometryStructure, item: Node) -> tuple[float, ...]:
@@ -133,13 +133,13 @@ def _range(text: str, count: int) -> tuple[int, int]:
 Faults = Iterator[tuple[Place, str]]
 
 # Directions come from coordinates in decimal text: beyond rounding they are either equal or mistaken.
-ALIGNED = 1e-6
+ALIGNMENT_TOLERANCE = 1e-6
 # A nut this far off its screw [m] is a slip of the pen, not rounding.
 OFF_AXIS = 1e-6
 # A beam shorter than this [m] joins two nodes at one place.
 MIN_BEAM_LENGTH = 1e-9
 # `up` this near to the beam's own direction turns nothing.
-PARALLEL = 1e-6
+PARALLEL_TOLERANCE = 1e-6
 
 
 def contradictions(structure: GeometryStructure) -> Faults:
@@ -211,7 +211,7 @@ def _body(structure: GeometryStructure, name: str, body: Body) -> Faults:
         yield from _section(structure, (*place, "section"), beams.section)
         stops: list[tuple[Node, ...]] = []
         for k, text in enumerate(beams.through):
-            known, faults = _known(structure, name, (text,), (*place, "through", k))
+            known, faults = _find_nodes(structure, name, (text,), (*place, "through", k))
             yield from faults
             if known and stops and len(known) != len(stops[-1]):
                 counts = f"{beams.through[k - 1]} has {len(stops[-1])} nodes and {text} has {len(known)}"
@@ -226,13 +226,13 @@ def _body(structure: GeometryStructure, name: str, body: Body) -> Faults:
         *(((*here, "masses", i, "nodes"), mass.nodes) for i, mass in enumerate(body.masses)),
         *(((*here, "mounts", i, "nodes"), mount.nodes) for i, mount in enumerate(body.mounts)),
     ):
-        known, faults = _known(structure, name, texts, place)
+        known, faults = _find_nodes(structure, name, texts, place)
         yield from faults
         if twice := [entry for k, entry in enumerate(known) if entry in known[:k]]:
             yield place, f"{twice[0]} is listed twice"
     for i, carriage in enumerate(body.carriages):
         place = (*here, "carriages", i)
-        known, faults = _known(structure, name, (carriage.node,), (*place, "node"))
+        known, faults = _find_nodes(structure, name, (carriage.node,), (*place, "node"))
         yield from faults
         if len(known) > 1:
             yield (*place, "node"), f"{carriage.node!r} is a line of {len(known)} nodes; a carriage sits on one"
@@ -246,9 +246,10 @@ def _body(structure: GeometryStructure, name: str, body: Body) -> Faults:
         for axis in _ways(structure, name) ^ _ways(structure, line.body):
             for k, direction in enumerate(carriage.directions):
                 way = structure.axes[axis].direction if axis in structure.axes else (0.0, 0.0, 0.0)
-                if abs(sum(a * b for a, b in zip(direction, way, strict=True))) > ALIGNED:
+                if abs(sum(a * b for a, b in zip(direction, way, strict=True))) > ALIGNMENT_TOLERANCE:
                     message = (
-                        f"{_shown(direction)} is not square to {_shown(way)}, along which axis {axis} moves {name}"
+                        f"{_direction_text(direction)} is not square to {_direction_text(way)}, along "
+                        f"which axis {axis} moves {name}"
                     )
                     yield (*place, "directions", k), f"{message} past {line.body}; the carriage would hold the axis"
 
@@ -259,7 +260,7 @@ def _section(structure: GeometryStructure, place: Place, name: str) -> Faults:
         yield place, f"there is no section {name!r}{hint}"
 
 
-def _known(
+def _find_nodes(
     structure: GeometryStructure, body: str, texts: Sequence[str], place: Place
 ) -> tuple[tuple[Node, ...], list[tuple[Place, str]]]:
     """Nodes of a body that are named, and what is wrong with the names."""
@@ -284,11 +285,11 @@ def _up(place: Place, up: tuple[float, float, float] | None, start: Sequence[flo
     if up is None or length < MIN_BEAM_LENGTH:
         return
     along = [(b - a) / length for a, b in zip(start, end, strict=True)]
-    if hypot(*_cross(along, up)) < PARALLEL:
+    if hypot(*_cross(along, up)) < PARALLEL_TOLERANCE:
         yield place, "points along the beam itself, so it turns nothing; a direction across the beam is needed"
 
 
-class _Hold(NamedTuple):
+class _AttachedPoint(NamedTuple):
     """Something held at a point: its place in the file, by what, the body in whose frame the point is given (None: not
     known), and the axis that it must move with (True) or must not (False)."""
 
@@ -308,26 +309,26 @@ def _drive(structure: GeometryStructure, name: str) -> Faults:
     yield from _frame(structure, ("axes", name, "scale", "body"), scale.body)
     reads = scale.body in structure.bodies and name in structure.bodies[scale.body].moves_with
     holds = [
-        _Hold((*here, "stator", "node"), (drive.stator.node,), screw, name, False),
+        _AttachedPoint((*here, "stator", "node"), (drive.stator.node,), screw, name, False),
         *(
-            _Hold((*here, "bearings", i, "held_by"), it.held_by, screw, name, False)
+            _AttachedPoint((*here, "bearings", i, "held_by"), it.held_by, screw, name, False)
             for i, it in enumerate(drive.bearings)
         ),
-        _Hold((*here, "nut", "held_by"), drive.nut.held_by, nut, name, True),
-        _Hold(("axes", name, "scale", "moving"), scale.moving, scale.body if reads else None, name, True),
-        _Hold(("axes", name, "scale", "against"), scale.against, None if reads else scale.body, name, False),
+        _AttachedPoint((*here, "nut", "held_by"), drive.nut.held_by, nut, name, True),
+        _AttachedPoint(("axes", name, "scale", "moving"), scale.moving, scale.body if reads else None, name, True),
+        _AttachedPoint(("axes", name, "scale", "against"), scale.against, None if reads else scale.body, name, False),
     ]
     if drive.nut.rotation_of is not None:
-        holds.append(_Hold((*here, "nut", "rotation_of"), drive.nut.rotation_of, nut, name, True))
+        holds.append(_AttachedPoint((*here, "nut", "rotation_of"), drive.nut.rotation_of, nut, name, True))
     for hold in holds:
-        yield from _held(structure, hold)
+        yield from _check_attachment(structure, hold)
 
 
 def _tool(structure: GeometryStructure) -> Faults:
     tool = structure.tool
     yield from _frame(structure, ("tool", "body"), tool.body)
-    yield from _held(structure, _Hold(("tool", "held_by"), tool.held_by, tool.body))
-    yield from _held(structure, _Hold(("tool", "against"), tool.against))
+    yield from _check_attachment(structure, _AttachedPoint(("tool", "held_by"), tool.held_by, tool.body))
+    yield from _check_attachment(structure, _AttachedPoint(("tool", "against"), tool.against))
 
 
 def _frame(structure: GeometryStructure, place: Place, body: str, axis: str = "", moves: bool = False) -> Faults:
@@ -335,28 +336,35 @@ def _frame(structure: GeometryStructure, place: Place, body: str, axis: str = ""
     if body not in structure.bodies:
         yield place, f"there is no body {body!r}{did_you_mean(body, list(structure.bodies))}"
     elif axis and (axis in structure.bodies[body].moves_with) != moves:
-        yield place, f"{_moving(structure, body)}; it {'must' if moves else 'must not'} move with {axis}"
+        yield place, f"{_moving_axes_text(structure, body)}; it {'must' if moves else 'must not'} move with {axis}"
 
 
-def _held(structure: GeometryStructure, hold: _Hold) -> Faults:
+def _check_attachment(structure: GeometryStructure, hold: _AttachedPoint) -> Faults:
     """Names are known; nodes of one mean move alike, and as the point does that they hold."""
     try:
-        result = held(structure, hold.texts)
+        result = resolve_attachment(structure, hold.texts)
     except InputError as error:
         yield hold.place, str(error)
         return
     ways = {body: _ways(structure, body) for body in result.bodies}
     body = result.bodies[0]
     if other := [name for name in ways if ways[name] != ways[body]]:
-        yield hold.place, f"{_moving(structure, body)}, {_moving(structure, other[0])}; nodes of a mean must move alike"
+        yield (
+            hold.place,
+            f"{_moving_axes_text(structure, body)}, {_moving_axes_text(structure, other[0])}; nodes of a mean "
+            f"must move alike",
+        )
     elif hold.axis is not None and (hold.axis in ways[body]) != hold.moves:
-        yield hold.place, f"{_moving(structure, body)}; it {'must' if hold.moves else 'must not'} move with {hold.axis}"
+        yield (
+            hold.place,
+            f"{_moving_axes_text(structure, body)}; it {'must' if hold.moves else 'must not'} move with {hold.axis}",
+        )
     elif result.rail is None and hold.frame in structure.bodies and ways[body] != _ways(structure, hold.frame):
-        both = f"{_moving(structure, body)}, {_moving(structure, hold.frame)}"
+        both = f"{_moving_axes_text(structure, body)}, {_moving_axes_text(structure, hold.frame)}"
         yield hold.place, f"{both}; what holds a point must move as the body does in whose frame the point is given"
 
 
-def _moving(structure: GeometryStructure, body: str) -> str:
+def _moving_axes_text(structure: GeometryStructure, body: str) -> str:
     return f"{body} moves with {', '.join(structure.bodies[body].moves_with) or 'no axis'}"
 
 
@@ -394,9 +402,9 @@ def _along_screw(structure: GeometryStructure, name: str) -> Faults:
         yield (*place, "screw"), "start and end are the same point; a screw has a length"
         return
     along = [(b - a) / length for a, b in zip(screw.start, screw.end, strict=True)]
-    if hypot(*_cross(along, axis.direction)) > ALIGNED:
+    if hypot(*_cross(along, axis.direction)) > ALIGNMENT_TOLERANCE:
         shown = ", ".join(f"{part:.6g}" for part in along)
-        yield (*place, "screw"), f"the screw runs along [{shown}], axis {name} along {_shown(axis.direction)}"
+        yield (*place, "screw"), f"the screw runs along [{shown}], axis {name} along {_direction_text(axis.direction)}"
         return
     for at in axis.travel:
         pose = {other: content.travel[0] for other, content in structure.axes.items()} | {name: at}
@@ -434,7 +442,7 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _shown(direction: Iterable[float]) -> str:
+def _direction_text(direction: Iterable[float]) -> str:
     vector = tuple(direction)
     for letter, known in FRAME.items():
         if vector == known:
@@ -475,4 +483,4 @@ def load_structure(path: str | Path) -> Structure:
         raise InputError(
             describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*STRUCTURE_KINDS])}")
         )
-    return checked(source, STRUCTURE_KINDS[kind], path, contradictions_of)
+    return check_tree(source, STRUCTURE_KINDS[kind], path, contradictions_of)

@@ -32,7 +32,7 @@ Inertia = Annotated[float, Quantity("kg.m^2", minimum=0)]
 
 def _text(pattern: str, what: str) -> tuple[PlainValidator, WithJsonSchema]:
     """Text of a pattern; `what` says what it is in messages."""
-    return PlainValidator(partial(_read, pattern, what)), WithJsonSchema(_schema(pattern))
+    return PlainValidator(partial(_match_text, pattern, what)), WithJsonSchema(_schema(pattern))
 
 
 def _texts(pattern: str, what: str) -> tuple[PlainValidator, WithJsonSchema]:
@@ -42,14 +42,14 @@ def _texts(pattern: str, what: str) -> tuple[PlainValidator, WithJsonSchema]:
         if isinstance(value, (list, tuple)):
             if not value:
                 raise fault(f"an empty list; a {what} is needed")
-            return tuple(_read(pattern, what, item) for item in value)
-        return (_read(pattern, what, value),)
+            return tuple(_match_text(pattern, what, item) for item in value)
+        return (_match_text(pattern, what, value),)
 
     one = _schema(pattern)
     return PlainValidator(read), WithJsonSchema({"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]})
 
 
-def _read(pattern: str, what: str, value: Any) -> str:
+def _match_text(pattern: str, what: str, value: Any) -> str:
     if not isinstance(value, str) or not re.fullmatch(pattern, value):
         raise fault(f"{brief(value)} is no {what}")
     return value
@@ -264,7 +264,7 @@ class Drive(Model):
 
     @field_validator("bearings")
     @classmethod
-    def _held(cls, bearings: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
+    def _check_bearings(cls, bearings: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
         if not any(bearing.axial > 0 for bearing in bearings):
             raise fault("no bearing holds the screw along its axis; at least one needs axial above 0 N/m")
         return bearings
@@ -446,7 +446,7 @@ class StructureAxis(Model):
 
     @field_validator("travel")
     @classmethod
-    def _ascending(cls, travel: tuple[float, float]) -> tuple[float, float]:
+    def _check_ascending(cls, travel: tuple[float, float]) -> tuple[float, float]:
         if travel[0] >= travel[1]:
             raise fault(f"travel from {travel[0]:.9g} m to {travel[1]:.9g} m; the first must be the lower end")
         return travel

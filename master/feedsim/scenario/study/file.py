@@ -18,10 +18,10 @@ WAYS = ("smallest", "largest")
 MAX_PARAMETER_NAME = 60  # characters of a parameter's name, which heads a column
 MOST_RUNS = 1_000_000
 # Columns of the table that every study has.
-TAKEN = ("run", "status", "message", "warnings", "seconds")
+RESERVED_COLUMNS = ("run", "status", "message", "warnings", "seconds")
 
 
-def _written(value: Any) -> Any:
+def _check_plain_value(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise fault(f"{brief(value)} is no number and no quantity")
     return value
@@ -38,7 +38,7 @@ def _keys(value: Any) -> tuple[str, ...]:
 
 # A quantity as it is written: a text or a number.
 _TEXT = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2.5 N.m", "5000 mm/min"]}
-Written = Annotated[Any, PlainValidator(_written), WithJsonSchema({"anyOf": [{"type": "number"}, _TEXT]})]
+PlainValue = Annotated[Any, PlainValidator(_check_plain_value), WithJsonSchema({"anyOf": [{"type": "number"}, _TEXT]})]
 # One dotted key or a list of them; becomes a tuple.
 _KEY = {"type": "string", "minLength": 1, "examples": ["machine.axes.*.friction.F_C"]}
 _LIST = {"type": "array", "items": _KEY, "minItems": 1, "uniqueItems": True}
@@ -72,14 +72,14 @@ class ParameterEntry(Model):
     distribution: Kind | None = Field(
         default=None, description="How the values are distributed (default: uniform where there are from and to)"
     )
-    low: Written | None = Field(default=None, alias="from", description="Least value")
-    high: Written | None = Field(default=None, alias="to", description="Greatest value")
+    low: PlainValue | None = Field(default=None, alias="from", description="Least value")
+    high: PlainValue | None = Field(default=None, alias="to", description="Greatest value")
     count: Annotated[StrictInt, Field(ge=1, le=MOST_RUNS)] | None = Field(
         default=None, description="In a grid: number of values from from to to"
     )
-    mean: Written | None = Field(default=None, description="Mean of a normal or lognormal distribution")
-    deviation: Written | None = Field(default=None, description="Standard deviation of a normal or lognormal one")
-    mode: Written | None = Field(
+    mean: PlainValue | None = Field(default=None, description="Mean of a normal or lognormal distribution")
+    deviation: PlainValue | None = Field(default=None, description="Standard deviation of a normal or lognormal one")
+    mode: PlainValue | None = Field(
         default=None, description="Most frequent value of a triangular one (default: the middle)"
     )
     choices: Annotated[tuple[Any, ...], Field(min_length=1)] | None = Field(
@@ -124,7 +124,7 @@ class StudyFile(Model):
     @classmethod
     def _names(cls, parameters: dict[str, ParameterEntry]) -> dict[str, ParameterEntry]:
         for name in parameters:
-            if name in TAKEN:
+            if name in RESERVED_COLUMNS:
                 raise fault(f"{name!r} is a column of every table; call the parameter otherwise")
             if not name or len(name) > MAX_PARAMETER_NAME or not name.isprintable() or set(name) & set(" ,;[]\"'="):
                 raise fault(

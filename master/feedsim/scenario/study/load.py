@@ -10,9 +10,9 @@ from math import prod
 from pathlib import Path
 
 from feedsim.files import checked
-from feedsim.files.checked import check, describe, dotted, fetch, in_order, read_group
+from feedsim.files.checked import check, describe, dotted_key, fetch, in_order, read_group
 from feedsim.files.fields import did_you_mean
-from feedsim.files.source import Source, at
+from feedsim.files.source import Source, value_at
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.motions import Circle, MeasuredSetpoints
 from feedsim.scenario.base import Base
@@ -22,7 +22,7 @@ from feedsim.scenario.study.file import MOST_RUNS, StudyFile
 from feedsim.scenario.study.parameter import Reader
 from feedsim.scenario.study.study import Parameter, Sampling, Study, as_text, changes_of
 
-SEED = 1
+DEFAULT_SEED = 1
 # Keys that decide which figures there are: of a motion or an evaluation as a whole, or what it is of.
 _DECIDES = re.compile(r"machine|(motions|evaluate)(\.(\d+|\*))?(\.(plane|axis|kind|motion)(\..*)?)?")
 MOST_CHOICES = 50  # choices that are looked at
@@ -61,7 +61,7 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
         faults += wrong
     if faults or entry is None or base is None:
         raise InputError.of(str(path), in_order(faults))
-    warnings += [*notes, *_middle(base, tuple(parameters.values()))]
+    warnings += [*notes, *_check_middle(base, tuple(parameters.values()))]
     return Study(
         name=entry.name,
         note=entry.note,
@@ -69,7 +69,7 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
         base=base,
         sampling=sampling,
         parameters=tuple(parameters.values()),
-        settings=tuple(_meant(base, _settings(source))),
+        settings=tuple(_setting_texts(base, _settings(source))),
         figures=entry.figures,
         goal=_goal(entry),
         explain=entry.explain or "",
@@ -96,7 +96,7 @@ def _settings(source: Source) -> list[Setting]:
     return [*checked.entries(source, "set")] if isinstance(source.data.get("set"), dict) else []
 
 
-def _meant(base: Base, settings: Sequence[Setting]) -> list[str]:
+def _setting_texts(base: Base, settings: Sequence[Setting]) -> list[str]:
     """Settings as KEY=VALUE, with the files that they name relative to the working folder."""
     draft = base.draft.copy()
     draft.apply(draft.own)
@@ -104,11 +104,11 @@ def _meant(base: Base, settings: Sequence[Setting]) -> list[str]:
     for key, value in settings:
         draft.apply([(key, value)])
         place = draft.changed[-1][0]
-        texts.append(f"{key}={as_text(value, at(draft.source.data, place))}")
+        texts.append(f"{key}={as_text(value, value_at(draft.source.data, place))}")
     return texts
 
 
-def _middle(base: Base, parameters: tuple[Parameter, ...]) -> list[Finding]:
+def _check_middle(base: Base, parameters: tuple[Parameter, ...]) -> list[Finding]:
     """A warning where the scenario cannot be loaded with a value from the middle of every parameter."""
     try:
         base.with_changes(changes_of(parameters, [parameter.middle for parameter in parameters]))
@@ -130,11 +130,13 @@ def _overlaps(source: Source, reader: Reader) -> list[str]:
             if a == b and {one, two} <= reader.factors:
                 continue  # they multiply one another
             if a == b:
-                message = f"{one} sets {dotted(a)} already"
+                message = f"{one} sets {dotted_key(a)} already"
             elif inner == a:
-                message = f"replaces {dotted(b)}, and with it {dotted(a)}, which {one} sets; put {two} before {one}"
+                message = (
+                    f"replaces {dotted_key(b)}, and with it {dotted_key(a)}, which {one} sets; put {two} before {one}"
+                )
             elif two in reader.factors:
-                message = f"{two} multiplies {dotted(b)}, which {one} replaces with all of {dotted(a)}"
+                message = f"{two} multiplies {dotted_key(b)}, which {one} replaces with all of {dotted_key(a)}"
             else:
                 continue
             result.append(describe(source, who, message))
@@ -185,7 +187,7 @@ def _sampling(
             f"sampling.runs: {number} is no power of two; a Sobol sequence is balanced with {near} or {2 * near} runs"
         )
         warnings.append(Finding("sampling-unbalanced", "doubt", text, "sampling.runs", f"--runs {near}"))
-    seed = SEED if given.seed is None else given.seed
+    seed = DEFAULT_SEED if given.seed is None else given.seed
     return Sampling(given.method, number, seed), faults, warnings
 
 

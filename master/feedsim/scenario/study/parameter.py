@@ -13,9 +13,9 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from feedsim.files import checked
-from feedsim.files.checked import describe, dotted, quantity_of, reading
+from feedsim.files.checked import describe, dotted_key, quantity_of, reading_context
 from feedsim.files.fields import Quantity
-from feedsim.files.source import Mark, Place, Source, at
+from feedsim.files.source import Mark, Place, Source, value_at
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.base import Base, Change, data_files
@@ -27,7 +27,7 @@ from feedsim.scenario.study.study import Choice, Distribution, Parameter, as_tex
 
 
 # Kind -> what it needs, what it may have.
-NEEDS: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
+KEYS_OF_KIND: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "uniform": (("from", "to"), ()),
     "loguniform": (("from", "to"), ()),
     "triangular": (("from", "to"), ("mode",)),
@@ -35,7 +35,7 @@ NEEDS: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "lognormal": (("mean", "deviation"), ("from", "to")),
 }
 # Deviations from the mean beyond which nothing is left: doubles cannot represent the tail's probability any more.
-FARTHEST = 8.0
+MAX_DEVIATIONS = 8.0
 
 Problem = tuple[Place, str]
 
@@ -51,7 +51,7 @@ def numbers(
         what = "values, or from, to and count" if grid else "values, or a distribution, or from and to"
         return None, [((), f"nothing is said of its values: {what}")]
     kind: Kind = entry.distribution or ("uniform" if not {"mean", "deviation"} & set(values) else "normal")
-    needed, optional = NEEDS[kind]
+    needed, optional = KEYS_OF_KIND[kind]
     problems: list[Problem] = [((), f"{kind}: missing key {key!r}") for key in needed if key not in values]
     problems += [
         ((key,), f"not of a {kind} distribution: it has {', '.join((*needed, *optional))}")
@@ -110,9 +110,9 @@ def _contradictions(distribution: Distribution) -> list[Problem]:
         problems.append((("deviation",), f"{deviation:.9g} is outside the allowed range: more than 0"))
     elif distribution.kind == "lognormal" and mean <= 0:
         problems.append((("mean",), f"{mean:.9g}; that of a lognormal distribution is more than 0"))
-    elif low is not None and low > mean + FARTHEST * deviation:
+    elif low is not None and low > mean + MAX_DEVIATIONS * deviation:
         problems.append((("from",), "more than 8 deviations above the mean: nothing is left of the distribution"))
-    elif high is not None and high < mean - FARTHEST * deviation:
+    elif high is not None and high < mean - MAX_DEVIATIONS * deviation:
         problems.append((("to",), "more than 8 deviations below the mean: nothing is left of the distribution"))
     elif distribution.kind == "lognormal" and high is not None and high <= 0:
         problems.append((("to",), "nothing is left of the distribution: a lognormal one is above 0"))
@@ -131,7 +131,7 @@ def _not_whole(distribution: Distribution) -> list[Problem]:
     return []
 
 
-def outside(distribution: Distribution, low: float, high: float) -> float:
+def probability_outside(distribution: Distribution, low: float, high: float) -> float:
     """Probability that a normal or lognormal distribution, as it is cut, is below `low` or above `high`.
 
     0 for distributions of other kinds: their limits themselves are checked.
@@ -187,7 +187,7 @@ class Reader:
         before = len(self.faults)
         try:
             parameter = self._read(name, entry)
-        except _Reported:
+        except _FaultReported:
             return None
         except InputError as error:
             self.faults += error.problems
@@ -195,7 +195,7 @@ class Reader:
         return parameter if len(self.faults) == before else None
 
     def _read(self, name: str, entry: ParameterEntry) -> Parameter:
-        targets = self.targets[name] = list(self._reached(name, entry))
+        targets = self.targets[name] = list(self._find_targets(name, entry))
         if entry.factor:
             self.factors.add(name)
             return self._factor(name, entry, targets)
@@ -204,7 +204,7 @@ class Reader:
         for target in targets:
             if target.quantity is None and not target.whole:
                 raise self._fault(
-                    name, ("key",), f"{dotted(target.place)} takes no number; list what it takes: values: [...]"
+                    name, ("key",), f"{dotted_key(target.place)} takes no number; list what it takes: values: [...]"
                 )
         whole = targets[0].whole
         unit = self._common_unit(name, targets)
@@ -214,11 +214,11 @@ class Reader:
             self._check_range(name, entry, target, distribution, 1.0)
         return Parameter(name, entry.keys, unit, whole=whole, distribution=distribution)
 
-    def _reached(self, name: str, entry: ParameterEntry) -> Iterator[Target]:
+    def _find_targets(self, name: str, entry: ParameterEntry) -> Iterator[Target]:
         seen = set()
         for i, key in enumerate(entry.keys):
             here = self._at(name, "key", *([i] if len(entry.keys) > 1 else []))
-            where = f"{self.source.mark(here).where}: {dotted(here)}"
+            where = f"{self.source.mark(here).where}: {dotted_key(here)}"
             scratch = self.base.settled.source.copy()
             result = list(checked.places(scratch, Scenario, key, Mark(where, Path())))
             if not result:
@@ -226,12 +226,14 @@ class Reader:
             for place in result:
                 if place not in seen:
                     seen.add(place)
-                    parent = checked.expected(Scenario, scratch.data, place[:-1])
+                    parent = checked.expected_annotation(Scenario, scratch.data, place[:-1])
                     annotation = checked.child(parent, place[-1])
                     if place[-1] in _WORDS and checked.keys(parent) is not None:
-                        raise InputError(f"{where}: {dotted(place)} is only shown; it changes no run")
-                    if checked.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
-                        raise InputError(f"{where}: {dotted(place[:-1])} has no {place[-1]!r}")
+                        raise InputError(f"{where}: {dotted_key(place)} is only shown; it changes no run")
+                    if checked.keys(parent) is None and place[-1] not in value_at(
+                        self.base.settled.source.data, place[:-1]
+                    ):
+                        raise InputError(f"{where}: {dotted_key(place[:-1])} has no {place[-1]!r}")
                     yield Target(place, annotation, quantity_of(annotation), _is_whole(annotation))
 
     def _common_unit(self, name: str, targets: list[Target]) -> str:
@@ -239,7 +241,7 @@ class Reader:
         result = ["1" if target.quantity is None else target.quantity.unit for target in targets]
         for target, unit in zip(targets, result, strict=True):
             if units.unit(unit).dimension != units.unit(result[0]).dimension or target.whole != targets[0].whole:
-                first, other = dotted(targets[0].place), dotted(target.place)
+                first, other = dotted_key(targets[0].place), dotted_key(target.place)
                 kinds = [
                     "a whole number" if t.whole else units.article(t.quantity.kind) if t.quantity else "no number"
                     for t in (targets[0], target)
@@ -265,17 +267,17 @@ class Reader:
                 except InputError as error:
                     self.faults += error.problems
         if len(values) < sum(value is not None for value in written.values()):
-            raise _Reported
+            raise _FaultReported
         distribution, problems = numbers(entry, values, self.grid, whole)
         self.faults += [describe(self.source, self._at(name, *key), message) for key, message in problems]
         if distribution is None:
-            raise _Reported
+            raise _FaultReported
         return distribution
 
     def _factor(self, name: str, entry: ParameterEntry, targets: list[Target]) -> Parameter:
         origins = []
         for target in targets:
-            key = dotted(target.place)
+            key = dotted_key(target.place)
             if target.quantity is None:
                 raise self._fault(name, ("factor",), f"{key} is no quantity, so that it cannot be multiplied")
             value = _value(self.base.scenario, target.place)
@@ -317,7 +319,7 @@ class Reader:
         here = self._at(name, "values", i)
         marks = {place[len(here) :]: mark for place, mark in self.source.marks.items() if place[: len(here)] == here}
         value = Source(entry.choices[i] if entry.choices else None, marks)
-        meant = self._meant(entry.keys, value, targets)
+        meant = self._read_value(entry.keys, value, targets)
         if meant is _WRONG:
             return None
         text = as_text(value, meant)
@@ -332,7 +334,7 @@ class Reader:
         label = value.data if isinstance(value.data, str) else text
         return Choice(" ".join(label.split()), number, text, meant)
 
-    def _meant(self, keys: tuple[str, ...], value: Source, targets: list[Target]) -> Any:
+    def _read_value(self, keys: tuple[str, ...], value: Source, targets: list[Target]) -> Any:
         """The plain value with the files that it names in it; faults are reported with the lines of the study."""
         draft = self.base.draft.copy() if keys == ("machine",) else self.base.settled.copy()
         draft.apply((key, value) for key in keys)
@@ -340,7 +342,7 @@ class Reader:
             draft.settle()
         problems = draft.faults
         if not problems and not all(
-            _fits(target, at(draft.source.data, target.place), draft.source) for target in targets
+            _accepts_value(target, value_at(draft.source.data, target.place), draft.source) for target in targets
         ):
             try:
                 draft.scenario()
@@ -350,7 +352,7 @@ class Reader:
             self.faults += problems
             return _WRONG
         self.files += [file for target in targets for file in data_files(draft.source, target.place)]
-        return at(draft.source.data, targets[0].place)
+        return value_at(draft.source.data, targets[0].place)
 
     def _check_range(
         self, name: str, entry: ParameterEntry, target: Target, distribution: Distribution, times: float
@@ -358,8 +360,8 @@ class Reader:
         for key, bound, written in (("from", distribution.low, entry.low), ("to", distribution.high, entry.high)):
             if bound is not None and target.quantity is not None:
                 self._check_one(name, (key,), target, bound, times, f"{written}")
-            elif bound is not None and not _fits(target, int(bound), self.base.settled.source):
-                self._explain(name, (key,), [Change(dotted(target.place), f"{bound:.0f}", int(bound))])
+            elif bound is not None and not _accepts_value(target, int(bound), self.base.settled.source):
+                self._explain_fault(name, (key,), [Change(dotted_key(target.place), f"{bound:.0f}", int(bound))])
         if target.quantity is not None and times != 0.0:
             self._doubt_range(name, target, target.quantity, distribution, times)
 
@@ -368,13 +370,13 @@ class Reader:
     ) -> None:
         """Warn of a distribution that is not cut and leads out of the allowed range."""
         low, high = sorted((max(quantity.minimum, quantity.above) / times, quantity.maximum / times))
-        share = outside(distribution, low, high)
-        if share >= RARE:
+        share = probability_outside(distribution, low, high)
+        if share >= NEGLIGIBLE_PROBABILITY:
             remedy = "Cut it with from and to"
             text = describe(
                 self.source,
                 self._at(name),
-                f"{100 * share:.2g} % of the distribution are outside the allowed range of {dotted(target.place)}, "
+                f"{100 * share:.2g} % of the distribution are outside the allowed range of {dotted_key(target.place)}, "
                 f"{quantity.range}; such runs fail. {remedy}",
             )
             self.warnings.append(Finding("distribution-out-of-range", "doubt", text, name, remedy))
@@ -385,10 +387,10 @@ class Reader:
         number = value * times
         if not quantity.minimum <= number <= quantity.maximum or number <= quantity.above:
             shown = written if times == 1.0 else f"{written} times {units.show(times, quantity.unit)}"
-            message = f"{shown} is outside the allowed range of {dotted(target.place)}: {quantity.range}"
+            message = f"{shown} is outside the allowed range of {dotted_key(target.place)}: {quantity.range}"
             self.faults.append(describe(self.source, self._at(name, *key), message))
 
-    def _explain(self, name: str, key: Place, made: list[Change]) -> None:
+    def _explain_fault(self, name: str, key: Place, made: list[Change]) -> None:
         """Say why the scenario does not take a value."""
         try:
             self.base.with_changes(made)
@@ -414,17 +416,17 @@ class Reader:
 
 _WRONG = object()
 _WORDS = ("name", "note")  # keys that are there to be read
-RARE = 1e-6  # share of a distribution that no study meets
+NEGLIGIBLE_PROBABILITY = 1e-6  # share of a distribution that no study meets
 
 
-class _Reported(Exception):
+class _FaultReported(Exception):
     """What is wrong is among the faults already."""
 
 
-def _fits(target: Target, data: Any, source: Source) -> bool:
+def _accepts_value(target: Target, data: Any, source: Source) -> bool:
     """Whether a value can stand at a place, whatever stands beside it."""
     try:
-        TypeAdapter(target.annotation).validate_python(data, context=reading(Scenario, source.data))
+        TypeAdapter(target.annotation).validate_python(data, context=reading_context(Scenario, source.data))
     except ValidationError:
         return False
     return True

@@ -193,8 +193,8 @@ def as_text(written: Source, meant: Any) -> str:
     """A value that means `meant`: the same, or with the files that it names read or relative to the working folder."""
     data = written.data
     if meant != data and isinstance(data, str):
-        return _quoted(meant if isinstance(meant, str) else str(written.mark(()).folder / data))
-    return _quoted(meant)
+        return _quote_value(meant if isinstance(meant, str) else str(written.mark(()).folder / data))
+    return _quote_value(meant)
 
 
 def number_text(value: float, unit: str) -> str:
@@ -202,7 +202,7 @@ def number_text(value: float, unit: str) -> str:
     return repr(float(value)) if unit == "1" else f"{float(value)!r} {unit}"
 
 
-def _quoted(value: Any) -> str:
+def _quote_value(value: Any) -> str:
     if isinstance(value, str):
         try:
             same = parse(value, "", Path(), lines=False).data == value

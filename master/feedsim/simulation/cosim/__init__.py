@@ -5,11 +5,20 @@ Start with run.py: ``run``; then schedule.py, which says once what a control cyc
 """
 
 from feedsim.foundation.installation import fmus_directory
-from feedsim.simulation.cosim.exchange import executed, executing
+from feedsim.simulation.cosim.exchange import describe_archive_programs, describe_programs
 from feedsim.simulation.cosim.run import Crossings, Follower, Run, check, follow, logged, run
 from feedsim.simulation.cosim.schedule import Progress
 
 __all__ = [
-    "Crossings", "Follower", "Progress", "Run", "check", "executed", "executing", "fmus_directory", "follow", "logged",
+    "Crossings",
+    "Follower",
+    "Progress",
+    "Run",
+    "check",
+    "describe_archive_programs",
+    "describe_programs",
+    "fmus_directory",
+    "follow",
+    "logged",
     "run",
 ]  # fmt: skip

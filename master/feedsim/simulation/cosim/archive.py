@@ -22,10 +22,10 @@ from fmpy.fmi2 import FMU2Slave
 
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import Closing, held
+from feedsim.foundation.owned import BlockResource, defer_signals
 from feedsim.simulation.cosim import unpacked
 from feedsim.simulation.cosim.unpacked import STORE, Content, check_there
-from feedsim.simulation.cosim.worker import calling, watched
+from feedsim.simulation.cosim.worker import mark_call, watched_process
 
 # --- How this process computes: rounding, denormal numbers, traps, which a program of another maker may leave
 #     changed
@@ -80,7 +80,7 @@ def restore(kept: Any) -> bool:
 
 
 @contextmanager
-def restored(changed: Callable[[], None] | None = None) -> Iterator[None]:
+def preserve_float_settings(changed: Callable[[], None] | None = None) -> Iterator[None]:
     """A block that calls another program; behind it this process computes as before. `changed` is called where the
     program has left it otherwise."""
     before = settings()
@@ -121,7 +121,7 @@ _NUMBERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
 }
 
 
-def read(file: Path) -> Any:
+def read_description(file: Path) -> Any:
     """The description of FMI 2.0 in a file, as FMPy reads it. Whatever it raises: it cannot be read even so."""
     root = ET.parse(file).getroot()
     for element in root.iter():
@@ -142,7 +142,7 @@ def read(file: Path) -> Any:
         tidied.unlink(missing_ok=True)
 
 
-def _is(kind: Callable[[str], object], text: str) -> bool:
+def _parses_as(kind: Callable[[str], object], text: str) -> bool:
     with suppress(ValueError):
         kind(text)
         return True
@@ -153,14 +153,14 @@ def _tidy_attributes(root: ET.Element) -> None:
     for element in root.iter():
         kind, names = _NUMBERS.get(element.tag, (str, ()))
         for name in names:
-            if name in element.attrib and not _is(kind, element.attrib[name]):
+            if name in element.attrib and not _parses_as(kind, element.attrib[name]):
                 del element.attrib[name]
         for name, value in element.attrib.items():
             if element.tag == "CoSimulation" and value.lower() in ("true", "false"):
                 element.set(name, value.lower())
     for unit in root.iter("Unit"):
         for base in unit.findall("BaseUnit"):
-            if not all(_is(float, value) for value in base.attrib.values()):
+            if not all(_parses_as(float, value) for value in base.attrib.values()):
                 unit.remove(base)
                 continue
             for name, value in base.attrib.items():
@@ -174,14 +174,14 @@ def _tidy_types(root: ET.Element) -> None:
             if not len(entry) or entry[0].tag not in TYPES or entry.get("name") is None:
                 group.remove(entry)
                 continue
-            _keep(entry[0], _OF_TYPES)
+            _keep_attributes(entry[0], _OF_TYPES)
             for item in entry[0].findall("Item"):
-                _keep(item, ("name", "value", "description"))
-                if item.get("name") is None or not _is(int, item.get("value", "")):
+                _keep_attributes(item, ("name", "value", "description"))
+                if item.get("name") is None or not _parses_as(int, item.get("value", "")):
                     entry[0].remove(item)
 
 
-def _keep(element: ET.Element, names: Iterable[str]) -> None:
+def _keep_attributes(element: ET.Element, names: Iterable[str]) -> None:
     for name in {*element.attrib} - {*names}:
         del element.attrib[name]
 
@@ -195,7 +195,12 @@ def _tidy_variables(root: ET.Element) -> None:
     for variable in [*group]:
         value = next((child for child in variable if child.tag in TYPES), None)
         reference = variable.get("valueReference", "")
-        if value is None or variable.get("name") in seen or not _is(int, reference) or not 0 <= int(reference) < 2**32:
+        if (
+            value is None
+            or variable.get("name") in seen
+            or not _parses_as(int, reference)
+            or not 0 <= int(reference) < 2**32
+        ):
             group.remove(variable)
             continue
         seen.add(variable.get("name"))
@@ -238,7 +243,7 @@ class UnitDefinition:
         return ".".join(f"{name}^{power}" for name, power in self.exponents.items()) or "1"
 
 
-class Archive(Closing):
+class Archive(BlockResource):
     """An ``.fmu`` file, unpacked for as long as this object is open (a context manager).
 
     Unpacked is what a run needs: description, resources, and the library for this platform. Archives of the same
@@ -270,7 +275,7 @@ class Archive(Closing):
     def note_fatal(self) -> None:
         """An instance has returned fmi2Fatal: of none may anything be called any more."""
         self.fatal = True
-        if (here := watched()) is not None:
+        if (here := watched_process()) is not None:
             here.spent = True
 
     def part(self, prefix: str) -> Archive:
@@ -370,7 +375,7 @@ class Archive(Closing):
         path = self.library()
         before = Path.cwd()
         try:
-            with restored(), calling(f"{self.path}: loading its library"):
+            with preserve_float_settings(), mark_call(f"{self.path}: loading its library"):
                 return FMU2Slave(
                     guid=self.guid, unzipDirectory=str(self.directory), libraryPath=str(path),
                     modelIdentifier=self.description.coSimulation.modelIdentifier,
@@ -412,13 +417,13 @@ def _read_description(path: Path, directory: Path) -> tuple[Any, list[str]]:
         raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {unpacked.LARGEST_DOCUMENT}")
     unpacked.refuse_document_type(file.read_bytes(), f"{path}: {_DESCRIPTION}")
     problems: list[str] = []
-    with held():  # FMPy's validation has a bare `except:`
+    with defer_signals():  # FMPy's validation has a bare `except:`
         try:
             description = read_model_description(str(directory))
         except Exception as error:
             problems = getattr(error, "problems", None) or [f"{error or type(error).__name__}"]
             try:
-                description = read(file)
+                description = read_description(file)
             except Exception:
                 raise InputError(f"{what}: {error}") from error
     if description.fmiVersion != "2.0":

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from feedsim.foundation import installation
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.installation import fmus_directory, mend
+from feedsim.foundation.installation import fmus_directory, repair_advice
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 from feedsim.simulation.cosim.archive import Archive, folders
@@ -72,7 +72,7 @@ def library(folder: Path) -> Native | str:
     return loaded
 
 
-def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Finding, ...]]:
+def choose_native_loop(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Finding, ...]]:
     """The native loop in the first of `folders` that has one; without one, unless it is not wanted, what that costs.
 
     wanted: None: where there is one that fits; False: Python is to work.
@@ -87,11 +87,11 @@ def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Fi
         if not isinstance(cdll, str):
             return cdll, ()
         reasons.append(cdll)
-    why = f"{'; '.join(dict.fromkeys(reasons))}; {mend('the native loop')}"
+    why = f"{'; '.join(dict.fromkeys(reasons))}; {repair_advice('the native loop')}"
     if wanted:
         raise InputError(f"{', '.join(map(str, folders))}: no native cycle loop that fits this version: {why}")
     text = f"the cycle loop ran in Python, some 30 times slower than the native one, same bits: {why}"
-    return None, (Finding("native-loop-missing", "note", text, "", mend("the native loop")),)
+    return None, (Finding("native-loop-missing", "note", text, "", repair_advice("the native loop")),)
 
 
 def _address(array: NDArray[Any]) -> int:
@@ -156,20 +156,20 @@ class Exchange(Executor):
 # was exported here, holds the shipped libraries; whatever differs in one byte is another maker's.
 
 
-SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "friction_gms.fmu", "setpoint.fmu", "machine.fmu")
+SHIPPED_ARCHIVES = ("plant.fmu", "controller.fmu", "friction.fmu", "friction_gms.fmu", "setpoint.fmu", "machine.fmu")
 Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files beside the library for this platform
 
 
 def is_shipped(archive: Archive) -> bool:
     """Whether all that can be loaded from an archive is what this installation ships, to the last byte."""
-    return _is_ours(archive.path) or programs(archive) in _shipped(*_states(fmus_directory()))
+    return _is_ours(archive.path) or programs(archive) in _shipped_programs(*_states(fmus_directory()))
 
 
 def programs(archive: Archive) -> dict[str, str]:
     """What of an archive can be loaded on this platform."""
     root = archive.directory
     paths = [file for folder in folders() for file in (root / "binaries" / folder).rglob("*") if file.is_file()]
-    return {file.relative_to(root).as_posix(): _digest(file.read_bytes()) for file in sorted(paths)}
+    return {file.relative_to(root).as_posix(): _content_digest(file.read_bytes()) for file in sorted(paths)}
 
 
 def _parts(machine: Machine, folder: Path, coupling: Coupling | None) -> dict[Path, list[str]]:
@@ -190,13 +190,13 @@ def any_foreign(machine: Machine, fmus: Path, coupling: Coupling | None = None) 
     except OSError:
         return False  # the run says which archive is missing
     ours = fmus_directory()
-    return any(_foreign(*state, ours) for state in states) or _loop(fmus, ours) is not None
+    return any(_is_foreign(*state, ours) for state in states) or _loop(fmus, ours) is not None
 
 
 def _loop(folder: Path, ours: Path) -> str | None:
     """SHA-256 of the cycle loop beside the archives of a folder, where it is another one than the shipped one."""
     with suppress(OSError):
-        if folder != ours and (digest := _digest((folder / LIBRARY_NAME).read_bytes())) != _digest(
+        if folder != ours and (digest := _content_digest((folder / LIBRARY_NAME).read_bytes())) != _content_digest(
             (ours / LIBRARY_NAME).read_bytes()
         ):
             return digest
@@ -204,7 +204,7 @@ def _loop(folder: Path, ours: Path) -> str | None:
 
 
 @lru_cache(maxsize=64)
-def _foreign(path: Path, changed: int, size: int, ours: Path) -> bool:
+def _is_foreign(path: Path, changed: int, size: int, ours: Path) -> bool:
     """Of an archive in that state, where the shipped ones are in the folder `ours`."""
     if _is_ours(path):
         return False
@@ -213,7 +213,7 @@ def _foreign(path: Path, changed: int, size: int, ours: Path) -> bool:
     return False
 
 
-def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> list[str]:
+def describe_programs(machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> list[str]:
     """What a run of the machine executes that is not shipped, a sentence for each archive: who, what, its SHA-256.
 
     What cannot be opened is left out: the run says why. fmus: folder of the archives, where one was named. coupling:
@@ -221,43 +221,48 @@ def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = No
     """
     folder = fmus or fmus_directory()
     parts = _parts(machine, folder, coupling)
-    sentences = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
+    sentences = [
+        sentence for path, who in parts.items() for sentence in describe_archive_programs(path, ", ".join(who))
+    ]
     if (digest := _loop(folder, fmus_directory())) is not None:
         sentences.append(f"executes {folder / LIBRARY_NAME} as cycle loop, SHA-256 {digest}")
     return sentences
 
 
-def executing(path: Path, who: str) -> list[str]:
+def describe_archive_programs(path: Path, who: str) -> list[str]:
     """The same of one archive, for the part that it plays; nothing of a shipped one."""
     if _is_ours(path):
         return []
     with suppress(InputError), Archive(path) as archive:
         if not is_shipped(archive):
             # Of the whole archive: what a wrapper's library executes may lie beside it, in resources/.
-            return [f"executes {path} as {who}: {', '.join(programs(archive))}; SHA-256 {_digest(path.read_bytes())}"]
+            return [
+                f"executes {path} as {who}: {', '.join(programs(archive))}; SHA-256 "
+                f"{_content_digest(path.read_bytes())}"
+            ]
     return []
 
 
 def _is_ours(path: Path) -> bool:
-    return path in [fmus_directory() / name for name in SHIPPED]
+    return path in [fmus_directory() / name for name in SHIPPED_ARCHIVES]
 
 
-def _digest(content: bytes) -> str:
+def _content_digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
 def _states(folder: Path) -> list[tuple[Path, int, int]]:
-    there = [path for name in SHIPPED if (path := folder / name).is_file()]
+    there = [path for name in SHIPPED_ARCHIVES if (path := folder / name).is_file()]
     return [(path, path.stat().st_mtime_ns, path.stat().st_size) for path in there]
 
 
 @lru_cache(maxsize=4)
-def _shipped(*states: tuple[Path, int, int]) -> list[Programs]:
+def _shipped_programs(*states: tuple[Path, int, int]) -> list[Programs]:
     """Programs of the shipped archives, none of which is unpacked for it."""
     wanted = tuple(f"binaries/{folder}/" for folder in folders())
     result: list[Programs] = []
     for path, _, _ in states:
         with suppress(OSError, zipfile.BadZipFile), zipfile.ZipFile(path) as package:
             names = [zip_info.filename for zip_info in package.infolist() if not zip_info.is_dir()]
-            result.append({name: _digest(package.read(name)) for name in names if name.startswith(wanted)})
+            result.append({name: _content_digest(package.read(name)) for name in names if name.startswith(wanted)})
     return result

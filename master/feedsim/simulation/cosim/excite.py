@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from feedsim.files.trace import Trace
-from feedsim.files.trace.trace import suggest
+from feedsim.files.trace.trace import suggest_name
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.installation import fmus_directory
 from feedsim.motions.kind import Peaks
@@ -24,9 +24,9 @@ from feedsim.motions.profile import speed_change
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation.cosim import worker
-from feedsim.simulation.cosim.exchange import any_foreign, chosen
+from feedsim.simulation.cosim.exchange import any_foreign, choose_native_loop
 from feedsim.simulation.cosim.loads import LOAD_TAKEN_UP
-from feedsim.simulation.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
+from feedsim.simulation.cosim.operations import DueCycles, Operation, copy, get_row, set_real, set_slopes
 from feedsim.simulation.cosim.schedule import Cycle, Loop, Progress, Setpoints
 from feedsim.simulation.cosim.system import TOOL_FORCES, System, controller
 from feedsim.simulation.cosim.unit import Floats, Log, Port
@@ -44,7 +44,7 @@ TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z")
 LIMITS = {"torque_limited": ("M_max", "N.m"), "voltage_limited": ("u_max", "V")}
 # Periods that differ by more than this share of the signal have not settled: 0.01 dB.
 PERIOD_TOLERANCE = 1e-3
-UNREACHED = 1e-9  # of the largest motion in the same unit
+UNREACHED_MOTION_SHARE = 1e-9  # of the largest motion in the same unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Measurement:
     reference: str
     excitation: Excitation
     periods: int
-    unsettled: float
+    unsettled_share: float
     wall_time: float
     units: Mapping[str, Mapping[str, str]]
     warnings: tuple[Finding, ...]
@@ -119,11 +119,11 @@ def measure(
     fmus = fmus or fmus_directory()
     given = (machine, axis, excitation, inject, friction, offset_speed, periods, settle, fmus, native)
     if any_foreign(machine, fmus):
-        return worker.call(_measured, *given, limit=call_limit, progress=progress)
-    return _measured(*given, progress=progress)
+        return worker.call(_measure_in_process, *given, limit=call_limit, progress=progress)
+    return _measure_in_process(*given, progress=progress)
 
 
-def _measured(
+def _measure_in_process(
     machine: Machine, axis: str, excitation: Excitation, inject: str, friction: bool, offset_speed: float | None,
     periods: int, settle: int, fmus: Path, native: bool | None, *, progress: Progress | None = None,
 ) -> Measurement:  # fmt: skip
@@ -138,13 +138,13 @@ def _measured(
     machine, program, first = _setpoints(machine, axis, offset_speed or 0.0, wait, duration)
     kept = first * ratio + settle * rows
     total = kept + periods * rows
-    library, notes = chosen(native, fmus)
+    library, notes = choose_native_loop(native, fmus)
     with System(machine, fmus, friction=friction) as system:
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)
-        record = _Record(system, periods * rows, When(first=kept))
+        record = _Record(system, periods * rows, DueCycles(first=kept))
         drives = Setpoints(system, program, ratio)
         before = [*drives.operations] if offset_speed else []
-        before += [*_excite(system, axis, inject, excitation, When(first=first * ratio)), *record.before]
+        before += [*_excite(system, axis, inject, excitation, DueCycles(first=first * ratio)), *record.before]
         loop = Loop(cycle, before, record.after, library, (drives,) if offset_speed else ())
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
@@ -156,7 +156,7 @@ def _measured(
         columns = {reference: np.tile(excitation.samples, periods)} | columns
         units[reference] = _unit(system, axis, inject)
         trace = Trace((kept + np.arange(periods * rows, dtype=np.float64)) * cycles.T_c, columns, units)
-        unsettled = _unsettled(trace, rows, periods)
+        unsettled = _unsettled_share(trace, rows, periods)
         doubts = (*_doubts(trace, axis, friction, offset_speed, unsettled), *notes)
         done = Measurement(
             trace=trace,
@@ -164,7 +164,7 @@ def _measured(
             reference=reference,
             excitation=excitation,
             periods=periods,
-            unsettled=unsettled,
+            unsettled_share=unsettled,
             wall_time=wall_time,
             units=system.archives,
             warnings=(*system.warnings, *doubts),
@@ -191,10 +191,10 @@ def _check(
     machine: Machine, axis: str, excitation: Excitation, inject: str, speed: float | None, periods: int, settle: int
 ) -> None:
     if axis not in machine.axes:
-        raise InputError(f"no axis {axis!r}{suggest(axis, machine.axes)}")
+        raise InputError(f"no axis {axis!r}{suggest_name(axis, machine.axes)}")
     inputs = (*DRIVE_INPUTS, *TOOL_FORCES)
     if inject not in inputs:
-        raise InputError(f"no input {inject!r} to excite{suggest(inject, inputs)}; there is {', '.join(inputs)}")
+        raise InputError(f"no input {inject!r} to excite{suggest_name(inject, inputs)}; there is {', '.join(inputs)}")
     for name in machine.axes:
         machine.shipped_drive(name, "a measured frequency response")
     T_c, T_pos = machine.cycles.T_c, machine.cycles.T_pos
@@ -261,7 +261,7 @@ def _start(axis: str, machine: Machine, distance: float, before: float) -> float
     return min(max(start, low - min(distance, 0.0)), high - max(distance, 0.0))
 
 
-def _excite(system: System, axis: str, inject: str, excitation: Excitation, when: When) -> list[Operation]:
+def _excite(system: System, axis: str, inject: str, excitation: Excitation, when: DueCycles) -> list[Operation]:
     """What sets the input for the control cycles, a sample each."""
     samples = excitation.samples.reshape(-1, 1)
     if inject in DRIVE_INPUTS:
@@ -274,7 +274,7 @@ def _excite(system: System, axis: str, inject: str, excitation: Excitation, when
 class _Record:
     """What is known at t_k before the cycle is run, and what the controllers have worked out at t_k after it."""
 
-    def __init__(self, system: System, rows: int, when: When) -> None:
+    def __init__(self, system: System, rows: int, when: DueCycles) -> None:
         self.system = system
         axes = len(system.axes)
         self.measured = np.zeros((rows, 2 * axes))  # x_a, n_a of every axis
@@ -330,7 +330,7 @@ def _refuse_limits(machine: Machine, record: _Record, inject: str, excitation: E
         raise InputError.of("the measurement runs into limits, its response is not linear", problems)
 
 
-def _unsettled(trace: Trace, rows: int, periods: int) -> float:
+def _unsettled_share(trace: Trace, rows: int, periods: int) -> float:
     if periods < 2:
         return 0.0
     moved = {name: float(np.std(trace[name][-rows:] - _line(trace[name][-rows:]))) for name in trace}
@@ -340,7 +340,7 @@ def _unsettled(trace: Trace, rows: int, periods: int) -> float:
         # What is far below the resolution of the values themselves says nothing, nor does rounding of an axis that the
         # excitation does not reach.
         reached = max(moved[other] for other in trace if trace.unit(other) == trace.unit(name))
-        if moved[name] > max(1e-12 * float(np.max(np.abs(last))), UNREACHED * reached):
+        if moved[name] > max(1e-12 * float(np.max(np.abs(last))), UNREACHED_MOTION_SHARE * reached):
             largest = max(largest, float(np.std(last - before)) / moved[name])
     return largest
 

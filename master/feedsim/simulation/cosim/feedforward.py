@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feedsim.files.trace.trace import suggest
+from feedsim.files.trace.trace import suggest_name
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Cycles, Drive, FrictionParameters, Machine
 from feedsim.scenario.axis_units import FILTER_TYPES, Filter
@@ -116,7 +116,7 @@ def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[O
     sends: list[Operation] = []
     for axis, torque in torques.items():
         if axis not in system.axes:
-            raise InputError(f"torque feedforward: no axis {axis!r}{suggest(axis, system.axes)}")
+            raise InputError(f"torque feedforward: no axis {axis!r}{suggest_name(axis, system.axes)}")
         if torque.shape != (instants,) or not np.all(np.isfinite(torque)):
             raise InputError(
                 f"torque feedforward of axis {axis}: {instants} finite values are needed, one per control cycle and "

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feedsim.foundation.errors import InputError, SimulationError
-from feedsim.foundation.installation import fmus_directory, mend
-from feedsim.foundation.owned import Closing
+from feedsim.foundation.installation import fmus_directory, repair_advice
+from feedsim.foundation.owned import BlockResource
 from feedsim.scenario import FrictionParameters
 from feedsim.scenario.roles import FRICTION_ROLE
 from feedsim.simulation.cosim.archive import Archive
@@ -34,7 +34,7 @@ _FREE_AXIS = ctypes.CFUNCTYPE(
 )
 
 
-class FrictionLaw(Closing):
+class FrictionLaw(BlockResource):
     """The law of a friction unit as a function, for as long as this object is open (a context manager).
 
     The numbers are those of stepping the unit with the slope of its speed. Calls are independent of each other and may
@@ -54,7 +54,7 @@ class FrictionLaw(Closing):
         """
         self._name = unit
         self._archive = Archive((fmus or fmus_directory()) / f"{unit}.fmu")
-        self._refusing = Lock()
+        self._load_lock = Lock()
         self._unit: Unit | None = None
         try:
             # The instance holds the library, and its GUID stands for the order of the parameters in it.
@@ -65,7 +65,7 @@ class FrictionLaw(Closing):
                 if not hasattr(library, name):
                     raise InputError(
                         f"{self._archive.path}: its library has no function {name}; it was built from older sources: "
-                        f"{mend('it')}"
+                        f"{repair_advice('it')}"
                     )
             self._response = _RESPONSE((response, library))
             self._free_axis = _FREE_AXIS((free_axis, library))
@@ -129,7 +129,7 @@ class FrictionLaw(Closing):
         """
         speeds = self._row(n, "speeds", 1)
         self._check_steps(h, "speeds", substeps=substeps, every=every)
-        values = self._ordered(parameters)
+        values = self._order_parameters(parameters)
         rows = (speeds.size - 1) // every + 1
         table = np.empty((3, rows))
         outputs = (row.ctypes.data for row in table)
@@ -176,7 +176,7 @@ class FrictionLaw(Closing):
         if not 0.0 < J < np.inf:
             raise InputError(f"inertia: {J} kg.m2; it must be finite and greater than 0")
         self._check_steps(h, "torques", substeps=substeps)
-        values = self._ordered(parameters)
+        values = self._order_parameters(parameters)
         motion = np.empty((2, torque.size + 1))
         angle, speed = (row.ctypes.data for row in motion)
         done = self._free_axis(values, J, M_0, torque.ctypes.data, torque.size, h, substeps, n, z, angle, speed)
@@ -206,7 +206,7 @@ class FrictionLaw(Closing):
             listed = ", ".join(f"{name} = {count}" for name, count in counts.items())
             raise InputError(f"{listed}; {'both' if len(counts) > 1 else 'it'} must be at least 1")
 
-    def _ordered(self, parameters: Mapping[str, float]) -> ctypes.Array[ctypes.c_double]:
+    def _order_parameters(self, parameters: Mapping[str, float]) -> ctypes.Array[ctypes.c_double]:
         if not parameters.keys() <= self.start_values.keys():
             unknown = next(name for name in parameters if name not in self.start_values)
             raise InputError(f"{self._archive.path.name}: no parameter '{unknown}'; there are {', '.join(self.names)}")
@@ -218,7 +218,7 @@ class FrictionLaw(Closing):
 
     def _let_unit_refuse(self, parameters: Mapping[str, float]) -> None:
         """Raise InputError with the unit's words where it refuses `parameters`."""
-        with self._refusing:  # loading a library changes the working directory for a moment
+        with self._load_lock:  # loading a library changes the working directory for a moment
             unit = Unit(self._archive, self._name)
             try:
                 unit.set_parameters(parameters)
@@ -228,7 +228,7 @@ class FrictionLaw(Closing):
                 unit.close()
 
 
-class FrictionLaws(Closing):
+class FrictionLaws(BlockResource):
     """The laws of the shipped friction units, each opened when a set of its parameters first asks for it."""
 
     def __init__(self, fmus: Path | None = None) -> None:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace import read_signals
 from feedsim.foundation.errors import InputError
-from feedsim.motions.setpoints import Recorded
+from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.loads import LoadCourse, MotorLoad, Noise, ToolLoad
-from feedsim.simulation.cosim.operations import Operation, When, copy, get_row, set_real
+from feedsim.simulation.cosim.operations import DueCycles, Operation, copy, get_row, set_real
 from feedsim.simulation.cosim.schedule import REPORTED_EVERY
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Floats, Log, Port
@@ -33,7 +33,7 @@ NOISE_SAMPLES = 10  # of a random load per time constant of its low-pass
 
 
 @dataclass(frozen=True, eq=False)
-class Acting:
+class ActingLoad:
     """A load over the time of a run.
 
     Attributes:
@@ -50,7 +50,7 @@ class Acting:
 
     def means(self, edges: Floats) -> Floats:
         """(N - 1,) means over the stretches between the N instants `edges` [s]."""
-        return means(self.time, self.values, edges, held=self.load.held)
+        return stretch_means(self.time, self.values, edges, held=self.load.held)
 
     def peak(self, duration: float) -> float:
         """The largest value, with its sign, that the file or table has within a run of `duration` [s]."""
@@ -58,7 +58,7 @@ class Acting:
         return float(during[np.argmax(np.abs(during))]) if during.size else 0.0
 
 
-def means(time: Floats, values: Floats, edges: Floats, *, held: bool) -> Floats:
+def stretch_means(time: Floats, values: Floats, edges: Floats, *, held: bool) -> Floats:
     """(N - 1,) means of a course over the stretches between the N instants `edges`.
 
     It goes through `values` at `time`, linear in between or held up to the next instant, and is 0 before and behind.
@@ -129,14 +129,14 @@ class Work:
         return self.given - self.taken
 
 
-def acting(scenario: Scenario, program: Program) -> tuple[Acting, ...]:
+def compute_acting_loads(scenario: Scenario, program: Program) -> tuple[ActingLoad, ...]:
     """The loads of a scenario over the time of its program.
 
     Raises:
         InputError: lists every file that cannot be read, column that is missing or of another unit, and load that ends
             before the run begins or begins behind its end.
     """
-    result: list[Acting] = []
+    result: list[ActingLoad] = []
     problems: list[str] = []
     for i, load in enumerate(scenario.loads):
         try:
@@ -148,7 +148,7 @@ def acting(scenario: Scenario, program: Program) -> tuple[Acting, ...]:
     return tuple(result)
 
 
-def _course(load: LoadCourse, place: str, program: Program) -> Acting:
+def _course(load: LoadCourse, place: str, program: Program) -> ActingLoad:
     torque = None
     if load.noise is not None:
         time, values = _random(load.noise, program.duration)
@@ -162,13 +162,13 @@ def _course(load: LoadCourse, place: str, program: Program) -> Acting:
         time, values = rows.time, rows["load"]
         if (drive := load.motor_torque) is not None:
             torque = read_signals(load.file, {"torque": (drive.column, drive.unit)}, "N.m", time=clock)["torque"]
-    time = time + _begin(load, program)
+    time = time + _load_start(load, program)
     if time[-1] <= 0 or time[0] >= program.duration:
         raise InputError(
             f"the load acts from {time[0]:.6g} to {time[-1]:.6g} s of the run, which lasts from 0 to "
             f"{program.duration:.6g} s: it never acts; 'motion' names the motion that its time runs with"
         )
-    return Acting(place, load, time, values * load.factor, torque)
+    return ActingLoad(place, load, time, values * load.factor, torque)
 
 
 def _random(noise: Noise, duration: float) -> tuple[Floats, Floats]:
@@ -188,12 +188,12 @@ def _random(noise: Noise, duration: float) -> tuple[Floats, Floats]:
     return h * np.arange(len(drawn), dtype=np.float64), float(rms) * np.asarray(values, dtype=np.float64)
 
 
-def _begin(load: LoadCourse, program: Program) -> float:
+def _load_start(load: LoadCourse, program: Program) -> float:
     """Instant of the run at which the load's own time is 0 [s]."""
     if load.motion is None:
         return 0.0
     segment = program.segments[load.motion]
-    if isinstance(segment.geometry, Recorded):
+    if isinstance(segment.geometry, RecordedGeometry):
         return segment.geometry.begin - segment.geometry.first
     return segment.start
 
@@ -201,7 +201,7 @@ def _begin(load: LoadCourse, program: Program) -> float:
 class _Account:
     """What a load has done so far, and its means over the cycles of the stretch at hand, (REPORTED_EVERY,)."""
 
-    def __init__(self, number: int, acting: Acting, axes: Sequence[str], T_c: float) -> None:
+    def __init__(self, number: int, acting: ActingLoad, axes: Sequence[str], T_c: float) -> None:
         load = acting.load
         self.load, self.at = load, axes.index(load.axis_name) if load.axis_name in axes else None
         self.values = np.zeros(REPORTED_EVERY)
@@ -215,7 +215,7 @@ class _Account:
         """Means over the cycles between `edges` [s] into `rows`."""
         self.values[rows] = values = self._acting.means(edges)
         if self._acting.torque is not None:
-            self._torques[rows] = means(self._acting.time, self._acting.torque, edges, held=False)
+            self._torques[rows] = stretch_means(self._acting.time, self._acting.torque, edges, held=False)
         self._peak = max((self._peak, float(values[np.argmax(np.abs(values))])), key=abs)
 
     def count(self, rows: NDArray[np.int64], place: Floats, speed: Floats | None, torque: Floats | None) -> None:
@@ -248,7 +248,7 @@ class Loads:
         before, after: operations that send the loads of a cycle, and keep what their work is found from.
     """
 
-    def __init__(self, system: System, loads: Sequence[Acting], T_c: float) -> None:
+    def __init__(self, system: System, loads: Sequence[ActingLoad], T_c: float) -> None:
         self._system, self._T_c, self._done = system, T_c, 0
         self._accounts = [_Account(i, value, system.axes, T_c) for i, value in enumerate(loads)]
         inputs = tuple(dict.fromkeys(entry.load.input for entry in loads))
@@ -266,7 +266,7 @@ class Loads:
         self.before: list[Operation] = []
         self.after: list[Operation] = []
         if loads:
-            always = When()
+            always = DueCycles()
             self.before += set_real(Port(system.plant, inputs), self._table)
             self.after += [copy(self._measured, system.measured, always), copy(self._motors, system.M_a_end, always)]
             self.after += get_row(self._tool, always)

@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 
 from feedsim.foundation.errors import SimulationError
 from feedsim.simulation.cosim import archive
-from feedsim.simulation.cosim.unit import ERROR, OK, WARNING, Floats, Log, Port, Unit, exchanging, not_finite
-from feedsim.simulation.cosim.worker import watched
+from feedsim.simulation.cosim.unit import ERROR, OK, WARNING, Floats, Log, Port, Unit, describe_exchange, not_finite
+from feedsim.simulation.cosim.worker import watched_process
 
 MAX_WITHOUT_SLOPE = 10  # exchange steps in a row that a unit may give slopes that are not finite
 
 # An operation in cycle k, which begins at t [s]; it returns the unit's fmi2Status.
-Act = Callable[[int, float], int]
+Action = Callable[[int, float], int]
 
 
-def _none() -> Floats:
+def _empty_values() -> Floats:
     return np.zeros(0)
 
 
 @dataclass(frozen=True)
-class When:
+class DueCycles:
     """Cycles in which an operation is due: `first`, and each `every` cycles from then on."""
 
     first: int = 0
@@ -56,7 +56,7 @@ class Bond:
     n_end: Floats
     residual: Floats
     residual_peak: Floats
-    dissipated: Floats
+    dissipated_energy: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +73,19 @@ class Operation:
     """
 
     kind: str
-    y: NDArray[Any] = field(default_factory=_none)
-    a: Floats = field(default_factory=_none)
-    b: Floats = field(default_factory=_none)
+    y: NDArray[Any] = field(default_factory=_empty_values)
+    a: Floats = field(default_factory=_empty_values)
+    b: Floats = field(default_factory=_empty_values)
     s: float = 0.0
     h: float = 0.0
     bond: Bond | None = None
     unit: Unit | None = None
-    references: NDArray[Any] = field(default_factory=_none)
-    orders: NDArray[Any] = field(default_factory=_none)
+    references: NDArray[Any] = field(default_factory=_empty_values)
+    orders: NDArray[Any] = field(default_factory=_empty_values)
     about: str = ""
     hint: str = ""
     names: tuple[str, ...] = ()
-    when: When | None = None
+    when: DueCycles | None = None
 
     def __post_init__(self) -> None:
         vectors = vars(self.bond) if self.bond else {"y": self.y, "a": self.a, "b": self.b}
@@ -104,18 +104,18 @@ class Operation:
 # --- calls of a unit
 
 
-def set_real(port: Port, table: Floats | None = None, when: When | None = None) -> list[Operation]:
+def set_real(port: Port, table: Floats | None = None, when: DueCycles | None = None) -> list[Operation]:
     """Send the port's values; with a table (rows, n), which is as the unit takes it, its next row, by default in every
     cycle."""
     return _sent("set_real", port, table, when)
 
 
-def set_slopes(port: Port, table: Floats | None = None, when: When | None = None) -> list[Operation]:
+def set_slopes(port: Port, table: Floats | None = None, when: DueCycles | None = None) -> list[Operation]:
     return _sent("set_slopes", port, table, when)
 
 
 def get_real(port: Port) -> list[Operation]:
-    return [_exchange("get_real", port), *_converted("get_real", port)]
+    return [_exchange("get_real", port), *_conversions("get_real", port)]
 
 
 def get_slopes(port: Port, hint: str = "", without: Floats | None = None) -> list[Operation]:
@@ -129,14 +129,14 @@ def get_slopes(port: Port, hint: str = "", without: Floats | None = None) -> lis
     got = [replace(_exchange("get_slopes", port), hint=hint)]
     if without is not None:
         got.append(replace(got[0], kind="finite", a=without, s=MAX_WITHOUT_SLOPE))
-    return [*got, *_converted("get_slopes", port)]
+    return [*got, *_conversions("get_slopes", port)]
 
 
-def _sent(kind: str, port: Port, table: Floats | None, when: When | None) -> list[Operation]:
-    return [*(_converted(kind, port) if table is None else ()), _exchange(kind, port, table, when)]
+def _sent(kind: str, port: Port, table: Floats | None, when: DueCycles | None) -> list[Operation]:
+    return [*(_conversions(kind, port) if table is None else ()), _exchange(kind, port, table, when)]
 
 
-def _converted(kind: str, port: Port) -> list[Operation]:
+def _conversions(kind: str, port: Port) -> list[Operation]:
     """Units of measurement on the way into the unit or out of it; nothing where none is to be converted."""
     slopes = kind.endswith("slopes")
     own, signals = (port.own_slopes, port.slopes) if slopes else (port.own_values, port.values)
@@ -165,7 +165,7 @@ def set_state(unit: Unit) -> Operation:
     return Operation("set_state", unit=unit, y=unit.kept_state, about="going back to the state kept")
 
 
-def get_row(log: Log, when: When) -> list[Operation]:
+def get_row(log: Log, when: DueCycles) -> list[Operation]:
     """The variables of a log into its next row."""
     tables = (("get_real", log.real_references, log.reals), ("get_boolean", log.flag_references, log.flags))
     return [
@@ -175,10 +175,10 @@ def get_row(log: Log, when: When) -> list[Operation]:
     ]
 
 
-def _exchange(kind: str, port: Port, table: Floats | None = None, when: When | None = None) -> Operation:
-    y, about = port.own_slopes if kind.endswith("slopes") else port.own_values, exchanging(kind, port.names)
+def _exchange(kind: str, port: Port, table: Floats | None = None, when: DueCycles | None = None) -> Operation:
+    y, about = port.own_slopes if kind.endswith("slopes") else port.own_values, describe_exchange(kind, port.names)
     if table is not None:
-        y, when = np.ascontiguousarray(table, dtype=np.float64), when or When()
+        y, when = np.ascontiguousarray(table, dtype=np.float64), when or DueCycles()
     unit, references, orders, names = port.unit, port.references, port.orders, port.names
     return Operation(
         kind, y, unit=unit, references=references, orders=orders, about=about, names=names, when=when
@@ -188,7 +188,7 @@ def _exchange(kind: str, port: Port, table: Floats | None = None, when: When | N
 # --- arithmetic on vectors with an entry per axis; y may be one of the operands
 
 
-def copy(y: Floats, a: Floats, when: When | None = None) -> Operation:
+def copy(y: Floats, a: Floats, when: DueCycles | None = None) -> Operation:
     """y = a; with `when`, the next row of y = a."""
     return Operation("copy", y=y, a=a, when=when)
 
@@ -227,7 +227,7 @@ class Executor:
         self._operations = tuple(operations)
         self._T_c = T_c
         self.done = 0
-        here = watched()
+        here = watched_process()
         self.mark = None if here is None else here.mark
         if here is not None:
             here.describe(T_c, [(o.unit.name if o.unit else "", o.about or o.kind, o.s if o.kind == "do_step" else 0.0)
@@ -321,7 +321,7 @@ class Interpreter(Executor):
             self.mark.back()
 
 
-def _call(o: Operation) -> Act:
+def _call(o: Operation) -> Action:
     assert o.unit is not None
     if o.kind == "finite":
         return _finite(o)
@@ -339,7 +339,7 @@ def _call(o: Operation) -> Act:
     return lambda *_: exchange(y)
 
 
-def _finite(o: Operation) -> Act:
+def _finite(o: Operation) -> Action:
     def act(*_: float) -> int:
         missing = ~np.isfinite(o.y)
         o.y[missing] = 0.0
@@ -350,7 +350,7 @@ def _finite(o: Operation) -> Act:
     return act
 
 
-def _arithmetic(o: Operation) -> Act:
+def _arithmetic(o: Operation) -> Action:
     y, a, b, s = o.y, o.a, o.b, o.s
     scaled = np.zeros(o.count)
 
@@ -378,13 +378,13 @@ def _arithmetic(o: Operation) -> Act:
         taken = bond.M_fr * (bond.n + h * bond.n_slope)
         np.add(bond.residual, 0.5 * h * (bond.assumed_torque * bond.n_end - taken), out=bond.residual)
         np.maximum(bond.residual_peak, np.abs(bond.residual), out=bond.residual_peak)
-        np.add(bond.dissipated, h * taken, out=bond.dissipated)
+        np.add(bond.dissipated_energy, h * taken, out=bond.dissipated_energy)
         return OK
 
     return _due(o, copy_row) if o.when else {"copy": copy, "line": line, "rate": rate, "bond": bond}[o.kind]
 
 
-def _due(o: Operation, work: Callable[[int], int]) -> Act:
+def _due(o: Operation, work: Callable[[int], int]) -> Action:
     """Done on one row of a table after the other, in the cycles that are due."""
     assert o.when is not None
     first, every, rows = o.when.first, o.when.every, len(o.y)

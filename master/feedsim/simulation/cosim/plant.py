@@ -23,8 +23,8 @@ from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, MOUNTS_IN_
 _START = ".x_0"  # of every axis of a plant
 MAX_PACKED_PLANTS = 4  # packed archives, of about 1 MB each: studies run the same machine again and again
 # With the archive in it, by content of what it is packed from; those used last stand last.
-_PACKED: dict[Any, TemporaryFolder] = {}
-_PACKING = threading.Lock()
+_PACKED_ARCHIVES: dict[Any, TemporaryFolder] = {}
+_PACKING_LOCK = threading.Lock()
 
 
 def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
@@ -76,15 +76,15 @@ def packed_for(machine: Machine, general: Path, make: Callable[[Path], None]) ->
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
     key = *contents, *((axis, machine.pose[axis]) for axis in machine.axes), machine.name, machine.note
-    with _PACKING:
-        folder = _PACKED.pop(key, None)
+    with _PACKING_LOCK:
+        folder = _PACKED_ARCHIVES.pop(key, None)
         # What cleans a folder for temporary files takes what has been idle for long.
         if folder is None or not (folder.path / general.name).is_file():
             folder = TemporaryFolder()
             make(folder.path / general.name)
-        _PACKED[key] = folder
-        while len(_PACKED) > MAX_PACKED_PLANTS:
-            _PACKED.pop(next(iter(_PACKED))).close()
+        _PACKED_ARCHIVES[key] = folder
+        while len(_PACKED_ARCHIVES) > MAX_PACKED_PLANTS:
+            _PACKED_ARCHIVES.pop(next(iter(_PACKED_ARCHIVES))).close()
         return Archive(folder.path / general.name)
 
 

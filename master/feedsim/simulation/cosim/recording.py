@@ -14,20 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files.trace import Table, Trace, matching
+from feedsim.files.trace import Table, Trace, match_names
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.owned import held
+from feedsim.foundation.owned import defer_signals
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 from feedsim.simulation.cosim import system as wiring
-from feedsim.simulation.cosim.operations import Interpreter, Operation, When, copy, get_row
+from feedsim.simulation.cosim.operations import DueCycles, Interpreter, Operation, copy, get_row
 from feedsim.simulation.cosim.schedule import REPORTED_EVERY, RING, Cycle
 from feedsim.simulation.cosim.unit import Floats, Log
-from feedsim.simulation.cosim.worker import watched
+from feedsim.simulation.cosim.worker import watched_process
 from feedsim.simulation.nc import Program
 
 PLANT_SIGNALS = ("x_a", "n_a")
-MEASURED = "x_m"  # of a drive: of the present inputs
+MEASURED_POSITION = "x_m"  # of a drive: of the present inputs
 GUIDE_SIGNAL = "guide.F_fr"  # of axes with friction there
 TRANSMISSION_SIGNALS = ("transmission.F", "transmission.way")  # of axes with one
 MOUNT_SIGNALS = ("mounts.E", "mounts.x_max")  # where some are not linear
@@ -50,7 +50,7 @@ def recorded_columns(scenario: Scenario) -> list[str]:
     if wanted is None:
         return columns_of(scenario.machine, loaded_inputs(scenario))
     try:
-        return matching(columns_of(scenario.machine, loaded_inputs(scenario), residual=True), wanted)
+        return match_names(columns_of(scenario.machine, loaded_inputs(scenario), residual=True), wanted)
     except InputError as error:
         raise InputError(f"{scenario.file}: recording.variables: {error}") from None
 
@@ -113,7 +113,7 @@ class Recording:
         system = cycle.system
         self._axes = system.axes
         self.every, self._ratio, self._T_c = every, ratio, cycle.cycle
-        self._columns = matching(columns_of(system.machine, loaded, residual=True), columns)
+        self._columns = match_names(columns_of(system.machine, loaded, residual=True), columns)
         total = cycles // every + 1
         self._ring = min(total, max(RING, 2 * (REPORTED_EVERY // every + 1)))
         self._table = Table(1 + len(self._columns), total, scratch)
@@ -137,7 +137,7 @@ class Recording:
             self.limited |= {f"{axis}.{limit}": 0 for limit in LIMITS if limit in drive}
             self._log(wiring.controller(axis), {signal: f"{axis}.{signal}" for signal in drive}, cycle)
             if (
-                f"{axis}.{MEASURED}" in self._columns
+                f"{axis}.{MEASURED_POSITION}" in self._columns
             ):  # it follows the inputs, which the drive gets behind the recording
                 self._measured += cycle.measured(axis)
             self._log(wiring.friction(axis), {signal: f"{axis}.{signal}" for signal in friction}, cycle)
@@ -166,7 +166,7 @@ class Recording:
     @property
     def operations(self) -> list[Operation]:
         """What is done ahead of each cycle; the end of the last one is left to :meth:`record`."""
-        when = When(every=self.every)
+        when = DueCycles(every=self.every)
         kept = [copy(self._residual, self._cycle.bond.residual, when)] if self._residual_names else []
         rows = (operation for log, _ in self._logs for operation in get_row(log, when))
         return [*self._measured, *rows, *kept]
@@ -178,7 +178,7 @@ class Recording:
 
     def ahead(self, begin: int, end: int) -> None:
         """Make room for the rows of the cycles `begin` to `end` - 1."""
-        if -(-end // self.every) - self.rows > self._ring or (self._sink is not None and watched() is not None):
+        if -(-end // self.every) - self.rows > self._ring or (self._sink is not None and watched_process() is not None):
             self.collect(begin)
 
     def collect(self, cycles: int) -> None:
@@ -190,7 +190,7 @@ class Recording:
         first, last = self.rows, min(-(-cycles // self.every), self._table.rows)
         if first >= last:
             return
-        with held():  # neither half a row nor one twice
+        with defer_signals():  # neither half a row nor one twice
             block = self._block(np.arange(first, last))
             self._table.append(block)
             if self._sink is not None:

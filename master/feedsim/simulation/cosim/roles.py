@@ -10,7 +10,7 @@ from typing import Any
 
 from feedsim.files.fields import did_you_mean
 from feedsim.foundation import units
-from feedsim.foundation.errors import Finding, InputError, few
+from feedsim.foundation.errors import Finding, InputError, shorten_list
 from feedsim.scenario import ForeignUnit, Machine
 from feedsim.scenario.axis_units import Parameter
 from feedsim.scenario.roles import BOOLEAN, DRIVE, Role, Signal
@@ -65,11 +65,11 @@ def archive_path(machine: Machine, axis: str, role: Role, fmus: Path) -> Path:
     return described.fmu if isinstance(described, ForeignUnit) else fmus / f"{role.archive_name(described)}.fmu"
 
 
-def filled(machine: Machine, axis: str, role: Role, archive: Archive) -> RoleUnit:
-    """The unit of `archive` in a role on an axis. InputError: as :func:`foreign`."""
+def fill_role(machine: Machine, axis: str, role: Role, archive: Archive) -> RoleUnit:
+    """The unit of `archive` in a role on an axis. InputError: as :func:`connect_foreign_unit`."""
     described = getattr(machine.axes[axis], role.name)
     if isinstance(described, ForeignUnit):
-        return foreign(role, axis, described, archive)
+        return connect_foreign_unit(role, axis, described, archive)
     parameters = controller_parameters(machine, axis) if role is DRIVE else machine.axes[axis].friction_at_motor
     signals = {name: Alias(name) for name in archive.variables}
     return RoleUnit(role, axis, archive, signals, parameters)
@@ -81,7 +81,7 @@ def controller_parameters(machine: Machine, axis: str) -> dict[str, Parameter]:
     return {**machine.shipped_drive(axis, "controller.fmu").parameters(), **cycles}
 
 
-def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleUnit:
+def connect_foreign_unit(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleUnit:
     """Another maker's unit in a role.
 
     Raises:
@@ -144,19 +144,19 @@ def _alias(signal: Signal, is_input: bool, name: str, archive: Archive) -> Alias
     causalities = ("input",) if is_input else ("output",) if signal.needed else ("output", "local")
     if variable is None:
         fitting = [other.name for other in archive.variables.values() if other.causality in causalities]
-        raise InputError(f"is no variable of the archive{_named(name, fitting, ' or '.join(causalities))}")
+        raise InputError(f"is no variable of the archive{_suggest_name(name, fitting, ' or '.join(causalities))}")
     if variable.causality not in causalities:
         fitting = [other.name for other in archive.variables.values() if other.causality in causalities]
         raise InputError(
-            f"is {variable.causality}, {' or '.join(causalities)} is needed{_listed(fitting, causalities[0])}"
+            f"is {variable.causality}, {' or '.join(causalities)} is needed{_list_names(fitting, causalities[0])}"
         )
     wanted = "Boolean" if signal.unit == BOOLEAN else "Real"
     if variable.type != wanted:
         raise InputError(f"is {variable.type}, {wanted} is needed")
-    return Alias(name, "1") if signal.unit == BOOLEAN else _converted(archive, name, signal.unit)
+    return Alias(name, "1") if signal.unit == BOOLEAN else _converted_alias(archive, name, signal.unit)
 
 
-def _converted(archive: Archive, name: str, unit: str) -> Alias:
+def _converted_alias(archive: Archive, name: str, unit: str) -> Alias:
     """The variable `name` for a signal in the SI unit `unit`; one without a unit is taken to be in SI.
 
     Raises:
@@ -200,13 +200,13 @@ def start_value(archive: Archive, name: str, given: Parameter, driven: Mapping[s
     variable = archive.variables.get(name)
     known = [other.name for other in archive.variables.values() if other.causality == "parameter"]
     if variable is None:
-        raise InputError(f"is no variable of the archive{_named(name, known, 'parameter')}")
+        raise InputError(f"is no variable of the archive{_suggest_name(name, known, 'parameter')}")
     if name in driven:
         raise InputError(f"stands for {driven[name]}, which counts")
     if variable.causality not in ("parameter", "input") or variable.variability == "constant":
         raise InputError(f"cannot be set, it is {variable.causality} and {variable.variability}"
-                         f"{_listed(known, 'parameter')}")  # fmt: skip
-    value = _typed(archive, variable, given)
+                         f"{_list_names(known, 'parameter')}")  # fmt: skip
+    value = _check_type(archive, variable, given)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         low, high = (_limit(variable, end) for end in ("min", "max"))
         if (low is not None and value < low) or (high is not None and value > high):
@@ -218,12 +218,12 @@ def start_value(archive: Archive, name: str, given: Parameter, driven: Mapping[s
     return value
 
 
-def _typed(archive: Archive, variable: Any, given: Parameter) -> Parameter:
+def _check_type(archive: Archive, variable: Any, given: Parameter) -> Parameter:
     kind = variable.type
     if kind == "Real" and not isinstance(given, bool):
         if isinstance(given, str):
             try:
-                return _parsed(given, archive, variable.name)
+                return _parse_quantity(given, archive, variable.name)
             except InputError as error:
                 raise InputError(f"cannot be that: {error}") from None
         return float(given)
@@ -241,7 +241,7 @@ def _typed(archive: Archive, variable: Any, given: Parameter) -> Parameter:
     raise InputError(f"is {kind}, {shown} is no value of that type")
 
 
-def _parsed(text: str, archive: Archive, name: str) -> float:
+def _parse_quantity(text: str, archive: Archive, name: str) -> float:
     """A quantity such as "12 ms" in the unit that the variable `name` declares.
 
     Raises:
@@ -267,18 +267,18 @@ def _limit(variable: Any, end: str) -> float | None:
     return None if declared is None else float(declared)
 
 
-def _named(name: str, known: list[str], kind: str) -> str:
+def _suggest_name(name: str, known: list[str], kind: str) -> str:
     """The nearest name and what is there."""
     if not known:
         return f"; it has no {kind} at all"
     near = did_you_mean(name, known)
-    return f"{near if 'mean' in near else ''}{_listed(known, kind)}"
+    return f"{near if 'mean' in near else ''}{_list_names(known, kind)}"
 
 
-def _listed(known: Sequence[str], kind: str) -> str:
+def _list_names(known: Sequence[str], kind: str) -> str:
     if not known:
         return f"; it has no {kind} at all"
-    return f"; {kind}: {few(known, MOST_NAMES)}"
+    return f"; {kind}: {shorten_list(known, MOST_NAMES)}"
 
 
 def check_instances(filled: Iterable[RoleUnit]) -> None:

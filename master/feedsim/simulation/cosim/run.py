@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from feedsim.files.trace import Table, Trace, least_and_largest, release, stretches
 from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.foundation.installation import fmus_directory
-from feedsim.foundation.owned import Closing
+from feedsim.foundation.owned import BlockResource
 from feedsim.scenario import Coupling, Drive, Level, Logging, Machine, Scenario
-from feedsim.simulation.cosim.exchange import any_foreign, chosen
+from feedsim.simulation.cosim.exchange import any_foreign, choose_native_loop
 from feedsim.simulation.cosim.feedforward import TorqueFeedforward, feeders
-from feedsim.simulation.cosim.loads import Acting, Loads, Work, acting
+from feedsim.simulation.cosim.loads import ActingLoad, Loads, Work, compute_acting_loads
 from feedsim.simulation.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
 from feedsim.simulation.cosim.schedule import Cycle, Loop, Progress, Setpoints
 from feedsim.simulation.cosim.system import System
@@ -40,13 +40,13 @@ if TYPE_CHECKING:
 # setpoints are held, position and speed are smooth and interpolated by a cubic through four cycles.
 
 
-LINEAR = ("i_d", "i_q", "M_a", "M_fr", "z", "c")
-SMOOTH = ("x_a", "n_a")
+LINEAR_SIGNALS = ("i_d", "i_q", "M_a", "M_fr", "z", "c")
+SMOOTH_SIGNALS = ("x_a", "n_a")
 # Signals of the drive that jump where the current loop is ideal: what a cycle ends with holds over all of it.
-IDEAL = ("i_d", "i_q", "M_a")
+IDEAL_LOOP_SIGNALS = ("i_d", "i_q", "M_a")
 ON_THE_GRID = 1e-6  # of a control cycle: instants come from decimal text
 # Below this share of the largest speed setpoint an axis stands: the spline of the setpoints rings down exponentially.
-STANDS = 1e-9
+STANDSTILL_SHARE = 1e-9
 # Rows that are worked on at a time.
 ROWS_AT_ONCE = 1 << 19
 
@@ -97,7 +97,7 @@ class _Column:
 
     def at(self, rows: NDArray[np.int64]) -> Floats:
         """The log at the next of its rows."""
-        values = sampled(self.values, rows, self.delay, self.course)
+        values = sample_delayed(self.values, rows, self.delay, self.course)
         if self.deviation is not None:
             values = values + self.deviation * self.stream.standard_normal(len(values))
         if self.quantum is not None:
@@ -105,7 +105,7 @@ class _Column:
         return values
 
 
-def sampled(values: Floats, rows: NDArray[np.int64], delay: float, course: str) -> Floats:
+def sample_delayed(values: Floats, rows: NDArray[np.int64], delay: float, course: str) -> Floats:
     """Values (N,) at the cycles ``rows`` less ``delay`` [cycles, any fraction].
 
     course: "linear" between cycles, "cubic" (Lagrange through four of them), "held" from a cycle on, "ahead": held from
@@ -164,16 +164,16 @@ def full_rate_columns(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _course(signal: str, ideal: bool) -> str:
-    if ideal and signal in IDEAL:
+    if ideal and signal in IDEAL_LOOP_SIGNALS:
         return "ahead"
-    return "linear" if signal in LINEAR else "cubic" if signal in SMOOTH else "held"
+    return "linear" if signal in LINEAR_SIGNALS else "cubic" if signal in SMOOTH_SIGNALS else "held"
 
 
 def _deviation(level: Level, fine: Trace, axis: str, name: str) -> float:
     if not level.relative:
         return level.value
     speed = fine[f"{axis}.n_ffw"]
-    stands = STANDS * max(abs(end) for end in least_and_largest(speed))
+    stands = STANDSTILL_SHARE * max(abs(end) for end in least_and_largest(speed))
     means: list[float] = []
     counts: list[int] = []
     for n, values in stretches(speed, fine[name], rows=ROWS_AT_ONCE):
@@ -267,7 +267,7 @@ def crossings_of(system: System) -> Crossings:
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """What a run leaves behind; nothing of it is judged (:func:`feedsim.simulation.judge.judged` does).
+    """What a run leaves behind; nothing of it is judged (:func:`feedsim.simulation.judge.judge_run` does).
 
     Long traces and programs are in files without names, and read page by page: they vanish, and give back the disk,
     with the last array that looks into them; nothing is to be closed or removed. A copy (``numpy.array(column)``) is in
@@ -305,7 +305,7 @@ class Run:
     limited: Mapping[str, float] = field(default_factory=dict)
     grid: tuple[GridAxis, ...] = ()
     crossings: Crossings | None = None
-    acting: tuple[Acting, ...] = ()
+    acting: tuple[ActingLoad, ...] = ()
     loads: tuple[Work, ...] = ()
     fine: Trace | None = None
     log: Trace | None = None
@@ -378,13 +378,15 @@ def _run(
 ) -> Run:
     """A run in this process."""
     recorded = recorded_columns(scenario)
-    loads, loaded = acting(scenario, program), loaded_inputs(scenario)
+    loads, loaded = compute_acting_loads(scenario, program), loaded_inputs(scenario)
     checked_modes(scenario.machine)  # refused ahead of the units, with file and line
     cycles = scenario.machine.cycles
     ratio = round(cycles.T_pos / cycles.T_c)
     every = round(scenario.recording.interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
-    library, executor_notes = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
+    library, executor_notes = choose_native_loop(
+        native, fmus, fmus_directory()
+    )  # archives out of an SSP file bring none along
     with system_of(scenario.machine, scenario.coupling, fmus) as system:
         cycle = cycle_of(system, scenario.coupling)
         recording = Recording(cycle, loaded, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
@@ -446,11 +448,11 @@ def _energies(cycle: Cycle) -> dict[str, float]:
     """Per axis "A.residual", "A.residual_peak" and "A.friction_work" [J]; see
     feedsim.simulation.cosim.operations.Bond."""
     bond = cycle.bond
-    kinds = {"residual": bond.residual, "residual_peak": bond.residual_peak, "friction_work": bond.dissipated}
+    kinds = {"residual": bond.residual, "residual_peak": bond.residual_peak, "friction_work": bond.dissipated_energy}
     return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(cycle.system.axes) for kind in kinds}
 
 
-class Follower(Closing):
+class Follower(BlockResource):
     """The axes of machines on setpoints from anywhere: their units, exchanged as :func:`run` does, and nothing judged.
 
     Units stay open: a machine that differs from the one before in values and modes alone gets them again, reset.
@@ -464,7 +466,7 @@ class Follower(Closing):
 
     def follow(
         self, machine: Machine, program: Program, columns: Collection[str], interval: float,
-        *, loads: Sequence[Acting] = (),
+        *, loads: Sequence[ActingLoad] = (),
     ) -> Trace:  # fmt: skip
         """
         Args:
@@ -483,15 +485,15 @@ class Follower(Closing):
         return self._follow(machine, program, columns, interval, loads)
 
     def _follow(
-        self, machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[Acting]
+        self, machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[ActingLoad]
     ) -> Trace:
         """The same in this process."""
         cycles = machine.cycles
         ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
         total = (len(program.time) - 1) * ratio
-        library, _ = chosen(self._native, self._fmus, fmus_directory())
+        library, _ = choose_native_loop(self._native, self._fmus, fmus_directory())
         try:
-            system = self._opened(machine)
+            system = self._open_system(machine)
             cycle = cycle_of(system, self._coupling)
             recording = Recording(cycle, (), program, total, ratio, every, columns)
             drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
@@ -506,7 +508,7 @@ class Follower(Closing):
             self.close()
             raise
 
-    def _opened(self, machine: Machine) -> System:
+    def _open_system(self, machine: Machine) -> System:
         if self._system is not None and self._system.serves(machine, self._fmus):
             self._system.renew(machine)
         else:
@@ -522,7 +524,7 @@ class Follower(Closing):
 
 def follow(
     machine: Machine, program: Program, columns: Collection[str], interval: float,
-    *, loads: Sequence[Acting] = (), coupling: Coupling | None = None, fmus: Path | None = None,
+    *, loads: Sequence[ActingLoad] = (), coupling: Coupling | None = None, fmus: Path | None = None,
     native: bool | None = None,
 ) -> Trace:  # fmt: skip
     """One machine on setpoints; arguments as those of :class:`Follower` and its follow()."""
@@ -531,7 +533,7 @@ def follow(
 
 
 def _follow(
-    machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[Acting],
+    machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[ActingLoad],
     coupling: Coupling, fmus: Path, native: bool | None,
 ) -> Trace:  # fmt: skip
     """In a worker process."""
@@ -545,7 +547,7 @@ class Ready:
 
     notes: tuple[Finding, ...]
     grid: tuple[GridAxis, ...]
-    acting: tuple[Acting, ...]
+    acting: tuple[ActingLoad, ...]
 
 
 def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> Ready:
@@ -558,7 +560,7 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
         InputError: what :func:`run` would refuse before its first step.
     """
     recorded_columns(scenario)
-    loads = acting(scenario, program)
+    loads = compute_acting_loads(scenario, program)
     checked_modes(scenario.machine)
     fmus = fmus or fmus_directory()
     with system_of(scenario.machine, scenario.coupling, fmus, only_shipped=True) as system:

@@ -17,17 +17,17 @@ from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.model import SCHEMES, Scheme
 from feedsim.simulation.cosim import operations as op
 from feedsim.simulation.cosim.exchange import Exchange, Native
-from feedsim.simulation.cosim.operations import Bond, Interpreter, Operation, When, set_real
+from feedsim.simulation.cosim.operations import Bond, DueCycles, Interpreter, Operation, set_real
 from feedsim.simulation.cosim.roles import RoleUnit, check_step
 from feedsim.simulation.cosim.system import Contact, Control, System
 from feedsim.simulation.cosim.unit import Floats, Unit
-from feedsim.simulation.cosim.worker import watched
+from feedsim.simulation.cosim.worker import watched_process
 from feedsim.simulation.nc import Program
 
 ARITHMETIC: dict[str, Callable[..., Operation]] = {"copy": op.copy, "line": op.line, "rate": op.rate}
 
 
-def lacking(role: RoleUnit, scheme: Scheme) -> str:
+def describe_missing_slopes(role: RoleUnit, scheme: Scheme) -> str:
     """What the friction in a role would need for a scheme and has not, in words; empty where it serves."""
     needed = {
         "no slope of its input": (role.takes_slopes, scheme.passes > 1 or scheme.speed == "extrapolated"),
@@ -59,7 +59,7 @@ class Cycle:
         self.assumed_torque = buffer()  # at the end of the exchange step, by the plant
         self.bond = Bond(
             M_fr=system.M_fr, n=system.n, n_slope=system.n_slope, assumed_torque=self.assumed_torque,
-            n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated=buffer(),
+            n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated_energy=buffer(),
         )  # fmt: skip
 
         self._warnings = self._check()
@@ -89,8 +89,8 @@ class Cycle:
         scheme, problems, warnings = self.scheme, [], []
         contacts = [contact.role for contact in self.system.contacts]
         for role in contacts:
-            if missing := lacking(role, scheme):
-                serving = [scheme.name for scheme in SCHEMES.values() if not lacking(role, scheme)]
+            if missing := describe_missing_slopes(role, scheme):
+                serving = [scheme.name for scheme in SCHEMES.values() if not describe_missing_slopes(role, scheme)]
                 problems.append(
                     f"{role}: coupling scheme {scheme.name} does not work with it, which has {missing}; those that do: "
                     f"{', '.join(serving)}"
@@ -156,14 +156,14 @@ class Cycle:
             if self.scheme.torque_ramp and control.role.gives_slopes:  # of another drive, M_a is constant
                 yield from self._slopes(control, "torque_ramp")
 
-    def _coupled(self) -> list[Unit]:
+    def _coupled_units(self) -> list[Unit]:
         return [self.system.plant, *(contact.unit for contact in self.system.contacts)]
 
     def _keep(self, _: float) -> Iterator[Operation]:
-        return map(op.get_state, self._coupled())
+        return map(op.get_state, self._coupled_units())
 
     def _restore(self, _: float) -> Iterator[Operation]:
-        return map(op.set_state, self._coupled())
+        return map(op.set_state, self._coupled_units())
 
     def _plant(self, start: float) -> Iterator[Operation]:
         """With the friction torque of the last step's end, or that of the friction's step just before."""
@@ -203,7 +203,7 @@ class Cycle:
         """Of the torque that a part gives, by a scheme with such a ramp."""
         without = [scheme.name for scheme in SCHEMES.values() if not getattr(scheme, ramp) and scheme.passes == 1]
         hint = f"coupling.scheme {' or '.join(without)} needs no slope of it"
-        if not part.role.foreign and watched() is None:  # of those that come along all are finite
+        if not part.role.foreign and watched_process() is None:  # of those that come along all are finite
             return op.get_slopes(part.torque, hint)
         counts = self._without_slope.setdefault(part.unit.known_as, np.zeros(2))
         return op.get_slopes(part.torque, hint, counts)
@@ -219,12 +219,12 @@ Progress = Callable[[int, int], None]
 # Cycles between two reports of progress, some 60 ms in Python, 3 ms in the native loop, which is interrupted here only.
 REPORTED_EVERY = 2048
 # The same in a process that is watched: at first, and in the end; an eighth of what has been done between.
-WATCHED = 16, 512
+WATCHED_CYCLES = 16, 512
 # Rows that are held at the least of what is long.
 RING = 4096
 
 
-class Buffered(Protocol):
+class BufferedPart(Protocol):
     """What holds a stretch of a run only: it is refilled, or emptied, between the cycles."""
 
     def ahead(self, begin: int, end: int) -> None:
@@ -240,7 +240,7 @@ class Loop:
         before: Iterable[Operation],
         after: Iterable[Operation],
         native: Native | None,
-        buffered: tuple[Buffered, ...] = (),
+        buffered: tuple[BufferedPart, ...] = (),
     ) -> None:
         """
         Args:
@@ -251,7 +251,7 @@ class Loop:
         T_c = cycle.cycle
         self._executor = Interpreter(operations, T_c) if native is None else Exchange(native, operations, T_c)
         self._buffered = buffered
-        self._watched = self._executor.mark is not None
+        self._is_watched = self._executor.mark is not None
 
     @property
     def done(self) -> int:
@@ -269,7 +269,7 @@ class Loop:
                 for part in self._buffered:
                     part.ahead(begin, end)
                 self._executor.run(begin, end)
-                if progress is not None and (end - begin == REPORTED_EVERY or self._watched):
+                if progress is not None and (end - begin == REPORTED_EVERY or self._is_watched):
                     progress(end, total)
         if progress is not None:
             progress(total, total)
@@ -278,7 +278,7 @@ class Loop:
         """Between which cycles rows are taken over. Where a unit may crash, little of a run is then in its process."""
         end = 0
         while end < total:
-            length = min(max(end // 8, WATCHED[0]), WATCHED[1]) if self._watched else REPORTED_EVERY
+            length = min(max(end // 8, WATCHED_CYCLES[0]), WATCHED_CYCLES[1]) if self._is_watched else REPORTED_EVERY
             begin, end = end, min(end + length, total)
             yield begin, end
 
@@ -299,8 +299,8 @@ class Setpoints:
         ]
         self._ratio, self._length = ratio, len(program.time)
         self._rows = min(len(program.time), max(RING, 2 * (REPORTED_EVERY // ratio + 1)))
-        self._filled = 0
-        when = When(every=ratio)
+        self._filled_rows = 0
+        when = DueCycles(every=ratio)
         self._tables = [np.zeros((self._rows, len(port.names))) for port in ports]
         self.operations = [
             operation
@@ -310,12 +310,12 @@ class Setpoints:
 
     def ahead(self, begin: int, end: int) -> None:
         done, needed = -(-begin // self._ratio), -(-end // self._ratio)
-        if needed <= self._filled:
+        if needed <= self._filled_rows:
             return
         last = min(done + self._rows, self._length)
-        at = np.arange(self._filled, last) % self._rows
+        at = np.arange(self._filled_rows, last) % self._rows
         for table, columns in zip(self._tables, self._columns, strict=True):
             for i, (alias, column) in enumerate(columns):
-                table[at, i] = alias.to_own(column[self._filled : last])
+                table[at, i] = alias.to_own(column[self._filled_rows : last])
         release(*(column for columns in self._columns for _, column in columns))
-        self._filled = last
+        self._filled_rows = last

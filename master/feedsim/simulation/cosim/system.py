@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import Closing
+from feedsim.foundation.owned import BlockResource
 from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.exchange import is_shipped
 from feedsim.simulation.cosim.plant import axes_of, open_plant
-from feedsim.simulation.cosim.roles import RoleUnit, archive_path, check_instances, filled
-from feedsim.simulation.cosim.unit import Floats, Port, Unexecuted, Unit
+from feedsim.simulation.cosim.roles import RoleUnit, archive_path, check_instances, fill_role
+from feedsim.simulation.cosim.unit import Floats, Port, Unit, UnloadedUnit
 from feedsim.simulation.nc import Program
 
 # --- Which output drives which input: the paper's Fig. 2 as a mapping, checked before the first step ------------------
@@ -130,7 +130,7 @@ def _faults(connection: Connection, instances: Mapping[str, Archive]) -> list[st
     faults = [
         f"{end} does not exist or is no {causality}"
         for end, causality in ((target, "input"), (source, "output"))
-        if end.instance not in (NC, ZERO) and not _is(end, causality, instances)
+        if end.instance not in (NC, ZERO) and not _has_causality(end, causality, instances)
     ]
     if faults or source.instance == ZERO:
         return faults
@@ -143,7 +143,7 @@ def _faults(connection: Connection, instances: Mapping[str, Archive]) -> list[st
     return [] if wanted == given else [f"{target} is in {wanted}, but {source} is in {given}"]
 
 
-def _is(end: Variable, causality: str, instances: Mapping[str, Archive]) -> bool:
+def _has_causality(end: Variable, causality: str, instances: Mapping[str, Archive]) -> bool:
     archive = instances.get(end.instance)
     return archive is not None and end.name in archive.variables and archive.variables[end.name].causality == causality
 
@@ -179,7 +179,7 @@ class Contact:
     torque: Port  # M_fr
 
 
-class System(Closing):
+class System(BlockResource):
     """All units of a machine (a context manager that frees them).
 
     Without friction there are no friction units, and M_fr stays 0: a LuGre model cannot be parameterised away.
@@ -240,7 +240,7 @@ class System(Closing):
         self.machine = machine
         if machine.plant is machine.mounts_table is None:  # packed for its axes, the archive's own modes are others
             self.plant_modes_file = machine.modes
-        self.roles = {name: filled(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
+        self.roles = {name: fill_role(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
         for unit in self.instances.values():
             unit.reset()
         self._parameterise(machine)
@@ -271,7 +271,7 @@ class System(Closing):
                 if path not in archives:
                     archives[path] = Archive(path)
                     self._open.append(archives[path])
-                role_units[name] = filled(machine, axis, role, archives[path])
+                role_units[name] = fill_role(machine, axis, role, archives[path])
             except InputError as error:
                 problems += error.problems
         if problems:
@@ -282,7 +282,7 @@ class System(Closing):
 
     def _instantiate(self, archive: Archive, name: str) -> Unit:
         role = self.roles.get(name)
-        kind = Unexecuted if self.only_shipped and not is_shipped(archive) else Unit
+        kind = UnloadedUnit if self.only_shipped and not is_shipped(archive) else Unit
         unit = kind(archive, name, role.signals if role is not None and role.foreign else None)
         unit.role = "" if role is None else f"{role.role.name} of {role.axis}"
         self._open.append(unit)

@@ -23,8 +23,8 @@ from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLogge
 from numpy.typing import NDArray
 
 from feedsim.foundation.errors import Finding, InputError, SimulationError
-from feedsim.simulation.cosim.archive import Archive, restored
-from feedsim.simulation.cosim.worker import calling
+from feedsim.simulation.cosim.archive import Archive, preserve_float_settings
+from feedsim.simulation.cosim.worker import mark_call
 
 Floats = NDArray[np.float64]
 
@@ -59,13 +59,13 @@ def status_name(status: int) -> str:
     return f"status {_STATUSES[status]}" if 0 <= status < len(_STATUSES) else f"status {status}, which FMI has not"
 
 
-def plain(text: bytes | None) -> str:
+def decode_unit_text(text: bytes | None) -> str:
     """What a unit has passed as a text, be it NULL, no UTF-8, or without an end in sight."""
     return (text or b"")[:MAX_TEXT].decode("utf-8", errors="replace").strip()
 
 
 @dataclass
-class _Stand:
+class _InstanceState:
     """Where an instance stands, by whatever signals it is known.
 
     may_terminate: it has been initialised, and nothing has happened behind which FMI 2.0 forbids fmi2Terminate.
@@ -112,14 +112,14 @@ class Unit:
         self.warnings: list[Finding] = []
         self._messages: list[str] = []
         self._last_text = ""
-        self._stand = _Stand()
+        self._stand = _InstanceState()
         self._fmu = archive.slave(name)
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         if signals is not None:
             _UNITS[id(self)] = self
             callbacks.componentEnvironment = id(self)
-            callbacks.logger = _TELL
+            callbacks.logger = _LOG_CALLBACK
             _print_messages(callbacks)
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
         callbacks.freeMemory = defaultCallbacks.freeMemory
@@ -141,7 +141,7 @@ class Unit:
         self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        text = plain(message).replace("%%", "%").replace("##", "#")
+        text = decode_unit_text(message).replace("%%", "%").replace("##", "#")
         text = _CALL.sub("", text)  # which call it was says nothing to the master's user
         self._last_text = text or self._last_text
         if status == WARNING:
@@ -176,7 +176,7 @@ class Unit:
     @contextmanager
     def calls(self, action: str, where: str = "") -> Iterator[None]:
         """A block that calls the unit; `where` stands behind its name in messages."""
-        with restored(self.warn_of_arithmetic), calling(f"unit {self.name}{where}: {action}"):
+        with preserve_float_settings(self.warn_of_arithmetic), mark_call(f"unit {self.name}{where}: {action}"):
             yield
 
     def _words(self) -> str:
@@ -376,7 +376,7 @@ class Unit:
         return np.array([known[name].valueReference for name in names], dtype=np.uint32)
 
 
-class Unexecuted(Unit):
+class UnloadedUnit(Unit):
     """A unit whose library is not loaded: it has its names, answers nothing and judges nothing."""
 
     def __init__(self, archive: Archive, name: str, signals: Mapping[str, Alias] | None = None) -> None:
@@ -421,7 +421,7 @@ def not_finite(names: Sequence[str], values: Floats) -> str:
     )
 
 
-def exchanging(operation: str, names: Sequence[str]) -> str:
+def describe_exchange(operation: str, names: Sequence[str]) -> str:
     """What a unit is at, for messages."""
     done = "setting" if operation.startswith("set") else "reading"
     return f"{done} {'slopes of ' if operation.endswith('slopes') else ''}{', '.join(names)}"
@@ -432,12 +432,12 @@ def exchanging(operation: str, names: Sequence[str]) -> str:
 _UNITS: weakref.WeakValueDictionary[int, Unit] = weakref.WeakValueDictionary()
 
 
-def _tell(environment: int | None, *message: Any) -> None:
+def _log_message(environment: int | None, *message: Any) -> None:
     if (unit := _UNITS.get(environment or 0)) is not None:
         unit._log(environment, *message)
 
 
-_TELL = fmi2CallbackLoggerTYPE(_tell)
+_LOG_CALLBACK = fmi2CallbackLoggerTYPE(_log_message)
 
 
 def _print_messages(callbacks: fmi2CallbackFunctions) -> None:
@@ -502,7 +502,7 @@ class Port:
             ]
 
     def _exchange(self, operation: str) -> None:
-        at, count, action = self.references.ctypes.data, self.references.size, exchanging(operation, self.names)
+        at, count, action = self.references.ctypes.data, self.references.size, describe_exchange(operation, self.names)
         with self.unit.calls(action):
             status = self.unit.call(operation)(at, count, self.own_values.ctypes.data)
         if status not in (OK, WARNING):

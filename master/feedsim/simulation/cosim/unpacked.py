@@ -24,7 +24,7 @@ from typing import IO, Any
 from xml.parsers import expat
 
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.installation import mend, shipped
+from feedsim.foundation.installation import repair_advice, shipped
 from feedsim.foundation.owned import TemporaryFolder
 
 # --- What comes from elsewhere, read with distrust: zip archives (names, sizes) and XML documents (no document
@@ -33,7 +33,7 @@ from feedsim.foundation.owned import TemporaryFolder
 
 MAX_UNPACKED_BYTES = 4 << 30  # bytes that a file may unpack to; the setpoints of the longest program take less
 RATIO = 100  # to the file's own size; tables of setpoints reach some 10, files made to fill a disk 1000
-FREE = 64 << 20  # bytes up to which the ratio does not count
+FREE_BYTES = 64 << 20  # bytes up to which the ratio does not count
 LARGEST_DOCUMENT = 64 << 20  # bytes of what is read into memory at once: XML, JSON, YAML
 MOST_ENTRIES = 20_000  # files and folders; archives of simulators have some hundreds
 MAX_PATH_PART_BYTES = 240  # bytes of a file's or folder's name; systems know 255
@@ -52,7 +52,7 @@ class Allowance:
             self._size = path.stat().st_size
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-        self._limit = min(MAX_UNPACKED_BYTES, max(FREE, RATIO * self._size))
+        self._limit = min(MAX_UNPACKED_BYTES, max(FREE_BYTES, RATIO * self._size))
         self._used = 0
 
     def take(self, size: int, where: str) -> None:
@@ -61,7 +61,7 @@ class Allowance:
         if self._used > self._limit:
             raise InputError(
                 f"{where}: what is needed of it unpacks to {self._used} bytes or more; at most {self._limit} are read "
-                f"of a file of {self._size} bytes ({RATIO} times its size, from {FREE >> 20} MiB to "
+                f"of a file of {self._size} bytes ({RATIO} times its size, from {FREE_BYTES >> 20} MiB to "
                 f"{MAX_UNPACKED_BYTES >> 30} "
                 "GiB)"
             )
@@ -82,13 +82,13 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
     zip_infos = [entry for entry in package.infolist() if not entry.filename.endswith("/")]
     names: dict[str, str] = {}  # as a disk compares them -> as the first of the entries has it
     for entry in zip_infos:
-        names.setdefault(_folded(entry.filename), entry.filename)
+        names.setdefault(_fold_case(entry.filename), entry.filename)
     faults: list[str] = []
     seen: set[str] = set()
     for entry in zip_infos:
         name = entry.filename
         if fault := _fault(entry, name in seen, names):
-            faults.append(f"{where}: the entry {shortened(name)!r} {fault}")
+            faults.append(f"{where}: the entry {shorten_name(name)!r} {fault}")
         seen.add(name)
     if faults:
         more = len(faults) - 20
@@ -116,12 +116,14 @@ def _fault(entry: zipfile.ZipInfo, twice: bool, names: dict[str, str]) -> str | 
         return f"has a name of more than {MAX_PATH_PART_BYTES} bytes ({MAX_PATH_BYTES} with its folders)"
     if fault := next(filter(None, map(_part_fault, name.split("/"))), None):
         return fault
-    folded = _folded(name)
+    folded = _fold_case(name)
     if names[folded] != name:
-        return f"differs from {shortened(names[folded])!r} only in case or accents, which some disks do not tell apart"
+        return (
+            f"differs from {shorten_name(names[folded])!r} only in case or accents, which some disks do not tell apart"
+        )
     parts = folded.split("/")
     above = next((names[text] for i in range(1, len(parts)) if (text := "/".join(parts[:i])) in names), None)
-    return f"is in the folder {shortened(above)!r}, which is a file too" if above else None
+    return f"is in the folder {shorten_name(above)!r}, which is a file too" if above else None
 
 
 def _part_fault(part: str) -> str | None:
@@ -129,13 +131,13 @@ def _part_fault(part: str) -> str | None:
     if part in ("", "."):
         return "has a part that is empty or '.'"
     if part[-1] in ". ":
-        return f"has a part that ends in a dot or a space, {shortened(part)!r}, which Windows leaves away"
+        return f"has a part that ends in a dot or a space, {shorten_name(part)!r}, which Windows leaves away"
     if part.partition(".")[0].rstrip(" ").upper() in _DEVICES:
-        return f"has a part, {shortened(part)!r}, that is a device on Windows"
+        return f"has a part, {shorten_name(part)!r}, that is a device on Windows"
     return None
 
 
-def _folded(name: str) -> str:
+def _fold_case(name: str) -> str:
     """A name as disks compare it that do not separate upper from lower case, nor the ways to write an accent."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
@@ -151,7 +153,7 @@ def leads_out(name: str) -> bool:
     )
 
 
-def shortened(name: str) -> str:
+def shorten_name(name: str) -> str:
     """A name for a message."""
     return name if len(name) <= 80 else f"{name[:77]}..."
 
@@ -162,20 +164,20 @@ def copy_stream(package: zipfile.ZipFile, entry: zipfile.ZipInfo, to: Path) -> N
     OutputError: it cannot be written, which is no fault of the archive.
     """
     with package.open(entry) as source:
-        with _written(to):
+        with _report_write_errors(to):
             to.parent.mkdir(parents=True, exist_ok=True)
             target = to.open("wb")
         try:
             while block := source.read(1 << 20):
-                with _written(to):
+                with _report_write_errors(to):
                     target.write(block)
         finally:
-            with _written(to):
+            with _report_write_errors(to):
                 target.close()
 
 
 @contextmanager
-def _written(to: Path) -> Iterator[None]:
+def _report_write_errors(to: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -227,7 +229,7 @@ MAX_UNUSED_CONTENTS = 8  # contents that no archive uses: the three units', and 
 KEPT_SIZE = 64 << 20  # bytes; what is larger, such as the setpoints of a long program, goes with its last user
 # A file that has rested for so long [ns] has other times after its next change; a younger one may change within the
 # same tick of its file system's clock.
-RESTED = 2_000_000_000
+MIN_FILE_AGE = 2_000_000_000
 DIGESTS = 64  # how many are remembered
 
 
@@ -345,7 +347,7 @@ class Store:
         state = (result.st_dev, result.st_ino, result.st_size, result.st_mtime_ns, result.st_ctime_ns)
         if (known := self._digests.get(state)) is not None:
             return known
-        rested = time.time_ns() - max(result.st_mtime_ns, result.st_ctime_ns) > RESTED  # asked before it is read
+        rested = time.time_ns() - max(result.st_mtime_ns, result.st_ctime_ns) > MIN_FILE_AGE  # asked before it is read
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         file.seek(0)
         if rested:
@@ -387,5 +389,6 @@ def check_there(path: Path) -> None:
     if not path.is_file():
         ours = path.parent == shipped("fmus")
         raise InputError(
-            f"{path}: no such file; {mend('the archives') if ours else 'FEEDSIM_FMUS or --fmus names their folder'}"
+            f"{path}: no such file; "
+            f"{repair_advice('the archives') if ours else 'FEEDSIM_FMUS or --fmus names their folder'}"
         )

@@ -26,7 +26,14 @@ from feedsim.simulation.cosim.schedule import Cycle
 from feedsim.simulation.cosim.system import System, plant_parameters
 from feedsim.simulation.cosim.unit import Alias, Port, Unit
 from feedsim.simulation.nc import Program
-from feedsim.structure.pack import POSES_IN_ARCHIVE, Packed, packaging, packed, plant_tables, setpoint_table
+from feedsim.structure.pack import (
+    POSES_IN_ARCHIVE,
+    PackedArchive,
+    pack_unit,
+    plant_tables,
+    setpoint_table,
+    translate_packager_errors,
+)
 
 # --- The whole machine as one unit: structure, drives and friction of all axes, packed with the scenario's motion
 #     into the
@@ -48,7 +55,7 @@ def pack_whole(
     model: str = "",
     trial: bool = True,
     terminals: bool = True,
-) -> Packed:
+) -> PackedArchive:
     """Pack a machine into the archive `base` of the unit `machine`; write it to `out`, whole or not at all.
 
     Args:
@@ -67,13 +74,13 @@ def pack_whole(
 
     settings = parameters(machine, coupling or Coupling(), built_in=program is not None)
     pose = {axis: machine.pose[axis] for axis in machine.axes}
-    with packaging(), _poses(machine) as poses:
+    with translate_packager_errors(), _poses(machine) as poses:
         given = whole_machine.WholeMachine(
             plant_tables(machine.modes, pose, poses, machine.mounts_table),
             setpoint_table(program) if program is not None else None,
             {name: whole_machine.spelled(value) for name, value in settings.items()},
         )
-        return packed(base, out, given, name=name, note=note, model=model, trial=trial, terminals=terminals)
+        return pack_unit(base, out, given, name=name, note=note, model=model, trial=trial, terminals=terminals)
 
 
 def pack_tables(base: Path, out: Path, machine: Machine) -> None:
@@ -81,9 +88,9 @@ def pack_tables(base: Path, out: Path, machine: Machine) -> None:
     from feedsim_packager import whole_machine
 
     pose = {axis: machine.pose[axis] for axis in machine.axes}
-    with packaging(), _poses(machine) as poses:
+    with translate_packager_errors(), _poses(machine) as poses:
         given = whole_machine.WholeMachine(plant_tables(machine.modes, pose, poses, machine.mounts_table), None, {})
-        packed(base, out, given, name=machine.name, note=machine.note, trial=False, level=0)
+        pack_unit(base, out, given, name=machine.name, note=machine.note, trial=False, level=0)
 
 
 @contextmanager
@@ -140,17 +147,17 @@ def system_of(machine: Machine, coupling: Coupling, fmus: Path, *, only_shipped:
     """The units of a machine, as `coupling` wants them; the rest as
     :class:`~feedsim.simulation.cosim.system.System`."""
     if coupling.units == "one":
-        return Whole(machine, fmus, coupling, only_shipped=only_shipped)
+        return WholeMachine(machine, fmus, coupling, only_shipped=only_shipped)
     return System(machine, fmus, only_shipped=only_shipped)
 
 
 def cycle_of(system: System, coupling: Coupling) -> Cycle:
     """A control cycle of such a system."""
-    kind = WholeCycle if isinstance(system, Whole) else Cycle
+    kind = WholeCycle if isinstance(system, WholeMachine) else Cycle
     return kind(system, SCHEMES[coupling.scheme], system.machine.cycles.T_c, coupling.steps(system.machine))
 
 
-class Whole(System):
+class WholeMachine(System):
     """One unit, and its parts under the names that they have as units of their own."""
 
     def __init__(self, machine: Machine, fmus: Path, coupling: Coupling, *, only_shipped: bool = False) -> None:
@@ -212,7 +219,7 @@ def open_whole(machine: Machine, fmus: Path) -> Archive:
 class WholeCycle(Cycle):
     """A step of the one unit; and, from what it shows, what plant and friction have exchanged inside."""
 
-    system: Whole
+    system: WholeMachine
 
     def _check(self) -> tuple[Finding, ...]:
         if self.scheme.passes > 1 or self.substeps > 1:

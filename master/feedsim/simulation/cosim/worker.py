@@ -36,7 +36,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from feedsim.foundation.errors import FeedsimError, Finding, SimulationError
-from feedsim.foundation.owned import TemporaryFolder, held
+from feedsim.foundation.owned import TemporaryFolder, defer_signals
 
 # --- Messages between two processes of which one executes programs of other makers, which may write into the pipe
 #     or close
@@ -78,13 +78,13 @@ class Receiver:
     def __init__(self, descriptor: int, token: bytes) -> None:
         os.set_blocking(descriptor, False)
         self.descriptor, self._token = descriptor, token
-        self._arrived = bytearray()
+        self._received_bytes = bytearray()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
 
     @property
     def begun(self) -> int:
-        return len(self._arrived)
+        return len(self._received_bytes)
 
     def receive(self, wait: float | None) -> Any:
         """The next message; None where nothing more arrives within `wait` [s], which is for ever where it is None.
@@ -99,21 +99,21 @@ class Receiver:
                 return None
             if not (block := os.read(self.descriptor, _BLOCK)):
                 raise EOFError
-            self._arrived += block
+            self._received_bytes += block
         return pickle.loads(content)
 
     def _whole(self) -> bytes | None:
         """Content of the first message, once it is there."""
-        head = bytes(self._arrived[: _HEAD.size])
+        head = bytes(self._received_bytes[: _HEAD.size])
         if head[:TOKEN] != self._token[: len(head)]:
             raise GarbledError
         if len(head) < _HEAD.size:
             return None
         _, size, check = _HEAD.unpack(head)
-        if len(self._arrived) < _HEAD.size + size:
+        if len(self._received_bytes) < _HEAD.size + size:
             return None
-        content = bytes(memoryview(self._arrived)[_HEAD.size : _HEAD.size + size])
-        del self._arrived[: _HEAD.size + size]
+        content = bytes(memoryview(self._received_bytes)[_HEAD.size : _HEAD.size + size])
+        del self._received_bytes[: _HEAD.size + size]
         if zlib.crc32(content) != check:
             raise GarbledError
         return content
@@ -176,7 +176,7 @@ class Mark:
         return tuple(int(number) for number in self.numbers)
 
 
-class Watched:
+class WatchedProcess:
     """The mark of this process, and who needs to know which operations its numbers stand for.
 
     spent: whether another process is to do what comes next.
@@ -194,30 +194,30 @@ class Watched:
         """Hand over what was asked for, ahead of the units' last calls, in which one may end the process."""
 
 
-_here: Watched | None = None
+_watched_process: WatchedProcess | None = None
 
 
-def watched() -> Watched | None:
+def watched_process() -> WatchedProcess | None:
     """Of this process; None: nobody watches."""
-    return _here
+    return _watched_process
 
 
-def watch(here: Watched | None) -> None:
+def watch(here: WatchedProcess | None) -> None:
     """Have this process watched."""
-    global _here
-    _here = here
+    global _watched_process
+    _watched_process = here
 
 
 def deliver(result: Any) -> None:
     """Hand over a result with `notes` or `warnings` to a process that watches, where there is one."""
-    if _here is not None:
-        _here.deliver(result)
+    if _watched_process is not None:
+        _watched_process.deliver(result)
 
 
 @contextmanager
-def calling(text: str) -> Iterator[None]:
+def mark_call(text: str) -> Iterator[None]:
     """A block that calls another program; `text` says which and for what, where somebody watches."""
-    mark = None if _here is None else _here.mark
+    mark = None if _watched_process is None else _watched_process.mark
     if mark is None:
         yield
         return
@@ -233,14 +233,14 @@ def calling(text: str) -> Iterator[None]:
 
 T = TypeVar("T")
 
-AVAILABLE = os.name == "posix"
-LOOK = 0.05  # s between two looks at a worker that says nothing
+WORKERS_AVAILABLE = os.name == "posix"
+WORKER_POLL_INTERVAL = 0.05  # s between two looks at a worker that says nothing
 TOLD_EVERY = 0.1  # s between two reports of progress
 MAX_DESCRIPTOR = 1 << 16
-DYING = 5.0  # s for a worker to end that is asked to
+WORKER_END_TIME = 5.0  # s for a worker to end that is asked to
 _SERVE = "import sys; from feedsim.simulation.cosim.worker import serve; serve(*sys.argv[1:])"
-_local = threading.local()  # a worker for each thread that needs one
-_all: list[_Worker] = []
+_thread_worker = threading.local()  # a worker for each thread that needs one
+_workers: list[_Worker] = []
 
 
 def call(
@@ -262,12 +262,12 @@ def call(
         SimulationError: the worker has ended, or a call takes longer than `limit`: which unit, in what, when.
         FeedsimError: what the function raises.
     """
-    if watched() is not None or not AVAILABLE:  # already there; or it cannot be helped
+    if watched_process() is not None or not WORKERS_AVAILABLE:  # already there; or it cannot be helped
         more = {name: one for name, one in (("sink", sink), ("progress", progress)) if one is not None}
         return function(*given, **more, **named)
-    worker: _Worker | None = getattr(_local, "worker", None)
+    worker: _Worker | None = getattr(_thread_worker, "worker", None)
     if worker is None or not worker.alive:
-        worker = _local.worker = _Worker()
+        worker = _thread_worker.worker = _Worker()
     answer: T = worker.call(function, given, named, limit, sink, progress)
     return answer
 
@@ -282,7 +282,7 @@ class _Worker:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
         environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(self._folder.path))  # what it leaves goes
         self._owner = os.getpid()
-        with held():  # a worker that runs is known
+        with defer_signals():  # a worker that runs is known
             their_end, ours = os.pipe()
             our_end, theirs = os.pipe()
             words = [sys.executable, "-c", _SERVE, str(their_end), str(theirs), str(self._mark.path), token.hex()]
@@ -292,9 +292,9 @@ class _Worker:
             )
             os.close(their_end)
             os.close(theirs)
-            self._to, self._from = Sender(ours, token), Receiver(our_end, token)
+            self._sender, self._receiver = Sender(ours, token), Receiver(our_end, token)
             self._ended = False
-            _all.append(self)
+            _workers.append(self)
 
     @property
     def alive(self) -> bool:
@@ -310,7 +310,7 @@ class _Worker:
         self._mark.at("the worker: starting", OWN_CODE)
         try:
             with suppress(BrokenPipeError):  # it has ended since: the answer shows how
-                self._to.send((surroundings, function, given, dict(named), sink is not None, progress is not None))
+                self._sender.send((surroundings, function, given, dict(named), sink is not None, progress is not None))
             return self._watch(limit, sink, progress)
         except FeedsimError:
             raise
@@ -328,11 +328,11 @@ class _Worker:
         result: Any = None
         while True:
             try:
-                message = self._from.receive(LOOK)
-                if message is None and self._process.poll() is not None and self._from.receive(0.0) is None:
+                message = self._receiver.receive(WORKER_POLL_INTERVAL)
+                if message is None and self._process.poll() is not None and self._receiver.receive(0.0) is None:
                     raise EOFError
             except (EOFError, OSError, GarbledError) as error:
-                return self._lost(result, self._how(operations, garbled=isinstance(error, GarbledError)))
+                return self._lost(result, self._describe_end(operations, garbled=isinstance(error, GarbledError)))
             if message is not None:
                 kind, content = message
                 if kind in ("end", "error"):
@@ -350,13 +350,13 @@ class _Worker:
                     sink(content)
                 elif kind == "progress" and progress is not None:
                     progress(*content)
-            now = (*self._mark.state(), self._from.begun)
+            now = (*self._mark.state(), self._receiver.begun)
             if now != state or message is not None:
                 state, since = now, time.monotonic()
-            elif (state[1] != OWN_CODE or self._from.begun) and time.monotonic() - since > limit:
+            elif (state[1] != OWN_CODE or self._receiver.begun) and time.monotonic() - since > limit:
                 return self._lost(
                     result,
-                    f"{self._where(operations)} does not come back within {limit:g} s; it has been ended. "
+                    f"{self._describe_place(operations)} does not come back within {limit:g} s; it has been ended. "
                     "coupling.call_limit allows a longer call",
                 )
 
@@ -368,17 +368,17 @@ class _Worker:
         said = Finding("unit-ended-late", "doubt", f"{how}; that was behind the last step, the result is whole")
         return replace(result, **{_notes(result): (*getattr(result, _notes(result)), said)})
 
-    def _how(self, operations: tuple[float, Sequence[tuple[str, str, float]]], garbled: bool) -> str:
+    def _describe_end(self, operations: tuple[float, Sequence[tuple[str, str, float]]], garbled: bool) -> str:
         """Who, in what, when, and how the worker has ended, or is to end."""
         fault = (
             "; the fault is in that unit's own program: its maker needs this message, and a debugger shows where it "
             "stops"
         )
         if garbled:
-            return f"{self._where(operations)} has written into descriptors that are not its own{fault}"
+            return f"{self._describe_place(operations)} has written into descriptors that are not its own{fault}"
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(DYING)
-        code, where = self._process.poll(), self._where(operations)
+            self._process.wait(WORKER_END_TIME)
+        code, where = self._process.poll(), self._describe_place(operations)
         if self._mark.state()[1] == SPOILED:
             return f"{self._mark.text}{fault}"
         if code is None:
@@ -392,7 +392,7 @@ class _Worker:
             return f"{where} was ended by {name} ({signal.strsignal(-code) or 'unknown'}){fault}"
         return f"{where} ended the process by itself, with exit status {code}{fault}"
 
-    def _where(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> str:
+    def _describe_place(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> str:
         """Which unit, in what, when; what a sentence begins with."""
         cycle, operation, *_ = self._mark.state()
         T_c, known = operations
@@ -411,11 +411,11 @@ class _Worker:
         with suppress(OSError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
-        for end in (self._to, self._from):
+        for end in (self._sender, self._receiver):
             os.close(end.descriptor)
         self._folder.close()
         with suppress(ValueError):
-            _all.remove(self)
+            _workers.remove(self)
 
 
 def _notes(result: Any) -> str:
@@ -425,19 +425,19 @@ def _notes(result: Any) -> str:
 
 @atexit.register
 def _end_all() -> None:
-    for worker in [*_all]:
+    for worker in [*_workers]:
         worker.end()
 
 
 # --- in the worker
 
 
-class _Served(Watched):
+class _ServingProcess(WatchedProcess):
     def __init__(self, mark: Mark, answers: Sender) -> None:
         super().__init__()
         self.mark = mark
         self._answers = answers
-        self._told = 0.0
+        self._report_time = 0.0
         self.delivered = False
 
     def describe(self, T_c: float, operations: Sequence[tuple[str, str, float]]) -> None:
@@ -451,8 +451,8 @@ class _Served(Watched):
         self._answers.send(("rows", part))
 
     def progress(self, done: int, total: int) -> None:
-        if done == total or time.monotonic() - self._told > TOLD_EVERY:
-            self._told = time.monotonic()
+        if done == total or time.monotonic() - self._report_time > TOLD_EVERY:
+            self._report_time = time.monotonic()
             self._answers.send(("progress", (done, total)))
 
 
@@ -464,7 +464,7 @@ def serve(asked: str, answers: str, mark: str, token: str) -> None:
     questions = Receiver(_out_of_reach(int(asked)), bytes.fromhex(token))
     replies = Sender(_out_of_reach(int(answers)), bytes.fromhex(token))
     noted = Mark(Path(mark), closed=True)
-    here = _Served(noted, replies)
+    here = _ServingProcess(noted, replies)
     limits = {name: resource.getrlimit(getattr(resource, name)) for name in _LIMITS if hasattr(resource, name)}
 
     def lowered() -> list[str]:

@@ -129,7 +129,7 @@ def multisine(
             f"no line between {low:.6g} and {high:.6g} Hz at a resolution of {resolution:.6g} Hz; "
             "take a wider band or a finer resolution"
         )
-    samples = _compressed(position_cycles * per_cycle, lines, np.random.default_rng(seed))
+    samples = _compress_multisine(position_cycles * per_cycle, lines, np.random.default_rng(seed))
     samples *= rms / np.sqrt(np.mean(samples**2))
     return Excitation("multisine", _frozen(samples), cycles.T_c, lines, seed)
 
@@ -233,7 +233,7 @@ def _decimations(stages: int) -> list[int]:
     return indexes
 
 
-def _compressed(count: int, lines: Integers, random: np.random.Generator) -> Floats:
+def _compress_multisine(count: int, lines: Integers, random: np.random.Generator) -> Floats:
     """Cosines of amplitude 1 at `lines` of a period of `count`; random phases, then clipped and reset in turns."""
     spectrum = np.zeros(count // 2 + 1, dtype=np.complex128)
     phases = np.exp(1j * random.uniform(0, 2 * np.pi, len(lines)))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from feedsim.files.trace import Table, least_and_largest
 from feedsim.foundation.errors import InputError
 from feedsim.motions import Motion
-from feedsim.motions.kind import Array, Course, Geometry, Held, Joined, Peaks, Points, Start
+from feedsim.motions.kind import Array, Course, Geometry, HeldPoints, JoinedPoints, Peaks, Points, Start
 from feedsim.scenario import Axis, Machine, Scenario
 
 # --- One C2 cubic spline through equidistant points, at rest on both sides --------------------------------------------
@@ -56,7 +56,7 @@ class RestSpline:
         # Knots are whole numbers, so that a long program loses no digits in the differences of instants.
         self._knots = first, last
         # Deviations from the first point keep the digits of a small motion far from the origin.
-        self._pieces = _clamped(np.concatenate([before, within, after]) - self._origin)
+        self._pieces = _clamped_spline(np.concatenate([before, within, after]) - self._origin)
 
     def __call__(self, time: Array) -> tuple[Array, Array]:
         """Position [unit of the points] and speed [per s] at ``time`` (N,) [s], at rest outside the points."""
@@ -70,7 +70,7 @@ class RestSpline:
         return self._origin + deviation, (dy + half * s * 2 + sixth * (s * s) * 3) / self._step
 
 
-def _clamped(y: Array) -> Array:
+def _clamped_spline(y: Array) -> Array:
     """(4, N - 1): powers 0 to 3 of the pieces of a C2 cubic spline through `y` (N,) at distances 1, clamped to slope 0.
 
     The slopes at the knots have s_(i-1) + 4 s_i + s_(i+1) = 3 (y_(i+1) - y_(i-1)).
@@ -213,7 +213,7 @@ LIMIT_ROUNDING = 1e-9
 
 
 # Position [m] and speed [m/s] of an axis at position cycles, counted from the first one of its piece.
-Sampled = Callable[[NDArray[np.int64]], tuple[Array, Array]]
+AxisSampler = Callable[[NDArray[np.int64]], tuple[Array, Array]]
 
 
 @dataclass
@@ -223,10 +223,10 @@ class _Stretch:
     first: int
     points: dict[str, list[Points]]
 
-    def sampled(self, axis: str, begin: float, ratio: int, T_ipo: float) -> Sampled:
+    def sampled(self, axis: str, begin: float, ratio: int, T_ipo: float) -> AxisSampler:
         """An axis on the spline through its points; ``ratio`` position cycles per ``T_ipo`` [s]."""
         # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
-        spline = LongSpline(Joined(self.points[axis]))
+        spline = LongSpline(JoinedPoints(self.points[axis]))
 
         def at(instants: NDArray[np.int64]) -> tuple[Array, Array]:
             x, v = spline(instants, ratio)
@@ -246,7 +246,7 @@ class _Inset:
     first: int
     setpoints: Mapping[str, tuple[Array, Array]]
 
-    def sampled(self, axis: str, begin: float, ratio: int, T_ipo: float) -> Sampled:
+    def sampled(self, axis: str, begin: float, ratio: int, T_ipo: float) -> AxisSampler:
         """An axis as recorded, or where it is at the beginning (`begin`, m); at rest behind the recording."""
         x_s, v_s = self.setpoints.get(axis, (np.array([begin]), np.zeros(1)))
 
@@ -352,7 +352,7 @@ def _append(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> lis
             stretch = _stretch(state)
             state.pieces.append(stretch)
         for axis, points in stretch.points.items():
-            points.append(course.points[axis] if axis in course.points else Held(origin[axis], course.cycles))
+            points.append(course.points[axis] if axis in course.points else HeldPoints(origin[axis], course.cycles))
     state.instant += course.cycles
     state.position |= course.target
     if course.absolute:
@@ -415,7 +415,7 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
 
 
 def _stretch(state: _Plan) -> _Stretch:
-    return _Stretch(state.instant, {axis: [Held(x, 1)] for axis, x in state.position.items()})
+    return _Stretch(state.instant, {axis: [HeldPoints(x, 1)] for axis, x in state.position.items()})
 
 
 def violations(name: str, axis: Axis, start: float, peaks: Peaks) -> list[str]:

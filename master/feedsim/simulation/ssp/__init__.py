@@ -4,7 +4,7 @@ May use cosim, structure, nc, scenario and trace.
 Start with export.py and, the other way, opened.py.
 """
 
-from feedsim.simulation.ssp.export import Exported, export
-from feedsim.simulation.ssp.opened import Opened, opened
+from feedsim.simulation.ssp.export import ExportedSystem, export
+from feedsim.simulation.ssp.opened import OpenedSystem, open_system
 
-__all__ = ["Exported", "Opened", "export", "opened"]
+__all__ = ["ExportedSystem", "OpenedSystem", "export", "open_system"]

@@ -69,11 +69,11 @@ class Files(Mapping[str, bytes]):
     def copy(self, name: str, to: Path) -> None:
         """Write a file of any size to `to`, whose folders are made. InputError: damaged, too large, no room for it."""
         self.allowance.take(self._entries[name].file_size, str(self.path))
-        with unpacked.readable(f"{self.path}: {unpacked.shortened(name)} cannot be unpacked"):
+        with unpacked.readable(f"{self.path}: {unpacked.shorten_name(name)} cannot be unpacked"):
             unpacked.copy_stream(self._package, self._entries[name], to)
 
 
-def inside(source: str, files: Container[str]) -> str:
+def resolve_source(source: str, files: Container[str]) -> str:
     """Name of the file that a `source` means: a URI (RFC 3986) relative to the SSP file's top. InputError: there is
     none, in words that go on behind "source 'x'".
 
@@ -104,7 +104,7 @@ def as_source(name: str) -> str:
 
 
 @contextmanager
-def read(path: Path) -> Iterator[Files]:
+def open_files(path: Path) -> Iterator[Files]:
     """The files of an SSP, for as long as the block lasts.
 
     Raises:
@@ -176,11 +176,11 @@ def parse(content: bytes, where: str, expected: str) -> Element:
     except (ET.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{where}: not readable XML: {error}") from error
     if root.tag != tag(expected):
-        raise InputError(f"{where}: its root is {shown(root.tag)}, not {expected} of SSP 1.0")
+        raise InputError(f"{where}: its root is {prefixed_tag(root.tag)}, not {expected} of SSP 1.0")
     return root
 
 
-def shown(name: str) -> str:
+def prefixed_tag(name: str) -> str:
     """A tag with its usual prefix."""
     namespace, _, local = name.removeprefix("{").partition("}")
     return next((f"{prefix}:{local}" for prefix, known in PREFIXES.items() if known == namespace), name)

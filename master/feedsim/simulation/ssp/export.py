@@ -18,7 +18,7 @@ from feedsim.simulation import judge
 from feedsim.simulation.cosim import fmus_directory, system
 from feedsim.simulation.cosim.archive import Archive, UnitDefinition
 from feedsim.simulation.cosim.plant import axes_of
-from feedsim.simulation.cosim.roles import RoleUnit, archive_path, filled
+from feedsim.simulation.cosim.roles import RoleUnit, archive_path, fill_role
 from feedsim.simulation.cosim.system import plant_parameters
 from feedsim.simulation.cosim.unpacked import check_there
 from feedsim.simulation.cosim.whole import UNIT, pack_whole
@@ -35,7 +35,7 @@ from feedsim.structure.pack import pack
 
 
 # Parameters of the unit that decide what a run of it is, and what feedsim can run.
-NEEDED = {"motion.built_in": "its setpoints are those inside", "coupling.friction": "friction is on"}
+REQUIRED_PARAMETERS = {"motion.built_in": "its setpoints are those inside", "coupling.friction": "friction is on"}
 
 
 def pack_one(scenario: Scenario, program: Program, fmus: Path, out: Path) -> None:
@@ -88,7 +88,7 @@ def coupling_of_one(result: Roles, values: Mapping[str, Mapping[str, Value]], wh
         return None
     given = values[result.plant]
     problems = [f"{where}: {result.plant}.{name} is {str(given.get(name)).lower()}; true is needed: {why}"
-                for name, why in NEEDED.items() if given.get(name) is not True]  # fmt: skip
+                for name, why in REQUIRED_PARAMETERS.items() if given.get(name) is not True]  # fmt: skip
     if problems:
         raise InputError.of(where, problems)
     scheme = int(given["coupling.scheme"])
@@ -119,7 +119,7 @@ COMPONENT_WIDTH, COMPONENT_HEIGHT, COMPONENT_GAP = 40.0, 30.0, 20.0
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedSystem:
     """An SSP file. `instances`: components in it; `platforms`: folders of binaries/ that all its
     archives have; `warnings`: what a user should know before running it."""
 
@@ -131,7 +131,7 @@ class Exported:
     warnings: tuple[Finding, ...]
 
 
-def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Exported:
+def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> ExportedSystem:
     """Write `scenario` to the SSP file `out`, whole or not at all; the same bytes for the same scenario and archives.
 
     fmus: folder with the archives of the units; default :func:`feedsim.simulation.cosim.fmus_directory`.
@@ -165,7 +165,7 @@ def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Export
     if (structure := described.structure(scenario)) is not None:
         files[described.STRUCTURE] = structure
     size = archive.write(out, files)
-    return Exported(out, size, tuple(instances), program.duration, tuple(platforms), warnings)
+    return ExportedSystem(out, size, tuple(instances), program.duration, tuple(platforms), warnings)
 
 
 def _sources(machine: Machine, fmus: Path) -> dict[Path, str]:
@@ -230,7 +230,7 @@ def _files(
     whole = UNIT in instances  # which has its parameters inside, and nothing to be connected
     for axis in () if whole else axes:
         for role, instance in ((DRIVE, system.controller(axis)), (FRICTION_ROLE, system.friction(axis))):
-            units[instance] = filled(machine, axis, role, archives[instances[instance]])
+            units[instance] = fill_role(machine, axis, role, archives[instances[instance]])
     parameters: dict[str, Mapping[str, Value]] = {} if whole else {system.PLANT: plant_parameters(machine, None)}
     parameters |= {instance: unit.parameters for instance, unit in units.items()}
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.files.source import closed
+from feedsim.files.source import confine_references
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.owned import TemporaryFolder
-from feedsim.motions.setpoints import Recorded
+from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import Scenario, load
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.unpacked import readable
@@ -36,7 +36,7 @@ WHOLE_CYCLE_TOLERANCE = 1e-6  # of a position cycle: a stop time this little beh
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
+class OpenedSystem:
     """What an SSP file asks for.
 
     Attributes:
@@ -67,7 +67,7 @@ class Opened:
         result = text
         for place, source in self.sources.items():
             result = result.replace(str(self.fmus / place), f"{self.path}: {source}")
-        return _named(result, self.path, self.fmus)
+        return _name_file(result, self.path, self.fmus)
 
 
 @contextmanager
@@ -82,7 +82,7 @@ def refusals_of(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
+def open_system(path: Path, overrides: Sequence[str] = ()) -> Iterator[OpenedSystem]:
     """Read and check an SSP; what it unpacks to is removed when the block ends.
 
     `overrides`: KEY=VALUE as for a scenario, for all but the motions, which the file has as setpoints.
@@ -91,12 +91,12 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         InputError: not a readable SSP, or not of the units of Fig. 2; lists what is wrong.
     """
     with (
-        archive.read(path) as files,
+        archive.open_files(path) as files,
         TemporaryFolder() as folder,
         ExitStack() as stack,
     ):
         with refusals_of(path):
-            structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
+            structure = system_structure.read_structure(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
             archives = _archives(structure, files, folder, path, stack)
             result = roles_of_one(structure, archives, str(path)) or roles(structure, archives, str(path))
             table = _table(archives[result.setpoint], f"{path}: {result.setpoint}")
@@ -104,7 +104,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
             coupling = coupling_of_one(result, given, str(path))
             if coupling is not None:
                 archives, given = split_one(result, archives, given)
-            if problems := rebuilt.lacking(result, given, str(path)):
+            if problems := rebuilt.missing_parameters(result, given, str(path)):
                 raise InputError.of(str(path), problems)
             own = rebuilt.annotation(structure.scenario, files, str(path))
             T_c, T_pos, guessed = rebuilt.cycles(result, archives, given, table, own, structure.step, str(path))
@@ -112,15 +112,15 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
             if problems := rebuilt.faults(parts, str(path)):
                 raise InputError.of(str(path), problems)
             _lay_out(folder, files, parts, own, path)
-            program = _sampled(parts, structure, path)
-        with closed(folder), _own_names(path, folder):
+            program = _sample_setpoints(parts, structure, path)
+        with confine_references(folder), _own_names(path, folder):
             scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
-            reported = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
+            reported = (*_warn_late_start(structure, path), *_jumps(scenario, program, path), *warnings)
             if guessed:
                 cycle = units.show(T_c, "s")
                 text = f"{path.name}: no drive gives its control cycle; it is {cycle}, {guessed}"
                 reported += (Finding("control-cycle-assumed", "doubt", text, path.name),)
-            yield Opened(scenario, program, path, folder, reported, _sources(structure, parts, folder))
+            yield OpenedSystem(scenario, program, path, folder, reported, _sources(structure, parts, folder))
 
 
 def _archives(
@@ -132,7 +132,7 @@ def _archives(
     names: dict[str, str] = {}
     for component in structure.components:
         try:
-            source = names[component.name] = archive.inside(component.source, files)
+            source = names[component.name] = archive.resolve_source(component.source, files)
         except InputError as error:
             problems.append(f"{path}: component {component.name}: its source {component.source!r} {error}")
             continue
@@ -193,7 +193,7 @@ def _sources(structure: Structure, parts: Parts, folder: Path) -> dict[str, str]
     }
 
 
-def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:
+def _sample_setpoints(parts: Parts, structure: Structure, path: Path) -> Program:
     """What the controllers see of the setpoints: the rows at their position cycle, from start to stop."""
     table, T_pos = parts.table, parts.T_pos
     last = float(table.time[-1]) if structure.stop is None else structure.stop - structure.start
@@ -220,11 +220,13 @@ def _with_motions(
     if own is not None and "motions" in own:
         data = rebuilt.scenario_data(parts, own, path.stem, folder, motions=True)
         before = _load(data, folder, path)
-        planned = _planned(before, program)
-        if planned is not None and setpoints.agree(planned.x_s, program.x_s):
+        planned = _plan_motions(before, program)
+        if planned is not None and setpoints.setpoints_agree(planned.x_s, program.x_s):
             scenario = _load(data, folder, path, overrides)
-            changed = _planned(scenario, program) if overrides else planned
-            if changed is None or not (_same(changed.x_s, planned.x_s) and _same(changed.n_ffw, planned.n_ffw)):
+            changed = _plan_motions(scenario, program) if overrides else planned
+            if changed is None or not (
+                _equal_setpoints(changed.x_s, planned.x_s) and _equal_setpoints(changed.n_ffw, planned.n_ffw)
+            ):
                 raise InputError(
                     f"{path}: {', '.join(f'--set {text}' for text in overrides)}: would change the setpoints, which "
                     "the file has as a table; change the scenario and export it anew (feedsim export)"
@@ -254,12 +256,12 @@ def _with_motions(
         origin={axis: float(program.x_s[axis][0]) for axis in axes},
         target={axis: float(program.x_s[axis][-1]) for axis in axes},
         axes=tuple(axis for axis in axes if np.any(program.x_s[axis] != program.x_s[axis][0])),
-        geometry=Recorded(begin=0.0, end=program.duration, first=0.0, file=path, axes=axes),
+        geometry=RecordedGeometry(begin=0.0, end=program.duration, first=0.0, file=path, axes=axes),
     )
     return scenario, Program(program.time, program.x_s, program.n_ffw, (segment,)), tuple(warnings)
 
 
-def _late(structure: Structure, path: Path) -> list[Finding]:
+def _warn_late_start(structure: Structure, path: Path) -> list[Finding]:
     if structure.start == 0.0:
         return []
     start = units.show(structure.start, "s")
@@ -291,11 +293,11 @@ def _load(data: Mapping[str, Any], folder: Path, path: Path, overrides: Sequence
     file.write_text(json.dumps(data, ensure_ascii=False, indent=1), encoding="utf-8")
     scenario = load(file, overrides)
     scenario._file, scenario._files = path, (("", path),)
-    scenario._origins = {place: _named(where, path, folder) for place, where in scenario._origins.items()}
+    scenario._origins = {place: _name_file(where, path, folder) for place, where in scenario._origins.items()}
     return scenario
 
 
-def _planned(scenario: Scenario, program: Program) -> Program | None:
+def _plan_motions(scenario: Scenario, program: Program) -> Program | None:
     """The scenario's own setpoints, from where the table begins; None where its motions cannot be driven."""
     pose = {axis: float(x_s[0]) for axis, x_s in program.x_s.items()}
     try:
@@ -305,7 +307,7 @@ def _planned(scenario: Scenario, program: Program) -> Program | None:
         return None
 
 
-def _same(some: Mapping[str, Any], others: Mapping[str, Any]) -> bool:
+def _equal_setpoints(some: Mapping[str, Any], others: Mapping[str, Any]) -> bool:
     return set(some) == set(others) and all(np.array_equal(some[axis], others[axis]) for axis in some)
 
 
@@ -316,10 +318,10 @@ def _own_names(path: Path, folder: Path) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(
-            _named(str(error), path, folder), [_named(problem, path, folder) for problem in error.problems]
+            _name_file(str(error), path, folder), [_name_file(problem, path, folder) for problem in error.problems]
         ) from None
 
 
-def _named(text: str, path: Path, folder: Path) -> str:
+def _name_file(text: str, path: Path, folder: Path) -> str:
     text = re.sub(rf"{re.escape(str(folder / 'scenario.yaml'))}(:\d+)?", lambda _: str(path), text)
     return text.replace(str(folder / "x")[:-1], f"{path}: ")

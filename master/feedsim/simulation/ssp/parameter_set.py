@@ -64,7 +64,7 @@ def parameter(name: str, kind: str, value: Value, unit: str | None) -> Parameter
     return Parameter(name, kind, str(value))
 
 
-def read(content: bytes, where: str) -> ParameterSet:
+def read_parameter_set(content: bytes, where: str) -> ParameterSet:
     """Read an SSV document. InputError lists every problem."""
     return from_element(archive.parse(content, where, "ssv:ParameterSet"), where)
 
@@ -84,7 +84,7 @@ def from_element(root: archive.Element, where: str) -> ParameterSet:
             continue
         if name in parameters:
             problems.append(f"{where}: parameter {name} is there twice")
-        kind = archive.shown(values[0].tag).partition(":")[2]
+        kind = archive.prefixed_tag(values[0].tag).partition(":")[2]
         parameters[name] = Parameter(name, kind, values[0].get("value", ""), values[0].get("unit"))
     if problems:
         more = len(problems) - MOST_PROBLEMS
@@ -112,7 +112,7 @@ def value(
         result = number(text)
         if parameter.unit in (None, "", unit):
             return result
-        return _converted(text, result, str(parameter.unit), unit, definitions)
+        return _convert_value(text, result, str(parameter.unit), unit, definitions)
     if kind == "Integer" and parameter.kind in ("Integer", "Enumeration", "Real"):
         result = number(text)
         if result != int(result):
@@ -138,7 +138,7 @@ def number(text: str) -> float:
     return result
 
 
-def _converted(
+def _convert_value(
     text: str, value: float, given: str, wanted: str, definitions: Iterable[Mapping[str, UnitDefinition]]
 ) -> float:
     try:

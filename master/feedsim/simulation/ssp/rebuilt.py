@@ -26,7 +26,7 @@ from feedsim.scenario.structure.parts import GeometryStructure
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.whole import UNIT
 from feedsim.simulation.ssp import parameter_set
-from feedsim.simulation.ssp.archive import inside
+from feedsim.simulation.ssp.archive import resolve_source
 from feedsim.simulation.ssp.parameter_set import Parameter, ParameterSet, Value, number
 from feedsim.simulation.ssp.roles import Roles
 from feedsim.simulation.ssp.setpoints import Table
@@ -37,7 +37,7 @@ from feedsim.structure.pack import MOUNTS_IN_ARCHIVE
 
 
 @dataclass(frozen=True)
-class _Said:
+class _GivenValue:
     """What a parameter set (`place`, `given`) says of a variable of a component."""
 
     component: str
@@ -81,7 +81,7 @@ def values(
         component: {} if component in foreign else {name: start_value(archives[component], name) for name in names}
         for component, names in parameters.items()
     }
-    inputs: dict[tuple[str, str], _Said] = {}  # the set that counts
+    inputs: dict[tuple[str, str], _GivenValue] = {}  # the set that counts
     for said in _all_said(structure, files, archives, where, problems):
         if len(problems) > parameter_set.MOST_PROBLEMS:
             break
@@ -117,12 +117,12 @@ def start_value(archive: Archive, name: str) -> Value:
 
 def _all_said(
     structure: Structure, files: Mapping[str, bytes], archives: Mapping[str, Archive], where: str, problems: list[str]
-) -> Iterator[_Said]:
+) -> Iterator[_GivenValue]:
     """Of the components' own sets, then of the system's, in the order in which they count."""
     for component in structure.components:
         for place, given, prefix in _sets(component.bindings, files, where, problems):
             for parameter in given.parameters:
-                yield _Said(component.name, prefix + parameter.name, parameter, place, given)
+                yield _GivenValue(component.name, prefix + parameter.name, parameter, place, given)
     for place, given, prefix in _sets(structure.bindings, files, where, problems):
         for parameter in given.parameters:
             name = prefix + parameter.name
@@ -130,7 +130,7 @@ def _all_said(
             if owner is None:
                 problems.append(f"{place}: {name}: is no parameter of a component")
             else:
-                yield _Said(owner, name.removeprefix(f"{owner}."), parameter, place, given)
+                yield _GivenValue(owner, name.removeprefix(f"{owner}."), parameter, place, given)
 
 
 def _sets(
@@ -143,19 +143,19 @@ def _sets(
             continue
         place = f"{where}: {binding.source}"
         try:
-            source = inside(str(binding.source), files)
+            source = resolve_source(str(binding.source), files)
         except InputError as error:
             problems.append(f"{place}: is named by a parameter binding, but {str(error).removeprefix('is ')}")
             continue
         try:
-            result.append((place, parameter_set.read(files[source], place), binding.prefix))
+            result.append((place, parameter_set.read_parameter_set(files[source], place), binding.prefix))
         except InputError as error:
             problems += error.problems
     return result
 
 
 def _constant_inputs(
-    inputs: Mapping[tuple[str, str], _Said],
+    inputs: Mapping[tuple[str, str], _GivenValue],
     structure: Structure,
     archives: Mapping[str, Archive],
     result: dict[str, dict[str, Value]],
@@ -208,7 +208,7 @@ STRUCTURE = "resources/structure.yaml"
 
 def text(scenario: Scenario) -> str:
     """The JSON text for `scenario`; recordings it names are where :func:`recordings` puts them."""
-    whole = plain(scenario)
+    whole = plain_value(scenario)
     del whole["loads"]  # there are none
     machine = whole["machine"]
     places = {path: name for name, path in recordings(scenario).items()}
@@ -243,7 +243,7 @@ def structure(scenario: Scenario) -> bytes | None:
     loaded = load_structure(scenario.machine.structure)
     if not isinstance(loaded, GeometryStructure):
         return None
-    return (json.dumps(plain(loaded), indent=1, ensure_ascii=False) + "\n").encode("utf-8")
+    return (json.dumps(plain_value(loaded), indent=1, ensure_ascii=False) + "\n").encode("utf-8")
 
 
 def recordings(scenario: Scenario) -> dict[str, Path]:
@@ -255,22 +255,22 @@ def recordings(scenario: Scenario) -> dict[str, Path]:
     }
 
 
-def plain(value: Any, annotation: Any = None) -> Any:
+def plain_value(value: Any, annotation: Any = None) -> Any:
     """A value of a scenario as its file has it: quantities as text with their SI unit, exact; nothing that is None."""
     if isinstance(value, BaseModel):
         fields = type(value).model_fields
         return {
-            info.alias or name: plain(inner, Annotated[(info.annotation, *info.metadata, None)])
+            info.alias or name: plain_value(inner, Annotated[(info.annotation, *info.metadata, None)])
             for name, info in fields.items()
             if (inner := getattr(value, name)) is not None
         }
     options = list(_options(annotation))
     if isinstance(value, Mapping):
         inner = next((get_args(option)[1] for option in options if get_origin(option) is dict), None)
-        return {key: plain(entry, inner) for key, entry in value.items()}
+        return {key: plain_value(entry, inner) for key, entry in value.items()}
     if isinstance(value, (tuple, list)):
         inner = next((get_args(option)[0] for option in options if get_origin(option) is tuple), None)
-        return [plain(entry, inner) for entry in value]
+        return [plain_value(entry, inner) for entry in value]
     if isinstance(value, float):
         quantity = next((note for option in options for note in _notes(option)), None)
         return f"{value!r} {quantity.unit}" if quantity is not None and quantity.unit != "1" else value
@@ -363,7 +363,7 @@ def cycles(
     return table.cycle, table.cycle, "the interval of the setpoints"
 
 
-def lacking(roles: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> list[str]:
+def missing_parameters(roles: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> list[str]:
     """Parameters that a scenario cannot do without, and an archive that calls itself shipped does not have."""
     needed = [(control, name) for control in roles.shipped_drives for name in ("T_c", "T_pos", "I_P")]
     needed += [(roles.plant, f"{axis}.{name}") for axis in roles.axes for name in ("x_0", "M_0")]
@@ -508,7 +508,7 @@ def _axis(parts: Parts, axis: str, reported: Mapping[str, Any], folder: Path) ->
     control, contact = roles.drives[axis], roles.frictions[axis]
     limits = _limits(parts.table, roles.setpoints[axis], float(plant[f"{axis}.x_0"]))
     if control in roles.foreign:
-        drive = _foreign(parts, control, DRIVE, reported, folder)
+        drive = _describe_foreign_unit(parts, control, DRIVE, reported, folder)
         pitch = reported.get("pitch") or f"{_seen_pitch(parts.table, roles.setpoints[axis])!r} m"
     else:
         drive, pitch = (
@@ -516,7 +516,7 @@ def _axis(parts: Parts, axis: str, reported: Mapping[str, Any], folder: Path) ->
             _pitch(float(parts.values[control]["I_P"]), reported.get("pitch")),
         )
     if contact in roles.foreign:
-        friction = _foreign(parts, contact, FRICTION_ROLE, reported, folder)
+        friction = _describe_foreign_unit(parts, contact, FRICTION_ROLE, reported, folder)
     else:
         identified = {key: value for key, value in reported.get("friction", {}).items() if key == "identified"}
         laws = {unit: law for law, unit in FRICTION_ROLE.others} if parts.coupling is None else {}
@@ -563,7 +563,9 @@ def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:
     return drive
 
 
-def _foreign(parts: Parts, component: str, role: Role, reported: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _describe_foreign_unit(
+    parts: Parts, component: str, role: Role, reported: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
     """A component that is no shipped unit. The wiring shows what is exchanged, the annotation what else is recorded."""
     archive, signals = parts.archives[component], parts.roles.foreign[component]
     recorded = {

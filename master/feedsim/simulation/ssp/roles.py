@@ -71,7 +71,7 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
         _drive(driven, link, archives, where, problems)
     if problems:
         raise InputError.of(where, problems)
-    return _assigned(driven, archives, where)
+    return _assign_roles(driven, archives, where)
 
 
 def _kind(archive: Archive) -> str:
@@ -155,7 +155,7 @@ def _unit(archive: Archive, variable: str) -> tuple[str | None, set[str]]:
     return unit, dimensions
 
 
-def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where: str) -> Roles:
+def _assign_roles(driven: Mapping[End, End], archives: Mapping[str, Archive], where: str) -> Roles:
     """Roles by the torques that drive the plant, then signals by what the roles' inputs are connected to."""
     plant, setpoint = (
         next(name for name, archive in archives.items() if _kind(archive) == kind) for kind in ("plant", "setpoint")
@@ -191,7 +191,7 @@ def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where:
         torque = next(name for name, entry in TORQUES.items() if entry is role)
         for axis, name in value.items():
             if not _is_shipped(archives[name], role):
-                offered = _offered(axis, role, plant, setpoint, setpoints[axis])
+                offered = _offered_signals(axis, role, plant, setpoint, setpoints[axis])
                 foreign[name] = {torque: outputs[f"{axis}.{torque}"][1]}
                 foreign[name] |= _signals(driven, name, role, offered, where, problems)
     assigned = Roles(setpoint, plant, partners[DRIVE], partners[FRICTION_ROLE], setpoints, foreign)
@@ -207,7 +207,7 @@ def _setpoint_axis(driven: Mapping[End, End], drive: str, setpoint: str) -> str 
     return next((variable.removesuffix(".x_s") for _, variable in sources if variable.endswith(".x_s")), None)
 
 
-def _offered(axis: str, role: Role, plant: str, setpoint: str, setpoint_axis: str) -> dict[End, str]:
+def _offered_signals(axis: str, role: Role, plant: str, setpoint: str, setpoint_axis: str) -> dict[End, str]:
     """What the system has for the inputs of a role: where it comes from -> signal."""
     places = {system.PLANT: (plant, axis), system.NC: (setpoint, setpoint_axis)}
     instance = system.controller(axis) if role is DRIVE else system.friction(axis)

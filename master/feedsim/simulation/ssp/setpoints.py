@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from feedsim.motions.circular import Circular
 from feedsim.motions.positioning_cycle import Visits
-from feedsim.motions.program import Programmed
-from feedsim.motions.setpoints import Recorded
+from feedsim.motions.program import ProgrammedGeometry
+from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import CircleTest, ContourTest, Positioning, PositioningAccuracy, Scenario
 from feedsim.simulation.nc import Program, Segment
-from feedsim.structure.pack import packaging, packed, setpoint_table
+from feedsim.structure.pack import pack_unit, setpoint_table, translate_packager_errors
 
-EVALUATED = {"contour": "contour error", "circle": "circularity", "positioning_accuracy": "positioning accuracy"}
+EVALUATION_NAMES = {"contour": "contour error", "circle": "circularity", "positioning_accuracy": "positioning accuracy"}
 SETPOINTS_IN_ARCHIVE = "resources/setpoints.csv"
-UNEVEN = 1e-6  # of a row, as in the unit
+ROW_TOLERANCE = 1e-6  # of a row, as in the unit
 EVALUATED_REST = 0.050  # s, behind a motion whose positioning is evaluated (feedsim.analysis)
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ class Table:
         setpoints_slack (src/setpoint_fmu/setpoints.c).
         """
         ulps = 16 * np.finfo(np.float64).eps * np.abs(time)
-        rounding = np.maximum(1e-9 * np.abs(time), max(2e-9, 2 * UNEVEN * self.cycle))
+        rounding = np.maximum(1e-9 * np.abs(time), max(2e-9, 2 * ROW_TOLERANCE * self.cycle))
         slack = np.maximum(ulps, np.minimum(rounding, 0.01 * min(step, self.cycle)))
         rows = np.floor((time - self.time[0] + slack) / self.cycle).astype(np.int64)
         return np.asarray(np.clip(rows, 0, len(self.time) - 1), dtype=np.int64)
@@ -55,8 +55,8 @@ def pack_setpoints(base: Path, out: Path, program: Program, *, name: str, note: 
         InputError: `base` is no such archive.
         OutputError: `out` cannot be written.
     """
-    with packaging():
-        packed(base, out, setpoint_table(program), name=name, note=note, trial=False)
+    with translate_packager_errors():
+        pack_unit(base, out, setpoint_table(program), name=name, note=note, trial=False)
 
 
 def read_setpoints(content: bytes, where: str) -> Table:
@@ -64,7 +64,7 @@ def read_setpoints(content: bytes, where: str) -> Table:
     from feedsim_packager import setpoints
     from feedsim_packager.resources import File
 
-    with packaging():
+    with translate_packager_errors():
         table = setpoints.read_columns(File(where, content))
     return Table(
         time=np.array(table.time, dtype=np.float64),
@@ -74,7 +74,7 @@ def read_setpoints(content: bytes, where: str) -> Table:
     )
 
 
-def agree(planned: Mapping[str, Array], table: Mapping[str, Array]) -> bool:
+def setpoints_agree(planned: Mapping[str, Array], table: Mapping[str, Array]) -> bool:
     """Whether setpoints (N,) and (M,) are the same as long as both last, and the axes of a longer table then rest."""
     if set(planned) != set(table):
         return False
@@ -103,16 +103,16 @@ def evaluation(scenario: Scenario, planned: Program, program: Program) -> tuple[
     """The scenario without what can no longer be evaluated, and what that is."""
     kept, lost = [], []
     for i, item in enumerate(scenario.evaluate):
-        needed = _needed(item, planned)
+        needed = _required_end(item, planned)
         if needed is None or needed <= program.duration + 1e-9:
             kept.append(item)  # where nothing is found the evaluation itself says why
         else:
-            what = f"positioning of {item.axis}" if isinstance(item, Positioning) else EVALUATED[item.kind]
+            what = f"positioning of {item.axis}" if isinstance(item, Positioning) else EVALUATION_NAMES[item.kind]
             lost.append(f"evaluate.{i} ({what}, to {needed:.6g} s)")
     return (scenario.model_copy(update={"evaluate": tuple(kept)}), lost) if lost else (scenario, [])
 
 
-def _needed(item: Positioning | CircleTest | PositioningAccuracy | ContourTest, planned: Program) -> float | None:
+def _required_end(item: Positioning | CircleTest | PositioningAccuracy | ContourTest, planned: Program) -> float | None:
     """Until when the motions must run for an evaluation [s]; None where they have nothing for it."""
     chosen = planned.segments if item.motion is None else planned.segments[item.motion : item.motion + 1]
     if isinstance(item, Positioning):
@@ -122,7 +122,7 @@ def _needed(item: Positioning | CircleTest | PositioningAccuracy | ContourTest, 
         cycles = [segment.end for segment in chosen if isinstance(segment.geometry, Visits)]
         return min(cycles[-1], planned.duration) if cycles else None
     if isinstance(item, ContourTest):
-        programs = [segment.end for segment in chosen if isinstance(segment.geometry, Programmed)]
+        programs = [segment.end for segment in chosen if isinstance(segment.geometry, ProgrammedGeometry)]
         return min(programs[-1], planned.duration) if programs else None
-    circles = [segment.end for segment in chosen if isinstance(segment.geometry, Circular | Recorded)]
+    circles = [segment.end for segment in chosen if isinstance(segment.geometry, Circular | RecordedGeometry)]
     return min(circles[-1], planned.duration) if circles else None

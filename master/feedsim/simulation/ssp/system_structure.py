@@ -40,7 +40,7 @@ class Binding:
 class Component:
     """An instance of the archive `source`; `box` is x1, y1, x2, y2 in a picture, y upwards.
 
-    The source is a path inside an SSP that is written, and the URI of one that was read (`archive.inside`).
+    The source is a path inside an SSP that is written, and the URI of one that was read (`archive.resolve_source`).
     """
 
     name: str
@@ -140,7 +140,7 @@ def _append(elements: archive.Element, component: Component) -> None:
             archive.child(bindings, "ssd:ParameterBinding", {"source": as_source(binding.source)})
 
 
-def read(content: bytes, where: str) -> Structure:
+def read_structure(content: bytes, where: str) -> Structure:
     """Read a document; what it cannot stand for in feedsim is refused. InputError lists every problem."""
     root = archive.parse(content, where, "ssd:SystemStructureDescription")
     system = root.find(archive.tag("ssd:System"))
@@ -151,7 +151,9 @@ def read(content: bytes, where: str) -> Structure:
     components: list[Component] = []
     for entry in () if elements is None else elements:
         if entry.tag != archive.tag("ssd:Component"):
-            problems.append(f"{where}: {archive.shown(entry.tag)} {entry.get('name')}: only components are read here")
+            problems.append(
+                f"{where}: {archive.prefixed_tag(entry.tag)} {entry.get('name')}: only components are read here"
+            )
         else:
             components.append(_component(entry, where, problems))
     names = [component.name for component in components]
@@ -192,7 +194,7 @@ def _component(entry: archive.Element, where: str, problems: list[str]) -> Compo
     connectors = []
     for place in entry.findall(f"{archive.tag('ssd:Connectors')}/{archive.tag('ssd:Connector')}"):
         typed = next((element for element in place if element.tag.startswith(f"{{{archive.SSC}}}")), None)
-        type_ = "Real" if typed is None else archive.shown(typed.tag).partition(":")[2]
+        type_ = "Real" if typed is None else archive.prefixed_tag(typed.tag).partition(":")[2]
         unit = None if typed is None else typed.get("unit")
         connectors.append(Connector(place.get("name", ""), place.get("kind", ""), type_, unit))
     return Component(

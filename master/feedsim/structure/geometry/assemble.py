@@ -14,10 +14,18 @@ from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.checks import contradictions, held, load_structure, node, nodes, pose_faults, rail
+from feedsim.scenario.structure.checks import (
+    contradictions,
+    load_structure,
+    node,
+    nodes,
+    pose_faults,
+    rail,
+    resolve_attachment,
+)
 from feedsim.scenario.structure.parts import Drive, GeometryStructure, Hold, Mount
 from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort, State
-from feedsim.structure.geometry.mesh import FRAME, Mesh, Row, rigid, symmetric, weighted
+from feedsim.structure.geometry.mesh import FRAME, Mesh, Row, rigid_grip, sum_weighted_rows, symmetric
 
 # --- Springs of a machine at a pose, each a stiffness and the row of the elongation it resists; and the ports ---------
 # Mounts hold the bed on the ground, carriages hold bodies on rails, bearings hold screws, nuts join bodies to screws,
@@ -33,7 +41,7 @@ def mount_rows(mesh: Mesh, name: str) -> Iterator[tuple[str, Mount, int, Row]]:
     for mount in mesh.structure.bodies[name].mounts:
         for item in (item for text in mount.nodes for item in nodes(mesh.structure, name, text)):
             number = mesh.number(item)
-            grip = rigid(np.array(mount.offset), np.zeros((1, 3)), [int(mesh.first_dof[number])])
+            grip = rigid_grip(np.array(mount.offset), np.zeros((1, 3)), [int(mesh.first_dof[number])])
             for d, (letter, direction) in enumerate(FRAME_BY_LETTER):
                 yield f"{item} {letter}", mount, d, grip.displacement(direction)
 
@@ -47,8 +55,8 @@ def body_springs(mesh: Mesh, origins: Mapping[str, Floats], positions: Floats) -
         for carriage in body.carriages:
             point = origins[name] + carriage.at
             number = mesh.number(nodes(structure, name, carriage.node)[0])
-            mine = rigid(point, positions[[number]], [int(mesh.first_dof[number])])
-            rails = mesh.riding(point, mesh.rail(rail(structure, carriage.rail)), positions)
+            mine = rigid_grip(point, positions[[number]], [int(mesh.first_dof[number])])
+            rails = mesh.rail_grip_at(point, mesh.rail(rail(structure, carriage.rail)), positions)
             for way in carriage.directions:
                 direction = np.array(way)
                 yield carriage.stiffness, mine.displacement(direction) - rails.displacement(direction)
@@ -62,13 +70,13 @@ def drive_springs(mesh: Mesh, axis: str, origins: Mapping[str, Floats], position
     for bearing in drive.bearings:
         end = screw[0] if bearing.at == "start" else screw[-1]
         point = positions[end]
-        carrier = mesh.grip(point, held(structure, bearing.held_by), positions)
-        journal = rigid(point, point[None], [int(mesh.first_dof[end])])
+        carrier = mesh.grip(point, resolve_attachment(structure, bearing.held_by), positions)
+        journal = rigid_grip(point, point[None], [int(mesh.first_dof[end])])
         for direction, stiffness in _along_and_across(along, bearing.axial, bearing.radial):
             yield stiffness, carrier.displacement(direction) - journal.displacement(direction)
     yield from _nut(mesh, drive, along, screw, origins, positions)
     rotor = Row(np.array([mesh.rotor(axis)]), np.ones(1))
-    start = rigid(positions[screw[0]], positions[[screw[0]]], [int(mesh.first_dof[screw[0]])])
+    start = rigid_grip(positions[screw[0]], positions[[screw[0]]], [int(mesh.first_dof[screw[0]])])
     yield drive.rotor.coupling, rotor - start.rotation(along)
 
 
@@ -78,9 +86,13 @@ def _nut(
     """Along the screw: u_nut - u_screw - I_P (phi_screw - phi_nut); across it: u_nut - u_screw."""
     nut = drive.nut
     point = origins[nut.body] + nut.at
-    carrier = mesh.grip(point, held(mesh.structure, nut.held_by), positions)
-    turning = carrier if nut.rotation_of is None else mesh.grip(point, held(mesh.structure, nut.rotation_of), positions)
-    thread = mesh.riding(point, screw, positions)
+    carrier = mesh.grip(point, resolve_attachment(mesh.structure, nut.held_by), positions)
+    turning = (
+        carrier
+        if nut.rotation_of is None
+        else mesh.grip(point, resolve_attachment(mesh.structure, nut.rotation_of), positions)
+    )
+    thread = mesh.rail_grip_at(point, screw, positions)
     for direction, stiffness in _along_and_across(along, nut.axial, nut.radial):
         elongation = carrier.displacement(direction) - thread.displacement(direction)
         if direction is along:
@@ -106,13 +118,14 @@ def ports(mesh: Mesh, origins: Mapping[str, Floats], positions: Floats) -> dict[
     result: dict[str, Floats] = {}
     for name, axis in structure.axes.items():
         carrier = mesh.number(node(structure, axis.drive.stator.node))
-        housing = rigid(positions[carrier], positions[[carrier]], [int(mesh.first_dof[carrier])])
+        housing = rigid_grip(positions[carrier], positions[[carrier]], [int(mesh.first_dof[carrier])])
         rotor = Row(np.array([mesh.rotor(name)]), np.ones(1))
         result[f"n_{name}"] = (rotor - housing.rotation(np.array(axis.direction))).dense(size)
     for name, axis in structure.axes.items():
         point, along = origins[axis.scale.body] + axis.scale.at, np.array(axis.direction)
         moving, against = (
-            mesh.grip(point, held(structure, texts), positions) for texts in (axis.scale.moving, axis.scale.against)
+            mesh.grip(point, resolve_attachment(structure, texts), positions)
+            for texts in (axis.scale.moving, axis.scale.against)
         )
         result[f"x_{name}"] = (moving.displacement(along) - against.displacement(along)).dense(size)
     mine, other = (_tool(mesh, texts, origins, positions) for texts in (structure.tool.held_by, structure.tool.against))
@@ -124,7 +137,7 @@ def ports(mesh: Mesh, origins: Mapping[str, Floats], positions: Floats) -> dict[
 def _tool(mesh: Mesh, texts: Hold, origins: Mapping[str, Floats], positions: Floats) -> Floats:
     """(3, N) displacement in X, Y and Z of what is held at the tool centre point."""
     tool = mesh.structure.tool
-    grip = mesh.grip(origins[tool.body] + tool.at, held(mesh.structure, texts), positions)
+    grip = mesh.grip(origins[tool.body] + tool.at, resolve_attachment(mesh.structure, texts), positions)
     return np.array([grip.displacement(direction).dense(mesh.size) for direction in FRAME])
 
 
@@ -160,7 +173,7 @@ class Assembler:
         return Assembly(
             name=structure.name or "structure",
             mass=mesh.mass,
-            stiffness=symmetric(mesh.stiffness + weighted(springs, mesh.size)),
+            stiffness=symmetric(mesh.stiffness + sum_weighted_rows(springs, mesh.size)),
             ports=ports(mesh, origins, positions),
             axes=tuple(structure.axes),
             labels=mesh.labels,

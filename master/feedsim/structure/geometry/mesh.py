@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.scenario.structure.checks import Held, Line, Node, nodes
+from feedsim.scenario.structure.checks import Attachment, Line, Node, nodes
 from feedsim.scenario.structure.parts import GeometryStructure, NodeGroup
 
 if TYPE_CHECKING:
@@ -82,13 +82,13 @@ class Grip:
         return Row(dofs.ravel(), (self.weights[:, None] * direction).ravel())
 
 
-def rigid(point: Floats, nodes: Floats, dofs: Iterable[int]) -> Grip:
+def rigid_grip(point: Floats, nodes: Floats, dofs: Iterable[int]) -> Grip:
     """A point held by the mean of nodes at (n, 3) positions."""
     first = np.fromiter(dofs, dtype=np.int64)
     return Grip(first, np.full(len(first), 1 / len(first)), point - nodes)
 
 
-def riding(point: Floats, line: Floats, first_dof: int) -> Grip:
+def rail_grip(point: Floats, line: Floats, first_dof: int) -> Grip:
     """A point that rides on a line of equally spaced nodes at (n, 3) positions, 6 degrees of freedom each.
 
     The two neighbours along the line hold it with the weights 1 - w and w = t^2 (3 - 2 t), t the fraction of the way
@@ -179,7 +179,7 @@ def rod(diameter: float, material: Material) -> BeamProperties:
 
 
 # A beam within acos 0.9 = 26 degrees of the vertical counts as upright: its local y turns towards Z.
-UPRIGHT = 0.9
+UPRIGHT_COSINE = 0.9
 Y, Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
@@ -213,7 +213,7 @@ def beam_axes(along: ArrayLike, up: ArrayLike | None = None) -> Floats:
     ex = np.asarray(along, dtype=np.float64)
     ex = ex / np.linalg.norm(ex)
     if up is None:
-        up = Z if abs(ex @ Y) >= UPRIGHT else Y
+        up = Z if abs(ex @ Y) >= UPRIGHT_COSINE else Y
     ez = np.cross(ex, np.asarray(up, dtype=np.float64))
     ez /= np.linalg.norm(ez)
     return np.array([ex, np.cross(ez, ex), ez])
@@ -319,17 +319,17 @@ class Mesh:
         shifts: Floats = np.array([origins[carrier] for carrier in self.carriers])
         return self.local + shifts
 
-    def grip(self, point: Floats, fixed: Held, positions: Floats) -> Grip:
+    def grip(self, point: Floats, fixed: Attachment, positions: Floats) -> Grip:
         """How nodes hold a point of the machine's frame, nodes being at `positions`."""
         if fixed.rail is not None:
-            return self.riding(point, self.rail(fixed.rail), positions)
+            return self.rail_grip_at(point, self.rail(fixed.rail), positions)
         numbers = [self.number(node) for node in fixed.nodes]
-        return rigid(point, positions[numbers], self.first_dof[numbers])
+        return rigid_grip(point, positions[numbers], self.first_dof[numbers])
 
-    def riding(self, point: Floats, numbers: range, positions: Floats) -> Grip:
+    def rail_grip_at(self, point: Floats, numbers: range, positions: Floats) -> Grip:
         """How a line of nodes holds a point that rides on it."""
         line = positions[numbers.start : numbers.stop]
-        return riding(point, line, int(self.first_dof[numbers.start]))
+        return rail_grip(point, line, int(self.first_dof[numbers.start]))
 
     def rail(self, line: Line) -> range:
         """Numbers of the nodes of a line."""
@@ -361,7 +361,7 @@ class Mesh:
         stiffness, mass = (
             coo_array((np.array([pair[k] for pair in elements]).ravel(), at), shape=shape).tocsc() for k in (0, 1)
         )
-        return symmetric(stiffness), symmetric(mass + weighted(list(self._inertias()), self.size))
+        return symmetric(stiffness), symmetric(mass + sum_weighted_rows(list(self._inertias()), self.size))
 
     def _add(self, body: str, carrier: str, names: list[str]) -> None:
         self.names += names
@@ -409,7 +409,7 @@ class Mesh:
     def _rigid_mass(
         self, node: int, offset: Floats | tuple[float, ...], mass: float, inertia: tuple[float, ...]
     ) -> Iterator[tuple[float, Row]]:
-        grip = rigid(np.asarray(offset), np.zeros((1, 3)), [int(self.first_dof[node])])
+        grip = rigid_grip(np.asarray(offset), np.zeros((1, 3)), [int(self.first_dof[node])])
         for direction, moment in zip(FRAME, inertia, strict=True):
             yield mass, grip.displacement(direction)
             yield moment, grip.rotation(direction)
@@ -431,7 +431,7 @@ def node_of(text: str) -> Node:
     return Node(body, name, int(index[0]) if index else None)
 
 
-def weighted(terms: list[tuple[float, Row]], size: int) -> csc_array:
+def sum_weighted_rows(terms: list[tuple[float, Row]], size: int) -> csc_array:
     """(size, size) sum of weight b b^T over rows b."""
     from scipy.sparse import csr_array
 

@@ -13,10 +13,10 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.scenario.structure.checks import held, nodes, rail
+from feedsim.scenario.structure.checks import nodes, rail, resolve_attachment
 from feedsim.scenario.structure.parts import GeometryStructure, Section
 from feedsim.structure.assembly import Assembly, Floats, Geometry, Integers
-from feedsim.structure.geometry.mesh import Grip, Mesh, area_moments, beam_axes, rigid
+from feedsim.structure.geometry.mesh import Grip, Mesh, area_moments, beam_axes, rigid_grip
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def outline(structure: GeometryStructure, assembly: Assembly) -> Outline:
 
 def _sections(structure: GeometryStructure) -> Iterator[tuple[tuple[float, float], bool]]:
     """Height and width of each beam's section and whether it is round, in the order of the mesh's beams."""
-    looks = {name: _looks(section) for name, section in structure.sections.items()}
+    looks = {name: _drawn_section(section) for name, section in structure.sections.items()}
     for name, body in structure.bodies.items():
         for group in body.nodes.values():
             if group.section is not None and group.count is not None:
@@ -102,7 +102,7 @@ def _sections(structure: GeometryStructure) -> Iterator[tuple[tuple[float, float
         yield from [((screw.diameter, screw.diameter), True)] * (screw.nodes - 1)
 
 
-def _looks(section: Section) -> tuple[tuple[float, float], bool]:
+def _drawn_section(section: Section) -> tuple[tuple[float, float], bool]:
     if section.kind in ("box", "rectangle"):
         return (section.height, section.width), False
     if section.kind in ("rod", "tube"):
@@ -115,7 +115,7 @@ def _features(mesh: Mesh, origins: dict[str, Floats], positions: Floats) -> Iter
     structure = mesh.structure
 
     def at(number: int, point: Floats) -> Grip:
-        return rigid(point, positions[[number]], [int(mesh.first_dof[number])])
+        return rigid_grip(point, positions[[number]], [int(mesh.first_dof[number])])
 
     for name, body in structure.bodies.items():
         for mass in body.masses:
@@ -130,26 +130,30 @@ def _features(mesh: Mesh, origins: dict[str, Floats], positions: Floats) -> Iter
             point = origins[name] + carriage.at
             number = mesh.number(nodes(structure, name, carriage.node)[0])
             yield Feature("carriage", "", name, point, at(number, point))
-            rails = mesh.riding(point, mesh.rail(rail(structure, carriage.rail)), positions)
+            rails = mesh.rail_grip_at(point, mesh.rail(rail(structure, carriage.rail)), positions)
             yield Feature("rail", "", rail(structure, carriage.rail).body, point, rails)
     for name, axis in structure.axes.items():
         drive, screw = axis.drive, mesh.screw(name)
         for bearing in drive.bearings:
             point = positions[screw[0] if bearing.at == "start" else screw[-1]]
-            grip = mesh.grip(point, held(structure, bearing.held_by), positions)
+            grip = mesh.grip(point, resolve_attachment(structure, bearing.held_by), positions)
             yield Feature("bearing", name, drive.screw.body, point, grip)
         point = origins[drive.nut.body] + drive.nut.at
-        grip = mesh.grip(point, held(structure, drive.nut.held_by), positions)
+        grip = mesh.grip(point, resolve_attachment(structure, drive.nut.held_by), positions)
         yield Feature("nut", name, drive.nut.body, point, grip)
         yield Feature("motor", name, f"rotor {name}", positions[screw[0]], at(screw[0], positions[screw[0]]))
         point = origins[axis.scale.body] + axis.scale.at
         yield Feature(
-            "scale", name, axis.scale.body, point, mesh.grip(point, held(structure, axis.scale.moving), positions)
+            "scale",
+            name,
+            axis.scale.body,
+            point,
+            mesh.grip(point, resolve_attachment(structure, axis.scale.moving), positions),
         )
     tool = structure.tool
     point = origins[tool.body] + tool.at
     for kind, who in (("tool", tool.held_by), ("workpiece", tool.against)):
-        yield Feature(kind, "", tool.body, point, mesh.grip(point, held(structure, who), positions))
+        yield Feature(kind, "", tool.body, point, mesh.grip(point, resolve_attachment(structure, who), positions))
 
 
 def _blocks(

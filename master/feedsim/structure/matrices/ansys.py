@@ -15,16 +15,16 @@ import numpy as np
 from feedsim.files import source
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario.structure.parts import AnsysStructure
-from feedsim.structure.assembly import DEGREES, counted
-from feedsim.structure.matrices.tables import FREEDOM_NAMES, Raw, from_triangle, read_points
+from feedsim.structure.assembly import DEGREES, count_text
+from feedsim.structure.matrices.tables import FREEDOM_NAMES, RawModel, from_triangle, read_points
 
 READER = "ansys.mapdl.reader"
 INSTALL = "make ansys (outside a checkout: pip install --no-deps ansys-mapdl-reader)"
 # ANSYS numbers its degrees of freedom UX, UY, UZ, ROTX, ROTY, ROTZ from 1.
-MECHANICAL = range(1, len(FREEDOM_NAMES) + 1)
+MECHANICAL_DIRECTIONS = range(1, len(FREEDOM_NAMES) + 1)
 
 
-def read(structure: AnsysStructure) -> Raw:
+def read_model(structure: AnsysStructure) -> RawModel:
     """The model, constrained degrees of freedom marked.
 
     Raises:
@@ -65,9 +65,9 @@ def read(structure: AnsysStructure) -> Raw:
         entries = matrix.tocoo()
         rows, columns = entries.row.astype(np.int64), entries.col.astype(np.int64)
         matrices.append(from_triangle(rows, columns, entries.data.astype(np.float64), len(nodes), file))
-    text = f"{counted(int(fixed.sum()), *DEGREES)} constrained: removed"
+    text = f"{count_text(int(fixed.sum()), *DEGREES)} constrained: removed"
     notes = (Finding("freedom-constrained", "doubt", text),) if np.any(fixed) else ()
-    return Raw(
+    return RawModel(
         matrices[0],
         matrices[1],
         nodes,
@@ -116,7 +116,7 @@ def _kinds(file: Path) -> list[int]:
 
 def _directions(file: Path, reference: np.ndarray, kinds: list[int]) -> np.ndarray:
     """(N,) 0 ... 5. The reader counts each node's degrees of freedom; `kinds` says what the count means."""
-    others = [kind for kind in kinds if kind not in MECHANICAL]
+    others = [kind for kind in kinds if kind not in MECHANICAL_DIRECTIONS]
     if others:
         raise InputError(f"{file}: degrees of freedom other than displacements and rotations (ANSYS numbers {others})")
     counts = np.asarray(reference[:, 1], dtype=np.int64)

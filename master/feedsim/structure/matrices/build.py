@@ -24,13 +24,13 @@ from feedsim.scenario.structure.parts import (
     MatrixMarketStructure,
     UnitSystem,
 )
-from feedsim.structure.assembly import DEGREES, Assembly, Floats, Geometry, Integers, counted, few
+from feedsim.structure.assembly import DEGREES, Assembly, Floats, Geometry, Integers, count_text, shorten_labels
 from feedsim.structure.matrices import ansys, calculix
 from feedsim.structure.matrices.tables import (
     FREEDOM_NAMES,
     NodeTable,
     Points,
-    Raw,
+    RawModel,
     from_both,
     from_triangle,
     read_nodes,
@@ -45,7 +45,7 @@ from feedsim.structure.modes import TOOL_PORTS
 MAX_MATRIX_ROWS = 50_000_000  # rows
 
 
-def read(structure: MatrixMarketStructure) -> Raw:
+def read_matrix_market(structure: MatrixMarketStructure) -> RawModel:
     """The model. Degrees of freedom with neither mass nor stiffness count as constrained.
 
     Raises:
@@ -62,10 +62,10 @@ def read(structure: MatrixMarketStructure) -> Raw:
     fixed = (np.diff(mass.indptr) == 0) & (np.diff(stiffness.indptr) == 0)
     notes = []
     if np.any(fixed):
-        text = f"{counted(int(fixed.sum()), *DEGREES)} without mass and stiffness: removed as constrained"
+        text = f"{count_text(int(fixed.sum()), *DEGREES)} without mass and stiffness: removed as constrained"
         notes.append(Finding("freedom-constrained", "doubt", text))
     absent = f"no column of {structure.nodes} gives it a degree of freedom" if structure.nodes else ""
-    return Raw(mass, stiffness, table.nodes, table.directions, fixed, absent, table.points, tuple(notes))
+    return RawModel(mass, stiffness, table.nodes, table.directions, fixed, absent, table.points, tuple(notes))
 
 
 def read_matrix(file: Path, what: str) -> sparse.csc_array:
@@ -135,31 +135,31 @@ def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
 
 
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedModel:
     """An imported model, and what a person should know of the import."""
 
     assembly: Assembly
     notes: tuple[Finding, ...]
 
 
-def import_model(structure: FiniteElements) -> Imported:
+def import_model(structure: FiniteElements) -> ImportedModel:
     """The model of a structure file of kind matrices, ansys or calculix, and notes on the import.
 
     Raises:
         InputError: a file is not readable or the files contradict one another.
     """
     if isinstance(structure, MatrixMarketStructure):
-        raw, file = read(structure), structure.stiffness
+        raw, file = read_matrix_market(structure), structure.stiffness
     elif isinstance(structure, AnsysStructure):
-        raw, file = ansys.read(structure), structure.full
+        raw, file = ansys.read_model(structure), structure.full
     elif isinstance(structure, CalculixStructure):
-        raw, file = calculix.read(structure), structure.stiffness
+        raw, file = calculix.read_model(structure), structure.stiffness
     else:
         raise TypeError(f"no kind of finite-element model: {type(structure).__name__}")
     return build(structure, structure.units, raw, structure.name or str(file))
 
 
-def build(structure: FiniteElements, system: UnitSystem, raw: Raw, name: str) -> Imported:
+def build(structure: FiniteElements, system: UnitSystem, raw: RawModel, name: str) -> ImportedModel:
     """The model without its constrained degrees of freedom, in SI.
 
     Raises:
@@ -182,11 +182,11 @@ def build(structure: FiniteElements, system: UnitSystem, raw: Raw, name: str) ->
         raise InputError(f"{name}: all {raw.size} degrees of freedom are constrained; nothing can move")
     rotation = raw.directions[kept] >= 3
     labels = raw.labels()
-    notes = [*raw.notes, *_dropped(vectors, raw, labels)]
+    notes = [*raw.notes, *_note_ineffective_ports(vectors, raw, labels)]
     assembly = Assembly(
         name=name,
-        mass=scaled(raw.mass[kept][:, kept], rotation, length, mass),
-        stiffness=scaled(raw.stiffness[kept][:, kept], rotation, length, mass / time**2),
+        mass=scale_matrix(raw.mass[kept][:, kept], rotation, length, mass),
+        stiffness=scale_matrix(raw.stiffness[kept][:, kept], rotation, length, mass / time**2),
         ports={
             port: port_vector(vector[kept], rotation, length, angle=port.startswith("n_"))
             for port, vector in vectors.items()
@@ -197,21 +197,21 @@ def build(structure: FiniteElements, system: UnitSystem, raw: Raw, name: str) ->
         pose=dict(structure.pose),
         units=system,
     )
-    return Imported(assembly, tuple(notes))
+    return ImportedModel(assembly, tuple(notes))
 
 
-def _dropped(vectors: dict[str, Floats], raw: Raw, labels: tuple[str, ...]) -> list[Finding]:
+def _note_ineffective_ports(vectors: dict[str, Floats], raw: RawModel, labels: tuple[str, ...]) -> list[Finding]:
     """A stator on the ground moves nothing: right, but worth a word."""
     notes = []
     for port, vector in vectors.items():
         on = np.flatnonzero((vector != 0) & raw.fixed)
         if len(on):
-            text = f"port {port}: constrained degrees of freedom add nothing ({few(labels, on)})"
+            text = f"port {port}: constrained degrees of freedom add nothing ({shorten_labels(labels, on)})"
             notes.append(Finding("port-on-constrained", "doubt", text, port))
     return notes
 
 
-def _geometry(points: Points, raw: Raw, kept: Integers, length: float) -> Geometry:
+def _geometry(points: Points, raw: RawModel, kept: Integers, length: float) -> Geometry:
     new = np.full(raw.size, -1, dtype=np.int64)
     new[kept] = np.arange(len(kept))
     dofs = np.full((len(points.ids), len(FREEDOM_NAMES)), -1, dtype=np.int64)
@@ -232,7 +232,7 @@ def factors(system: UnitSystem) -> tuple[float, float, float]:
     )
 
 
-def scaled(matrix: sparse.csc_array, rotation: np.ndarray, length: float, factor: float) -> sparse.csc_array:
+def scale_matrix(matrix: sparse.csc_array, rotation: np.ndarray, length: float, factor: float) -> sparse.csc_array:
     """factor L2 D A D; `rotation` (N,) says which degrees of freedom are rotations."""
     if length == 1 and factor == 1:
         return matrix

@@ -14,21 +14,21 @@ import numpy as np
 from scipy import sparse
 
 from feedsim.files import source
-from feedsim.files.source import referred
+from feedsim.files.source import resolve_reference
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.structure.parts import CalculixStructure
 from feedsim.structure.assembly import Integers
-from feedsim.structure.matrices.tables import FREEDOM_NAMES, Points, Raw, from_triangle, read_points
+from feedsim.structure.matrices.tables import FREEDOM_NAMES, Points, RawModel, from_triangle, read_points
 
 # Types of elements that CalculiX makes solids of: beams, shells, plane and axisymmetric ones, membranes, trusses.
-_EXPANDED = re.compile(r"B2|B3|S[0-9]|CP[SE]|CAX|M3D|T[23]D")
-ABSENT = (
+_EXPANDED_ELEMENTS = re.compile(r"B2|B3|S[0-9]|CP[SE]|CAX|M3D|T[23]D")
+ABSENT_FREEDOM_ADVICE = (
     "CalculiX has eliminated it: leave the row out if the node is held there (*BOUNDARY), name the node it depends on "
     "if it is tied (*EQUATION, *TIE, *RIGID BODY)"
 )
 
 
-def read(structure: CalculixStructure) -> Raw:
+def read_model(structure: CalculixStructure) -> RawModel:
     """The model; constrained degrees of freedom are in none of the files.
 
     Raises:
@@ -42,7 +42,7 @@ def read(structure: CalculixStructure) -> Raw:
         points = read_mesh(structure.mesh)
     elif structure.nodes is not None:
         points = read_points(structure.nodes, structure.lines)
-    return Raw(mass, stiffness, nodes, directions, np.zeros(len(nodes), dtype=bool), ABSENT, points)
+    return RawModel(mass, stiffness, nodes, directions, np.zeros(len(nodes), dtype=bool), ABSENT_FREEDOM_ADVICE, points)
 
 
 def _dofs(file: Path, mesh: Path | None) -> tuple[tuple[str, ...], Integers]:
@@ -60,7 +60,8 @@ def _dofs(file: Path, mesh: Path | None) -> tuple[tuple[str, ...], Integers]:
             raise InputError(f"{file}:{line}: {text.strip()!r}; node.direction is expected, such as 12.3")
         if (node, direction) in seen:
             raise InputError(
-                f"{file}:{line}: node {node} {FREEDOM_NAMES[int(direction) - 1]} occurs twice. {_expanded(mesh)}"
+                f"{file}:{line}: node {node} {FREEDOM_NAMES[int(direction) - 1]} occurs twice. "
+                f"{_explain_expansion(mesh)}"
             )
         seen.add((node, direction))
         nodes.append(node)
@@ -70,10 +71,10 @@ def _dofs(file: Path, mesh: Path | None) -> tuple[tuple[str, ...], Integers]:
     return tuple(nodes), np.array(directions, dtype=np.int64)
 
 
-def _expanded(mesh: Path | None) -> str:
+def _explain_expansion(mesh: Path | None) -> str:
     """Why nodes occur several times, and what to do."""
     types = [] if mesh is None else [options.get("TYPE", "").upper() for _, options in _elements(mesh)]
-    there = ", ".join(dict.fromkeys(name for name in types if _EXPANDED.match(name)))
+    there = ", ".join(dict.fromkeys(name for name in types if _EXPANDED_ELEMENTS.match(name)))
     shown = f" ({mesh} has {there})" if there else ""
     return (
         f"CalculiX expands beams, shells and other flat elements into solids{shown}, whose nodes share a number. "
@@ -93,7 +94,7 @@ def _matrix(file: Path, size: int, dofs: Path) -> sparse.csc_array:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of an empty file, which is reported below
-            with source.opened(file) as stream:
+            with source.open_file(file) as stream:
                 table = np.loadtxt(stream, dtype=np.float64, ndmin=2, encoding="ascii")
     except ValueError as error:
         raise InputError(f"{file}: lines of row, column and value are expected: {error}") from error
@@ -177,7 +178,7 @@ class _Reader:
         elif self._keyword == "ELEMENT":
             if not self._open:
                 self._where = where
-            self._open += [_whole(where, cell) for cell in text.split(",") if cell.strip()]
+            self._open += [_whole_number(where, cell) for cell in text.split(",") if cell.strip()]
             self._element()
 
     def close(self) -> None:
@@ -192,7 +193,7 @@ class _Reader:
             position = [float(cell) if cell else 0.0 for cell in [*cells[1:4], "", "", ""][:3]]
         except ValueError:
             raise InputError(f"{where}: {text!r}; node, x, y, z are expected") from None
-        self.nodes[_whole(where, cells[0])] = (position[0], position[1], position[2])
+        self.nodes[_whole_number(where, cells[0])] = (position[0], position[1], position[2])
 
     def _element(self) -> None:
         count = self._type_known()
@@ -234,7 +235,7 @@ def _cards(file: Path, depth: int = 0) -> Iterator[tuple[str, str]]:
             if keyword == "INCLUDE":
                 if depth == MAX_INCLUDE_DEPTH:
                     raise InputError(f"{file}:{number}: files include one another more than {MAX_INCLUDE_DEPTH} deep")
-                yield from _cards(referred(file.parent, options.get("INPUT", "")), depth + 1)
+                yield from _cards(resolve_reference(file.parent, options.get("INPUT", "")), depth + 1)
                 continue
         yield f"{file}:{number}", text
 
@@ -246,7 +247,7 @@ def _options(text: str) -> tuple[str, dict[str, str]]:
     return first[1:].strip().upper(), {key.strip().upper(): value.strip() for key, _, value in pairs}
 
 
-def _whole(where: str, cell: str) -> int:
+def _whole_number(where: str, cell: str) -> int:
     if not cell.strip().isdecimal():
         raise InputError(f"{where}: {cell.strip()!r} is no number of a node or element")
     return int(cell)

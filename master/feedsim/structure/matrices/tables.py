@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from feedsim.files.fields import did_you_mean
-from feedsim.files.trace.cells import named_columns, twice
+from feedsim.files.trace.cells import duplicate_names, named_columns
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.structure.assembly import Floats, Integers, few
+from feedsim.structure.assembly import Floats, Integers, shorten_labels
 from feedsim.structure.modes import TOOL_PORTS
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
-class Raw:
+class RawModel:
     """Matrices with their degrees of freedom as the file counts them.
 
     Attributes:
@@ -192,7 +192,7 @@ def read_table(file: Path, what: str, headers: Sequence[Sequence[str]], optional
     problems = [
         f"{file}:1: unknown column {name!r}{did_you_mean(name, known)}" for name in columns if name not in known
     ]
-    problems += [f"{file}:1: column {name!r} occurs twice" for name in twice(columns)]
+    problems += [f"{file}:1: column {name!r} occurs twice" for name in duplicate_names(columns)]
     problems += [
         f"{file}:{number}: {len(row)} cells; the header has {len(columns)}"
         for number, row in lines[1:]
@@ -311,7 +311,7 @@ SPELLINGS = {
 }
 
 
-def read_ports(file: Path, raw: Raw, axes: Sequence[str]) -> dict[str, Floats]:
+def read_ports(file: Path, raw: RawModel, axes: Sequence[str]) -> dict[str, Floats]:
     """Vectors (N,) of the ports, in the file's units, constrained degrees of freedom included.
 
     Ports of the tool that the table does not name are zero: nothing acts there and nothing is seen.
@@ -324,7 +324,7 @@ def read_ports(file: Path, raw: Raw, axes: Sequence[str]) -> dict[str, Floats]:
     wanted = [f"{quantity}_{axis}" for axis in axes for quantity in ("n", "x")]
     vectors = {port: np.zeros(raw.size) for port in (*wanted, *TOOL_PORTS)}
     problems = [
-        f"{file}: no row of port {port!r} ({_meaning(port)})"
+        f"{file}: no row of port {port!r} ({_port_meaning(port)})"
         for port in wanted
         if all(row["port"] != port for row in rows)
     ]
@@ -344,7 +344,7 @@ def read_ports(file: Path, raw: Raw, axes: Sequence[str]) -> dict[str, Floats]:
     named = {row["port"] for row in rows}
     for port, vector in vectors.items() if not problems else ():
         if port in named and np.any(vector) and not np.any(vector[~raw.fixed]):
-            on = few(find.labels, np.flatnonzero(vector))
+            on = shorten_labels(find.labels, np.flatnonzero(vector))
             problems.append(f"{file}: port {port!r} acts on constrained degrees of freedom alone ({on}): nothing moves")
     if problems:
         raise InputError.of(f"{file}: not a usable table of ports", problems[:MOST_PROBLEMS])
@@ -354,7 +354,7 @@ def read_ports(file: Path, raw: Raw, axes: Sequence[str]) -> dict[str, Floats]:
 class _Finder:
     """The degree of freedom that a row of the table names."""
 
-    def __init__(self, file: Path, raw: Raw) -> None:
+    def __init__(self, file: Path, raw: RawModel) -> None:
         self.file, self.raw = file, raw
         self.labels = raw.labels()
         pairs = zip(raw.nodes, raw.directions.tolist(), strict=True) if raw.nodes else ()
@@ -384,6 +384,6 @@ class _Finder:
         )
 
 
-def _meaning(port: str) -> str:
+def _port_meaning(port: str) -> str:
     kind = "rotor against stator: torque in, angle out" if port.startswith("n_") else "linear scale: travel out"
     return f"{kind}; axes: names {port[2:]}"

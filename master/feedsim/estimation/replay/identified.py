@@ -211,7 +211,7 @@ def _shapes(D: Array, e: Array) -> list[tuple[float, float] | None]:
 OF_MACHINE = "of the machine"
 
 
-def _tied(axis: str, limit: float, share: float) -> Finding:
+def _find_clipped_torque(axis: str, limit: float, share: float) -> Finding:
     """That the torque of so many rows [1] is the largest one [N.m] to the last digit."""
     remedy = "Record with a wider range, or drive more gently"
     return Finding(
@@ -289,7 +289,7 @@ def identify_drives(
                 marked, share = tied_at_limit(whole.record)
                 whole = replace(whole, record=marked)
                 if share and not said:
-                    said = (_tied(axis, float(np.max(np.abs(marked.torque))), share),)
+                    said = (_find_clipped_torque(axis, float(np.max(np.abs(marked.torque))), share),)
             own, lines = without_outside(whole, J)
             begins[axis] = _find_fit_start(own) if machine is None else None
             fitted[axis], outside[axis] = own, lines

@@ -554,7 +554,7 @@ def with_either(estimates: Mapping[str, Estimate], other: OtherCycle) -> dict[st
 FITTED_SHARE = 0.5  # of what the test needs: a rival that is predicted to gain less is not fitted
 # A rival is given up that does not reach the fit without it by so many times of what differences predict, or has so
 # many times its cost where they were taken so often.
-FURTHER, FAR, MAX_FAR = 2.0, 2.0, 2
+PREDICTION_FACTOR, COST_FACTOR, DIFFERENCES_TO_JUDGE = 2.0, 2.0, 2
 ERROR_RATE = 0.01  # of each test: how often a rival is taken that the axis does not have
 CURRENT_DAMPING, OTHER_DAMPING = 1.0, 0.7  # of the low-pass that stands for a current loop: at first, and as it begins
 BEGIN_CURRENT = 1400.0  # [Hz] of that low-pass: twice the bandwidth
@@ -702,7 +702,9 @@ def _best_fit(
 
     def is_none(point: Point, predicted: float, taken: int) -> bool:
         cost = problem.cost(tuple(names), point)
-        return cost - FURTHER * predicted > without or (taken >= MAX_FAR and cost > FAR * without)
+        return cost - PREDICTION_FACTOR * predicted > without or (
+            taken >= DIFFERENCES_TO_JUDGE and cost > COST_FACTOR * without
+        )
 
     # What delays the speed setpoint is beside what the symmetry filter has to match.
     later = problem.start["T_sym"] + 2 * rival.begin.get("D", 0.0) / rival.begin.get("omega_0", 1.0)

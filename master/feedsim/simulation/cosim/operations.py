@@ -56,7 +56,7 @@ class Bond:
     n_end: Floats
     residual: Floats
     residual_peak: Floats
-    dissipated_energy: Floats
+    dissipated: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -378,7 +378,7 @@ def _arithmetic(o: Operation) -> Action:
         taken = bond.M_fr * (bond.n + h * bond.n_slope)
         np.add(bond.residual, 0.5 * h * (bond.assumed_torque * bond.n_end - taken), out=bond.residual)
         np.maximum(bond.residual_peak, np.abs(bond.residual), out=bond.residual_peak)
-        np.add(bond.dissipated_energy, h * taken, out=bond.dissipated_energy)
+        np.add(bond.dissipated, h * taken, out=bond.dissipated)
         return OK
 
     return _due(o, copy_row) if o.when else {"copy": copy, "line": line, "rate": rate, "bond": bond}[o.kind]

@@ -448,7 +448,7 @@ def _energies(cycle: Cycle) -> dict[str, float]:
     """Per axis "A.residual", "A.residual_peak" and "A.friction_work" [J]; see
     feedsim.simulation.cosim.operations.Bond."""
     bond = cycle.bond
-    kinds = {"residual": bond.residual, "residual_peak": bond.residual_peak, "friction_work": bond.dissipated_energy}
+    kinds = {"residual": bond.residual, "residual_peak": bond.residual_peak, "friction_work": bond.dissipated}
     return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(cycle.system.axes) for kind in kinds}
 
 

@@ -59,7 +59,7 @@ class Cycle:
         self.assumed_torque = buffer()  # at the end of the exchange step, by the plant
         self.bond = Bond(
             M_fr=system.M_fr, n=system.n, n_slope=system.n_slope, assumed_torque=self.assumed_torque,
-            n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated_energy=buffer(),
+            n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated=buffer(),
         )  # fmt: skip
 
         self._warnings = self._check()

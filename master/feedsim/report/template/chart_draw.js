@@ -213,7 +213,7 @@ function draw_panel(panel, box, parent, values, hidden, frame, id) {
 // Deviations about the programmed circle. reach: deviation [um] of the outermost ring.
 function draw_polar(panel, box, parent, values, hidden, reach, id) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
-  const gap = RING_GAPS[panel.rings] * panel.rings, outer = 1 + OUTER * gap;
+  const gap = RING_GAPS[panel.rings] * panel.rings, outer = 1 + OUTER_RADIUS * gap;
   const half = Math.min(box.width, box.height - 24) / 2 - 20, centre = [box.width / 2, 24 + (box.height - 24) / 2];
   const one = half / outer;
   const radius = deviation => one * Math.max(0, Math.min(2 * outer, 1 + deviation / reach * gap));
@@ -245,12 +245,12 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   for (const curve of shown) {
     const angle = values(curve.x), deviation = values(curve.y), n = angle.length;
     const points = Array.from(angle, (entry, k) => place(entry, deviation[k]).map(value => Math.round(10 * value) / 10).join(" ")).filter((point, k, all) => point !== all[k - 1]);
-    const turned = n && Math.abs(Math.sin((angle[n - 1] - angle[0]) / 2)) < NEXT;
-    const ends = turned && Math.abs(deviation[n - 1] - deviation[0]) < CLOSED * reach;
+    const turned = n && Math.abs(Math.sin((angle[n - 1] - angle[0]) / 2)) < END_ANGLE_SINE;
+    const ends = turned && Math.abs(deviation[n - 1] - deviation[0]) < CLOSED_TURN_GAP * reach;
     make("path", { ...styled(curve), d: n ? `M${points.join("L")}${ends ? "Z" : ""}` : "" }, field);
   }
   for (const mark of panel.marks) {
-    const [x, y] = place(mark.x, mark.y), inside = one * (1 - OUTER * RING_GAPS[panel.rings]);
+    const [x, y] = place(mark.x, mark.y), inside = one * (1 - OUTER_RADIUS * RING_GAPS[panel.rings]);
     const to = [centre[0] + inside * Math.cos(mark.x), centre[1] - inside * Math.sin(mark.x)];
     make("circle", { cx: x, cy: y, r: 4, fill: colour(mark.colour) }, part);
     if (!mark.text) continue;
@@ -273,7 +273,7 @@ function draw_grid(panel, box, parent, values) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent), cells = values(panel.values);
   headed(panel.title, 4, box.width - 4, part);
   const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
-  const slanted = SLANTED * panel.columns[columns - 1].length; // the last name leans over the edge
+  const slanted = SLANTED_LETTER_WIDTH * panel.columns[columns - 1].length; // the last name leans over the edge
   const width = Math.min((box.width - left - 8) / columns, (box.width - left - 8 - slanted) / (columns - 0.5)), height = ROW, numbers = width >= CELL_WITH_NUMBER;
   const [low, high] = panel.span, about_zero = low < 0 && high > 0;
   const every = Math.ceil(CELL_WITH_NAME / width);

@@ -1,8 +1,8 @@
 // What the drawing of charts (chart_draw.js) computes with: numbers as text, scales and their ticks, curves as paths.
 const SPACE = "http://www.w3.org/2000/svg";
 const {
-  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED, DASHES, DEPTH, FAINT, FILL, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
-  NARROWEST, NEXT, OUTER, PHASES, RIGHT, RING_GAPS, ROOM, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED, TICK_HEIGHT, TICK_WIDTH, TOP, UNITS_WITH_PREFIX,
+  BAND, BLOCK, BOTTOM, CELL_WITH_NAME, CELL_WITH_NUMBER, CLOSED_TURN_GAP, DASHES, DEPTH, FAINT, FILL, GAP, HEIGHT, LEADER, LEFT, LETTER, LINE_PITCH, MAX_DIGITS, MIN_TICKS,
+  MIN_RELATIVE_SPAN, END_ANGLE_SINE, OUTER_RADIUS, PHASES, RIGHT, RING_GAPS, CURVE_MARGIN, ROUND, ROW, SECOND, SCALE_STEP, SCALE_STEPS, SLANTED_LETTER_WIDTH, TICK_HEIGHT, TICK_WIDTH, TOP, UNITS_WITH_PREFIX,
 } = LAYOUT; // feedsim.report.chart.model
 const NARROW = 640, COLUMN = 250;
 const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
@@ -131,7 +131,7 @@ function title_of(axis, result) {
 
 // A range that a zoom asks for, no narrower than its numbers have digits for.
 function wide_enough([low, high], axis) {
-  const least = axis.log || axis.names.length ? 0 : NARROWEST * Math.max(Math.abs(low), Math.abs(high));
+  const least = axis.log || axis.names.length ? 0 : MIN_RELATIVE_SPAN * Math.max(Math.abs(low), Math.abs(high));
   return high - low >= least ? [low, high] : [(low + high - least) / 2, (low + high + least) / 2];
 }
 
@@ -200,11 +200,11 @@ function range_of(panel, curves, values, span) {
   if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
   if (panel.y.log) return [low / 1.3, high * 1.3];
   if (panel.y.symlog) { // room in the measure of the axis, on either side of zero
-    const more = (value, sign) => value + sign * (3 * ROOM * Math.abs(value) + (high > low ? 0 : panel.y.symlog));
+    const more = (value, sign) => value + sign * (3 * CURVE_MARGIN * Math.abs(value) + (high > low ? 0 : panel.y.symlog));
     return [more(low, -1), more(high, 1)];
   }
   if (high > low) [low, high] = wide_enough([low, high], panel.y);
-  const room = ROOM * (high - low) || 0.05 * Math.abs(high) || 1;
+  const room = CURVE_MARGIN * (high - low) || 0.05 * Math.abs(high) || 1;
   return [low - (low === 0 && curves.some(entry => entry.filled) ? 0 : room), high + room];
 }
 

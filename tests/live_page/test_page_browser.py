@@ -157,10 +157,11 @@ def test_contrast_is_enough_and_motion_is_reduced_where_asked(
 ) -> None:
     with Opened(browser, files["xz_circle"], color_scheme=scheme, reduced_motion="reduce") as opened:
         opened.settled()
-        opened.page.locator("#lessons-part summary").click()
-        opened.page.locator("#lessons button").first.click()
         opened.page.locator("#more").click()
         opened.page.locator("section[id^=why-] summary").click()
+        assert opened.page.evaluate(CONTRAST) == []
+        opened.page.locator("#lessons-part summary").click()
+        opened.page.locator("#lessons button").first.click()
         opened.settled()
         assert opened.page.evaluate(CONTRAST) == []
         assert opened.page.locator("#figures tr.more").first.is_visible()

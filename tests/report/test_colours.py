@@ -18,23 +18,24 @@ from feedsim.report.show import looks_of
 
 REPORT = Path(formatting.__file__).parent
 MEANINGS = (
-    "SIMULATED", "RECORDED", "SETPOINT", "AT_TOOL", "RESIDUAL_COLOUR", "ALLOWED", "FRICTION", "OTHERWISE", "CLOCKWISE",
+    "SIMULATED_COLOUR", "RECORDED_COLOUR", "SETPOINT_COLOUR", "AT_TOOL", "RESIDUAL_COLOUR", "ALLOWED_COLOUR",
+    "FRICTION_COLOUR", "ALTERNATIVE_COLOUR", "CLOCKWISE",
 )  # fmt: skip
 # Word with which the name of a curve begins -> meanings that its colour may have.
 WORDS = {
-    "recorded": {"RECORDED"},
-    "measured": {"RECORDED"},
-    "reference": {"RECORDED"},
-    "without": {"BEFORE"},
-    "simulated": {"SIMULATED"},
-    "model": {"SIMULATED"},
-    "fit": {"SIMULATED"},
-    "result": {"SIMULATED"},
-    "linear scales": {"SIMULATED", "CLOCKWISE"},
-    "with compensation": {"AFTER"},
-    "setpoint": {"SETPOINT"},
-    "friction": {"FRICTION"},
-    "tolerance": {"ALLOWED"},
+    "recorded": {"RECORDED_COLOUR"},
+    "measured": {"RECORDED_COLOUR"},
+    "reference": {"RECORDED_COLOUR"},
+    "without": {"BEFORE_COLOUR"},
+    "simulated": {"SIMULATED_COLOUR"},
+    "model": {"SIMULATED_COLOUR"},
+    "fit": {"SIMULATED_COLOUR"},
+    "result": {"SIMULATED_COLOUR"},
+    "linear scales": {"SIMULATED_COLOUR", "CLOCKWISE"},
+    "with compensation": {"AFTER_COLOUR"},
+    "setpoint": {"SETPOINT_COLOUR"},
+    "friction": {"FRICTION_COLOUR"},
+    "tolerance": {"ALLOWED_COLOUR"},
     "outside": {"RESIDUAL_COLOUR"},
 }
 # Modules whose colours are a list of many alike things: levels of a parameter, bodies, signals, stretches, sources.
@@ -74,7 +75,8 @@ def test_a_curve_has_the_colour_of_its_name() -> None:
             elements = node.args if isinstance(node, ast.Call) else node.elts if isinstance(node, ast.Tuple) else []
             if not elements or not isinstance(elements[0], ast.Constant) or not isinstance(elements[0].value, str):
                 continue
-            meanings = {each.id for each in elements if isinstance(each, ast.Name)} & {*MEANINGS, "BEFORE", "AFTER"}
+            names = {each.id for each in elements if isinstance(each, ast.Name)}
+            meanings = names & {*MEANINGS, "BEFORE_COLOUR", "AFTER_COLOUR"}
             words = [word for word in WORDS if elements[0].value.startswith(word)]
             if meanings and words:
                 seen += 1

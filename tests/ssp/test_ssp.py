@@ -347,7 +347,7 @@ def test_what_is_wrong_stays_so_in_an_ssp() -> None:
     file = Path("a.ssp")
     found = OpenedSystem(None, None, file, Path("there"), (), {"plant.fmu": "resources/plant.fmu"})  # type: ignore[arg-type]
     archive = str(Path("there") / "plant.fmu")
-    (told,) = found.told([Finding("unit-warns", "wrong", f"{archive}: bad", archive)])
+    (told,) = found.all_findings([Finding("unit-warns", "wrong", f"{archive}: bad", archive)])
     assert told == Finding("unit-warns", "wrong", "a.ssp: resources/plant.fmu: bad", "a.ssp: resources/plant.fmu")
 
 

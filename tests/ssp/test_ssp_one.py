@@ -31,7 +31,7 @@ def test_it_runs_as_the_scenario_does(short: Path, one: Path, fmus: Path, overri
     here = judge_run(cosim.run(scenario.load(short, overrides), fmus=fmus))
     with ssp.open_system(one, overrides) as found:
         there = judge_run(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
-        assert found.told(there.warnings) == here.warnings
+        assert found.all_findings(there.warnings) == here.warnings
     assert [*there.units] == ["machine"]
     assert [*there.trace.columns] == [*here.trace.columns]
     for name in here.trace.columns:

@@ -275,14 +275,14 @@ def compensate(
     plain = _fully_recorded(scenario, turn)
     tell = progress or (lambda what, done, total: None)
 
-    def told(what: str) -> Callable[[int, int], None]:
+    def report_run(what: str) -> Callable[[int, int], None]:
         return lambda done, total: tell(what, done, total)
 
     with FrictionLaws(fmus) as laws:
         torque = friction_feedforward(machine, program, used, applied, laws)
-        before = judge_run(run(plain, program=program, fmus=fmus, progress=told("without compensation")))
+        before = judge_run(run(plain, program=program, fmus=fmus, progress=report_run("without compensation")))
         after = judge_run(
-            run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
+            run(plain, program=program, fmus=fmus, progress=report_run("with compensation"), torque_feedforward=torque)
         )
         variations, changed = errors_and_changes(
             scenario, program, turn, used, applied, laws, machines or {}, fmus=fmus, progress=tell

@@ -107,7 +107,7 @@ def open_run(given: File | Scenario, changes: Changes = None, fmus: File | None 
     from feedsim.simulation import ssp  # not for runs of scenario files
 
     with ssp.open_system(file, texts) as result:
-        yield OpenedRun(result.scenario, result.program, result.fmus, texts, result.told, result.named)
+        yield OpenedRun(result.scenario, result.program, result.fmus, texts, result.all_findings, result.named)
 
 
 # --- One scenario, run, with its figures, causes and pictures ---------------------------------------------------------

@@ -19,9 +19,8 @@ Curve = Callable[[Floats], Floats]
 
 STEP_PER_DAMPING = 1 / 3
 GRID_STEPS = (5e-4, 1e-2)  # finest, coarsest relative step of the grid
-BRACKET_POINTS = (
-    15  # points looked at within every bracket in one call of the curve, which costs little more than a single one
-)
+# Points looked at within every bracket in one call of the curve, which costs little more than a single one
+BRACKET_POINTS = 15
 CROSSING_ROUNDS = 24  # at most: every other one narrows a bracket to 1/16, the others to what the chord is off
 CHORD_OFFSETS = np.r_[-(8.0 ** np.arange(-1, -8, -1)), 0.0, 8.0 ** np.arange(-7, 0)]  # shares of a bracket, INSIDE
 EXTREME_ROUNDS = 6  # each narrows a bracket to 1/8: two steps to 1e-7; an extreme's place shows to the rounding's root

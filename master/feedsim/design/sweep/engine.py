@@ -177,9 +177,8 @@ class Batches:
 
 
 SCHEDULER_LOSS_TIME = 20.0  # s without the scheduler, after which a study is given up
-WORKER_LOSS_TIME = (
-    300.0  # s without any worker that can take part, likewise: on a busy machine one that died comes back slowly
-)
+# [s] without any worker that can take part, likewise: on a busy machine one that died comes back slowly
+WORKER_LOSS_TIME = 300.0
 FETCH_TIME = 5.0  # s for a result to arrive; one that is lost with its worker is made again, and may take any time
 _CLUSTER_POLL_INTERVAL = 1.0  # s between two looks at the cluster
 

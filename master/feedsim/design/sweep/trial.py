@@ -135,9 +135,8 @@ def _none_works(failed: dict[int, str]) -> str:
 
 
 SCHEDULER_ANSWER_TIME = 10.0  # s that a scheduler has to answer
-LOCAL_JOIN_TIME = (
-    120.0  # s for the processes of this machine to find one another, however busy it is; who is late is lost
-)
+# [s] for the processes of this machine to find one another, however busy it is; who is late is lost
+LOCAL_JOIN_TIME = 120.0
 WORKER_JOIN_TIME = 30.0  # s that a scheduler without workers has to get one
 
 # Threads of linear algebra would compete with the workers for the cores.

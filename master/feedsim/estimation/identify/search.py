@@ -21,9 +21,8 @@ MAX_LOG_DEVIATION = 3.0  # of the logarithm, where a standard deviation is large
 VALLEY_TOLERANCE = 1e-6  # of cost and step there
 START_TOLERANCE = 1e-3  # tolerance of cost and step to compare starts
 FOLLOWED_STARTS = 3  # of the starts; as many again where none of them explains the torque
-MAX_NOISE_RESIDUAL = (
-    2.0  # mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
-)
+# Mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
+MAX_NOISE_RESIDUAL = 2.0
 
 
 def with_excess(prior: Prior) -> Prior:

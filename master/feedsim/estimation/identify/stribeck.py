@@ -312,9 +312,8 @@ def repetition_variance(
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
-DOUBTFUL_PROBABILITY = (
-    0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
-)
+# Probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
+DOUBTFUL_PROBABILITY = 0.95
 STRIBECK_PROBABILITY = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
 HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
 SHAPE_PARAMETERS: Mapping[str, str] = {

@@ -523,9 +523,8 @@ FRICTION_SHARES = (0.05, 0.15, 0.4)
 LEAST_TRAVEL = 0.01  # rad: a motor that turns less determines no drive
 ONE_PHASE_DEVIATION = 1.0  # of the logarithm of an inertia by a torque that is known once a position cycle
 CLIPPED_DEVIATION = 0.3  # of the logarithm of an inertia to which rows belong whose torque is cut off
-SEPARATING_HALF_WIDTH = (
-    0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
-)
+# Relative half width of F_C below which the rigid line separates friction from the constant load
+SEPARATING_HALF_WIDTH = 0.5
 # A torque limit that is not known must not act: gentle moves determine nothing of the torque of rapid ones.
 TORQUE_LIMIT_RATIO = 20.0
 

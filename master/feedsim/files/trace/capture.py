@@ -46,9 +46,8 @@ NEAR_WITHOUT = 0.03  # the same where rows had to be left out, of which some bes
 # N.m of TORQUE for an A of CURRENT that motors of feed axes with a screw have.
 TORQUE_CONSTANTS = (0.05, 5.0)
 SAME_SIGNAL_CORRELATION = 0.9  # of a correlation, above which TORQUE and CURRENT are the same thing in two units
-CUT_OFF_SHARE = (
-    0.005  # share of the rows that are one value to the last digit, at an end of the range: it is cut off there
-)
+# Share of the rows that are one value to the last digit, at an end of the range: it is cut off there
+CUT_OFF_SHARE = 0.005
 FIT_ROWS = 20_000  # rows that a fit rests on
 MAX_AXES_SEARCHED = 32  # axes among which a signal of another one is looked for
 OUTLIER_SHARE = 0.02  # share of the rows that may stand out

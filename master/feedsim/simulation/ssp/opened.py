@@ -54,7 +54,7 @@ class OpenedSystem:
     warnings: tuple[Finding, ...]
     sources: Mapping[str, str]
 
-    def told(self, warnings: Iterable[Finding]) -> tuple[Finding, ...]:
+    def all_findings(self, warnings: Iterable[Finding]) -> tuple[Finding, ...]:
         """The file's own warnings and those of a run of it, which then speak of the file as well."""
         named = self.named
         return (*self.warnings, *(

@@ -150,6 +150,29 @@ def test_imports_point_downwards(room: str) -> None:
                 assert ORDER.index(other) >= ORDER.index(room), f"{module} imports upwards: {name}"
 
 
+def loaded_with(module: str) -> set[str]:
+    """A module and what it imports when it is loaded: nothing late, nothing for types alone."""
+    loaded, waiting = set(), [module]
+    while waiting:
+        name = waiting.pop()
+        if name in loaded:
+            continue
+        loaded.add(name)
+        for node in ast.parse(MODULES[name].read_text(encoding="utf-8")).body:
+            if isinstance(node, (ast.Import, ast.ImportFrom)):
+                waiting += [module_of(other) for other in imported(ast.unparse(node)) if other.startswith("feedsim.")]
+    return loaded
+
+
+@pytest.mark.parametrize("job", ["run", "check", "compare", "export", "circle"])
+def test_the_core_loads_neither_identification_nor_design(job: str) -> None:
+    """What most people use stands without the rest; options such as draws of a run load that when they are given."""
+    rest = ("feedsim.design.", *(f"feedsim.estimation.{room}." for room in ("identify", "modal", "replay")))
+    loaded = loaded_with(f"feedsim.jobs.{job}")
+    assert "feedsim.scenario.machine" in loaded
+    assert not {name for name in loaded if name.startswith(rest)}
+
+
 def test_a_run_judges_nothing() -> None:
     """Simulating takes a table of modes, and packs a machine: no structure is solved, no loop is closed."""
     allowed = {f"feedsim.structure.{file}" for file in ("assembly", "modes", "pack", "poses")}

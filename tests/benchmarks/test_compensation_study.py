@@ -11,8 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 from compensation_study import MACHINES, written  # noqa: E402
 
+from feedsim.analysis.proposals import axis_lag, least_margins, loop_lag  # noqa: E402
 from feedsim.design.tune.circles import practical  # noqa: E402
-from feedsim.design.tune.proposals import axis_lag, least_margins, loop_lag  # noqa: E402
 from feedsim.linear.judgement import judge  # noqa: E402
 from feedsim.scenario import load  # noqa: E402
 from feedsim.structure import checked_modes  # noqa: E402

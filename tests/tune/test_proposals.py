@@ -13,9 +13,7 @@ import pytest
 
 from command_helpers import feedsim
 from feedsim import analysis
-from feedsim.cli import main
-from feedsim.design.tune import Proposal, of_circle, of_run
-from feedsim.design.tune.proposals import (
+from feedsim.analysis.proposals import (
     COMPENSATION,
     GAIN_MARGIN,
     PHASE_MARGIN,
@@ -26,6 +24,8 @@ from feedsim.design.tune.proposals import (
     model_gain,
     torque_response,
 )
+from feedsim.cli import main
+from feedsim.design.tune import Proposal, of_circle, of_run
 from feedsim.linear.judgement import judge
 from feedsim.linear.system import LinearSystem
 from feedsim.report.changes import changes_part, changes_section

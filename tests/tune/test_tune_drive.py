@@ -15,6 +15,7 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
+from feedsim.analysis.proposals import axis_lag, loop_lag
 from feedsim.design.tune.circles import Pair
 from feedsim.design.tune.drive import (
     CHOSEN,
@@ -28,7 +29,6 @@ from feedsim.design.tune.drive import (
 )
 from feedsim.design.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
 from feedsim.design.tune.knobs import Knobs, match_lag, with_drives
-from feedsim.design.tune.proposals import axis_lag, loop_lag
 from feedsim.linear.judgement import Candidates, judge
 from feedsim.scenario import Drive, Machine, load, load_machine
 from feedsim.structure import Modes, checked_modes

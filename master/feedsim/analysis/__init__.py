@@ -1,7 +1,8 @@
 """Derived figures from traces, responses of the linear system, and what takes several runs: docs/figures.md.
 
-May use cosim, structure, nc, scenario and trace.
-Start with evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole.
+May use linear, cosim, structure, nc, scenario and trace.
+Start with evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole;
+proposals.py says which parameter to change.
 """
 
 from feedsim.analysis.circle import Diagnosis, explain_circle

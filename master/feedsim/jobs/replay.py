@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from feedsim.analysis import FigureTable
-from feedsim.design.tune import Proposal
-from feedsim.design.tune.proposals import of_drives
+from feedsim.analysis.proposals import Proposal, of_drives
 from feedsim.estimation.identify import RecordedAxis
 from feedsim.estimation.replay.closed_loop import AxisRecord, cut_window, read_axes
 from feedsim.estimation.replay.closed_loop import window as window_of

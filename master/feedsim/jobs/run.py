@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from feedsim import analysis, scenario
-from feedsim.design.tune import Proposal
+from feedsim.analysis.proposals import Proposal
 from feedsim.files.source import is_ssp, is_study
 from feedsim.files.trace import Array
 from feedsim.foundation.arguments import Changes, settings, spell_argument

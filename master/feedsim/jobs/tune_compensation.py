@@ -9,8 +9,8 @@ from typing import Annotated
 
 from feedsim import scenario as scenarios
 from feedsim.analysis import FigureTable
+from feedsim.analysis.proposals import check_controlled
 from feedsim.design.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES, JudgedCompensation, tune
-from feedsim.design.tune.proposals import check_controlled
 from feedsim.design.uncertainty import check_count, cloud_of
 from feedsim.files.fields import no_axis
 from feedsim.foundation.arguments import settings, spell_argument, split_names

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from feedsim import scenario as scenarios
 from feedsim.analysis import FigureTable
-from feedsim.design.tune import Proposal, of_run
+from feedsim.analysis.proposals import Proposal, of_run
 from feedsim.design.tune.drive import EVALUATIONS, Limits, TunedDrive
 from feedsim.design.tune.drive import tune_drive as tune
 from feedsim.design.tune.drive_program import check_axis

@@ -9,8 +9,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from feedsim.design.tune import Proposal
-from feedsim.design.tune.proposals import COMPENSATION
+from feedsim.analysis.proposals import COMPENSATION, Proposal
 from feedsim.files.control import Name, names_of
 from feedsim.report.content import Bullets, Section, Table, Text, code, command_path
 from feedsim.report.formatting import minus, typeset

@@ -16,7 +16,7 @@ from feedsim.analysis.circle.records import RecordedCircle
 from feedsim.analysis.circle.words import Change, compare_terms, sure_changes
 from feedsim.analysis.circularity import axis_letters
 from feedsim.analysis.evaluate import FIGURE_UNITS, both_directions, cause_figures, shift_centre
-from feedsim.design.tune import of_circle
+from feedsim.analysis.proposals import of_circle
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report import content
 from feedsim.report.changes import action, changes_section, control_section

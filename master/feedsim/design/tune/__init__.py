@@ -1,9 +1,5 @@
-"""What to change: parameters of drives that make a circle rounder or a stop shorter, with the value proposed.
+"""Values for parameters of drives, found by simulation: compensations, feedforward, gains.
 
 May use uncertainty, analysis, cosim, linear, structure, scenario.
-Start with proposals.py; the closed forms are in closed_forms.py.
+Start with knobs.py: the parameters, and what bounds them; drive.py and circles.py search.
 """
-
-from feedsim.design.tune.proposals import Proposal, of_circle, of_drives, of_run
-
-__all__ = ["Proposal", "of_circle", "of_drives", "of_run"]

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Array
+from feedsim.analysis.proposals import axis_lag
 from feedsim.design.tune.circles import Circles, Contour, Pair, extremes, practical, size, tuned_on
 from feedsim.design.tune.knobs import Effect, effects_of, frictionless, with_groups
-from feedsim.design.tune.proposals import axis_lag
 from feedsim.design.uncertainty import JUDGE_SEED, SEARCH_DRAWS, SEARCH_SEED, Cloud, draw_named, torque_scale
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Drive, Machine, Scenario

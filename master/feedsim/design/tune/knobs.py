@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from feedsim.analysis.figures import Array
-from feedsim.design.tune.proposals import MIN_RESET_TIME, NEUTRAL, NEUTRAL_SHARE, axis_lag, loop_lag, model_gain
+from feedsim.analysis.proposals import MIN_RESET_TIME, NEUTRAL, NEUTRAL_SHARE, axis_lag, loop_lag, model_gain
 from feedsim.design.uncertainty import torque_scale
 from feedsim.foundation.units import convert, parameters
 from feedsim.scenario import Cycles, Drive, Filter, Friction, FrictionParameters, Machine

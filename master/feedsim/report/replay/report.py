@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
-from feedsim.design.tune import Proposal
+from feedsim.analysis.proposals import Proposal
 from feedsim.estimation.identify import Provenance
 from feedsim.estimation.identify.read import recording_day
 from feedsim.estimation.replay.compare import TO_RPM, Comparison

@@ -21,7 +21,7 @@ from feedsim.analysis import (
     contours,
     tasks,
 )
-from feedsim.design.tune import Proposal
+from feedsim.analysis.proposals import Proposal
 from feedsim.files.trace import Trace, write_csv
 from feedsim.foundation.installation import require_extras
 from feedsim.motions.circular import SENSE_WORDS

@@ -24,8 +24,7 @@ from feedsim.analysis import (
     tasks,
 )
 from feedsim.analysis.circle import worth_telling
-from feedsim.design.tune import Proposal, of_run
-from feedsim.design.tune.proposals import waits_for_ringing
+from feedsim.analysis.proposals import Proposal, of_run, waits_for_ringing
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import show

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import feedsim as fs
-from feedsim.foundation import outputs
+from feedsim.files import sheets
 
 ROOT = Path(__file__).resolve().parents[1] / "scenarios"
 OUT = ROOT / "histories"
@@ -78,7 +78,7 @@ def scattered(random: np.random.Generator, factors: Mapping[str, float]) -> dict
 
 def write(name: str, about: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A list with a comment ahead."""
-    text = outputs.text_of((heads, *rows))
+    text = sheets.text_of((heads, *rows))
     OUT.mkdir(exist_ok=True)
     (OUT / f"{name}.csv").write_text(f"# {about}\n# {NOTE}\n{text}", encoding="utf-8")
 

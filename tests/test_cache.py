@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from feedsim.foundation import owned
+from feedsim.foundation import outputs
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.scenario import load_machine
@@ -36,7 +36,7 @@ class Counted:
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "kept"
-    monkeypatch.setenv(owned.CACHE_VARIABLE, str(folder))
+    monkeypatch.setenv(outputs.CACHE_VARIABLE, str(folder))
     return folder
 
 
@@ -49,7 +49,7 @@ def code(tmp_path: Path) -> Path:
 
 def test_an_answer_is_found_once(place: Path, code: Path) -> None:
     find = Counted([0.1 + 0.2, 1e-300, "words", None])
-    answers = [owned.cache_answer("kind", ["a", 1.5], [code], find) for _ in range(3)]
+    answers = [outputs.cache_answer("kind", ["a", 1.5], [code], find) for _ in range(3)]
     assert answers == [find.answer] * 3  # to the last bit
     assert find.times == 1
     assert [file.name.startswith("kind-") for file in place.iterdir()] == [True]
@@ -58,11 +58,11 @@ def test_an_answer_is_found_once(place: Path, code: Path) -> None:
 def test_what_follows_from_something_else_is_found_anew(place: Path, code: Path) -> None:
     find = Counted()
     for follows_from in (["a", 1.0], ["a", 1.0 + 1e-15], ["b", 1.0]):
-        owned.cache_answer("kind", follows_from, [code], find)
+        outputs.cache_answer("kind", follows_from, [code], find)
     assert find.times == 3
     (code / "solver.py").write_text("x = 2\n")
-    owned._versions.cache_clear()
-    owned.cache_answer("kind", ["a", 1.0], [code], find)
+    outputs._versions.cache_clear()
+    outputs.cache_answer("kind", ["a", 1.0], [code], find)
     assert find.times == 4
 
 
@@ -71,10 +71,10 @@ def test_what_follows_from_something_else_is_found_anew(place: Path, code: Path)
 )
 def test_a_damaged_file_is_replaced(content: str, place: Path, code: Path) -> None:
     find = Counted(7)
-    owned.cache_answer("kind", [], [code], find)
+    outputs.cache_answer("kind", [], [code], find)
     (file,) = place.iterdir()
     file.write_text(content)
-    assert owned.cache_answer("kind", [], [code], find) == 7
+    assert outputs.cache_answer("kind", [], [code], find) == 7
     assert find.times == 2
     assert json.loads(file.read_text())["answer"] == 7
 
@@ -82,9 +82,9 @@ def test_a_damaged_file_is_replaced(content: str, place: Path, code: Path) -> No
 def test_a_folder_that_cannot_be_written_is_none(tmp_path: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     for folder in ("", str(tmp_path / "file"), str(tmp_path / "file" / "below")):
-        monkeypatch.setenv(owned.CACHE_VARIABLE, folder)
+        monkeypatch.setenv(outputs.CACHE_VARIABLE, folder)
         find = Counted(3)
-        assert [owned.cache_answer("kind", [], [code], find) for _ in range(2)] == [3, 3]
+        assert [outputs.cache_answer("kind", [], [code], find) for _ in range(2)] == [3, 3]
         assert find.times == 2
 
 
@@ -95,17 +95,17 @@ def test_a_folder_that_cannot_be_written_is_none(tmp_path: Path, code: Path, mon
      ({"HOME": "/home/a", "XDG_CACHE_HOME": "/b"}, Path("/b/feedsim"))],
 )  # fmt: skip
 def test_where_answers_are_kept(set_to: dict[str, str], expected: Path | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (owned.CACHE_VARIABLE, "HOME", "XDG_CACHE_HOME"):
+    for name in (outputs.CACHE_VARIABLE, "HOME", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     for name, value in set_to.items():
         monkeypatch.setenv(name, value)
-    assert owned.cache_folder() == expected
+    assert outputs.cache_folder() == expected
 
 
 def test_the_oldest_answers_go(place: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owned, "MAX_ANSWERS", 3)
+    monkeypatch.setattr(outputs, "MAX_ANSWERS", 3)
     for k in range(6):
-        owned.cache_answer("kind", [k], [code], Counted(k))
+        outputs.cache_answer("kind", [k], [code], Counted(k))
         for file in place.iterdir():  # a clock may be coarse
             if json.loads(file.read_text())["answer"] == k:
                 os.utime(file, (k, k))
@@ -121,10 +121,10 @@ def test_the_pose_is_judged_the_same_and_solved_once(place: Path, monkeypatch: p
             each.cache_clear()
         return pose_change(machine, RANGES), room.table_mismatch(machine)
 
-    monkeypatch.setenv(owned.CACHE_VARIABLE, "")
+    monkeypatch.setenv(outputs.CACHE_VARIABLE, "")
     plain = judged()
     assert plain[0].axes[0].modes
-    monkeypatch.setenv(owned.CACHE_VARIABLE, str(place))
+    monkeypatch.setenv(outputs.CACHE_VARIABLE, str(place))
     assert judged() == plain
     monkeypatch.setattr(room, "_model", lambda *_, **__: pytest.fail("solved again"))
     monkeypatch.setattr(room, "_modes_of_table", lambda *_: pytest.fail("solved again"))
@@ -162,8 +162,8 @@ def test_templates_of_reports_are_compiled_once(place: Path) -> None:
 def test_folders_of_other_code_are_few(place: Path, code: Path) -> None:
     for k in range(8):
         (code / "solver.py").write_text(f"x = {k}\n")
-        owned._versions.cache_clear()
-        own = owned.own_folder("compiled", [code])
+        outputs._versions.cache_clear()
+        own = outputs.own_folder("compiled", [code])
         assert own is not None
         os.utime(own, (k, k))
     assert len([*place.iterdir()]) == 5
@@ -172,7 +172,7 @@ def test_folders_of_other_code_are_few(place: Path, code: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="rights of POSIX")
 def test_a_folder_that_others_can_write_to_is_not_used(place: Path, code: Path) -> None:
-    own = owned.own_folder("compiled", [code])
+    own = outputs.own_folder("compiled", [code])
     assert own is not None
     own.chmod(0o777)
-    assert owned.own_folder("compiled", [code]) is None
+    assert outputs.own_folder("compiled", [code]) is None

@@ -17,9 +17,9 @@ import pytest
 
 from command_helpers import PATIENCE
 from feedsim.files.trace import written_whole
-from feedsim.foundation import owned
+from feedsim.foundation import outputs
 from feedsim.foundation.errors import OutputError
-from feedsim.foundation.owned import TemporaryFolder, claim_folder, remove_orphans
+from feedsim.foundation.outputs import TemporaryFolder, claim_folder, remove_orphans
 
 ROOT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[subprocess.Popen[str]]:
     """A process that has run `code` and waits; killed before the block if so asked, else ended behind it."""
     text = textwrap.dedent(code) + "\nprint('there', flush=True)\nsys.stdin.readline()\n"
-    rooms = "from feedsim.foundation.owned import *\nfrom feedsim.files.trace import written_whole\n"
+    rooms = "from feedsim.foundation.outputs import *\nfrom feedsim.files.trace import written_whole\n"
     head = f"import sys\nfrom pathlib import Path\n{rooms}"
     process = subprocess.Popen(
         [sys.executable, "-c", head + text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=folder,
@@ -64,7 +64,7 @@ def test_a_folder_belongs_to_one_process(tmp_path: Path) -> None:
 def test_a_killed_process_keeps_nobody_waiting(tmp_path: Path) -> None:
     folder = tmp_path / "out" / "below"
     with another_process(CLAIM, tmp_path, kill=True):
-        assert [path.name for path in folder.iterdir()] == [owned.LOCK]
+        assert [path.name for path in folder.iterdir()] == [outputs.LOCK]
         with claim_folder(folder):
             (folder / "result").touch()
         assert [path.name for path in folder.iterdir()] == ["result"]
@@ -142,16 +142,16 @@ def test_a_folder_that_comes_and_goes_is_no_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("elsewhere", [True, False])
 def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: bool) -> None:
     """The folder for temporary files has some, for this machine; another machine's word has to be believed."""
-    real, folder = owned.lock_file, tmp_path / "out"
+    real, folder = outputs.lock_file, tmp_path / "out"
     (tmp_path / "tmp").mkdir()
-    monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path / "tmp"))  # type: ignore[attr-defined]
+    monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path / "tmp"))  # type: ignore[attr-defined]
 
     def locked(file: int) -> bool | None:
         return None if f"{folder}" in str(Path(f"/proc/self/fd/{file}").resolve()) else real(file)
 
     if not Path("/proc/self/fd").is_dir():
         pytest.skip("needs /proc")
-    monkeypatch.setattr(owned, "lock_file", locked)
+    monkeypatch.setattr(outputs, "lock_file", locked)
     with claim_folder(folder):
         told: list[str] = []
 
@@ -166,8 +166,8 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert "another process" in told[0]
     assert list((tmp_path / "tmp").iterdir()) == []
     folder.mkdir()
-    host = "elsewhere" if elsewhere else owned.platform.node()  # type: ignore[attr-defined]
-    (folder / owned.LOCK).write_text(f"process 7 on {host} since 2020-01-01 00:00:00: feedsim run")
+    host = "elsewhere" if elsewhere else outputs.platform.node()  # type: ignore[attr-defined]
+    (folder / outputs.LOCK).write_text(f"process 7 on {host} since 2020-01-01 00:00:00: feedsim run")
     if elsewhere:
         with pytest.raises(OutputError, match="not at work any more, remove that file"), claim_folder(folder):
             pass
@@ -177,12 +177,12 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_temporary_folders_go_with_their_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
+    monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
     for name in ("feedsim-another", "feedsim-ab12cd34", "mine"):  # not of ours, older than all this, another's
         (tmp_path / name).mkdir()
         (tmp_path / name / "file").touch()
     (tmp_path / "feedsim-00000000").symlink_to(tmp_path / "mine")
-    (tmp_path / "mine" / owned.LOCK).touch()
+    (tmp_path / "mine" / outputs.LOCK).touch()
     there = set(tmp_path.iterdir())
     make = "folder = TemporaryFolder()\n(folder.path / 'a').mkdir()\n(folder.path / 'a' / 'b').touch()"
     with another_process(make, tmp_path):
@@ -193,7 +193,7 @@ def test_temporary_folders_go_with_their_process(tmp_path: Path, monkeypatch: py
         assert len(set(tmp_path.iterdir()) - there) == 1
         with TemporaryFolder() as own:
             assert set(tmp_path.iterdir()) == {*there, own.parent}, "the first use removes what is left"
-    assert list(own.parent.iterdir()) == [own.parent / owned.LOCK]
+    assert list(own.parent.iterdir()) == [own.parent / outputs.LOCK]
     assert (tmp_path / "mine" / "file").exists()
 
 
@@ -201,14 +201,14 @@ def test_temporary_folders_go_with_their_process(tmp_path: Path, monkeypatch: py
 def test_a_signal_at_any_line_leaves_no_temporary_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lock: bool
 ) -> None:
-    monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
+    monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
     interrupted, at = True, 0
     while interrupted:
         at, interrupted, left = at + 1, False, at
 
         def trace(frame: FrameType, event: str, given: object) -> object:
             nonlocal left
-            if frame.f_code.co_filename == owned.__file__ and event == "line":
+            if frame.f_code.co_filename == outputs.__file__ and event == "line":
                 left -= 1
                 if left < 0:
                     raise SystemExit(143)
@@ -228,7 +228,7 @@ def test_a_signal_at_any_line_leaves_no_temporary_folder(
 
 POOL = """
 import multiprocessing, sys, time
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 folders = []
 
 def work(number):

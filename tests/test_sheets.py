@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import feedsim as fs
-from feedsim.foundation import outputs
+from feedsim.files import sheets
 
 TEXTS = ["=1+1", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "'=1", "''+x", "'H0003'", "-80 mm", "plain", "", "a=b"]
 NUMBERS = ["-1", "+2.5", "-1e-3", "-.5", "-inf", "5."]
@@ -28,20 +28,20 @@ def is_formula(cell: str) -> bool:
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_no_text_is_a_formula_and_comes_back(text: str) -> None:
-    made = outputs.text_of([[text, "end"]])
+    made = sheets.text_of([[text, "end"]])
     ((cell, _),) = csv.reader(io.StringIO(made, newline=""))
     assert not is_formula(cell)
-    assert list(outputs.read_rows(io.StringIO(made, newline=""))) == [[text, "end"]]
+    assert list(sheets.read_rows(io.StringIO(made, newline=""))) == [[text, "end"]]
 
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_numbers_stay_numbers(number: str) -> None:
-    assert outputs.text_of([[number]]) == f"{number}\n"
+    assert sheets.text_of([[number]]) == f"{number}\n"
 
 
 @given(st.lists(st.text(st.characters(exclude_categories=["Cs"])), min_size=2))
 def test_every_text_comes_back(row: list[str]) -> None:
-    assert list(outputs.read_rows(io.StringIO(outputs.text_of([row]), newline=""))) == [row]
+    assert list(sheets.read_rows(io.StringIO(sheets.text_of([row]), newline=""))) == [row]
 
 
 def test_text_of_a_file_of_a_control_is_no_formula(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.foundation import owned
+from feedsim.foundation import outputs
 from feedsim.simulation.cosim import archive
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.unpacked import STORE
@@ -50,7 +50,7 @@ def test_a_signal_arrives_behind_the_block(number: int) -> None:
     went_on: list[bool] = []
 
     def block() -> None:
-        with owned.defer_signals():
+        with outputs.defer_signals():
             _swallow(number)
             went_on.append(True)
 
@@ -62,14 +62,14 @@ def test_a_signal_arrives_behind_the_block(number: int) -> None:
 
 def test_what_is_ignored_stays_so(number: int) -> None:
     signal.signal(number, signal.SIG_IGN)
-    with owned.defer_signals():
+    with outputs.defer_signals():
         assert signal.getsignal(number) is signal.SIG_IGN
         signal.raise_signal(number)
 
 
 def test_an_error_in_the_block_puts_the_handler_back(number: int) -> None:
     handler = signal.getsignal(number)
-    with pytest.raises(ValueError, match="inside"), owned.defer_signals():
+    with pytest.raises(ValueError, match="inside"), outputs.defer_signals():
         raise ValueError("inside")
     assert signal.getsignal(number) is handler
 
@@ -78,7 +78,7 @@ def test_other_threads_are_left_alone() -> None:
     done: list[bool] = []
 
     def work() -> None:
-        with owned.defer_signals():  # signal.signal would raise here
+        with outputs.defer_signals():  # signal.signal would raise here
             done.append(True)
 
     thread = threading.Thread(target=work)
@@ -116,7 +116,7 @@ PLACES = {
 }
 PROGRAM = """
 import atexit, ctypes, signal, sys, time, weakref
-from feedsim.foundation.owned import end_program
+from feedsim.foundation.outputs import end_program
 
 class It:
     pass
@@ -151,7 +151,7 @@ program()
 
 def ended(place: str, number: int, again: str = "pass", before: str = "") -> subprocess.CompletedProcess[str]:
     code = PROGRAM.format(place=place, number=number, again=again, before=before)
-    environment = {**os.environ, "PYTHONPATH": str(Path(owned.__file__).parents[1])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(outputs.__file__).parents[1])}
     return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=100)
 
 

@@ -16,7 +16,7 @@ from scipy.io import savemat
 
 from command_helpers import feedsim, feedsim_process
 from feedsim.files.trace import read_csv
-from feedsim.foundation.owned import LOCK
+from feedsim.foundation.outputs import LOCK
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIO = """

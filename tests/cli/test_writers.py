@@ -81,7 +81,7 @@ def complete(out: Path, besides: Sequence[str] = ()) -> dict[str, object]:
 def test_a_second_one_is_refused_before_it_begins(
     command: str, place: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = "import sys\nfrom pathlib import Path\nfrom feedsim.foundation.owned import claim_folder\n"
+    code = "import sys\nfrom pathlib import Path\nfrom feedsim.foundation.outputs import claim_folder\n"
     code += "with claim_folder(Path('claimed')):\n    print('there', flush=True)\n    sys.stdin.readline()\n"
     owner = subprocess.Popen(
         [sys.executable, "-c", code], cwd=place, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,

@@ -17,12 +17,12 @@ from feedsim.analysis.figures import Array
 from feedsim.analysis.positioning import MIN_REST_TIME, Approach
 from feedsim.comparison.shift import estimated_shift
 from feedsim.files.columns import Columns
+from feedsim.files.sheets import read_rows
 from feedsim.files.source import json_file
 from feedsim.files.trace import Recording, Trace, as_series, read_recording
 from feedsim.files.trace.recording import map_columns
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.outputs import read_rows
 from feedsim.motions.circular import SENSE_WORDS
 
 DIGEST_DIGITS = 12  # digits of a digest

@@ -35,7 +35,7 @@ from feedsim.cli.commands import (
     shown_streams,
     watch_job,
 )
-from feedsim.foundation.owned import end_program
+from feedsim.foundation.outputs import end_program
 
 EPILOG = """exit codes:
   0 done    1 internal error, or with --strict a result that is WRONG    2 bad input or usage

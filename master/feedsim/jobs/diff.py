@@ -14,7 +14,7 @@ from feedsim.analysis.side_by_side import Source, align_sources, differing_param
 from feedsim.design.sweep.bundle import case, scenario_of
 from feedsim.files.columns import Columns, load_columns
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Argument,

@@ -16,7 +16,7 @@ from pathlib import Path
 from feedsim.files.source import is_program, places, read_yaml, value_at
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.foundation.installation import repair_advice, shipped
-from feedsim.foundation.owned import defer_signals
+from feedsim.foundation.outputs import defer_signals
 
 # Kind -> the file that stands for one, in the folder of all of them; of a kind whose files lie in a folder each, that
 # folder is the example.

@@ -13,8 +13,7 @@ from feedsim.files.source import is_ssp
 from feedsim.foundation import units
 from feedsim.foundation.arguments import Changes, Pairs, Value, by_name, pairs, settings, spell_argument, split_names
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.outputs import archive_with, begins_with, is_same_file
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder, archive_with, begins_with, is_same_file
 from feedsim.jobs.machine import positions
 from feedsim.jobs.parameters import (
     NO_WATCH,

@@ -17,6 +17,7 @@ from feedsim.analysis import FigureTable
 from feedsim.analysis.history import Array, Scatter, Series, changes, find_limit_crossing, scatter
 from feedsim.estimation.identify.friction_file import fleet_yaml
 from feedsim.estimation.least_squares import NORMAL_95
+from feedsim.files.sheets import read_rows
 from feedsim.files.source import json_file
 from feedsim.files.trace.trace import MAX_MAGNITUDE
 from feedsim.foundation.arguments import (
@@ -30,7 +31,6 @@ from feedsim.foundation.arguments import (
     split_names,
 )
 from feedsim.foundation.errors import Finding, InputError, find_nearest_name, shorten_list
-from feedsim.foundation.outputs import read_rows
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.arguments import Call, call, call_context
 from feedsim.foundation.errors import Finding, InputError, OutputError
-from feedsim.foundation.outputs import allow_replacement, check_file, is_replacement_allowed
-from feedsim.foundation.owned import claim_folder
+from feedsim.foundation.outputs import allow_replacement, check_file, claim_folder, is_replacement_allowed
 from feedsim.jobs.parameters import File, Watch
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html

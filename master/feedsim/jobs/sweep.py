@@ -17,7 +17,7 @@ from feedsim.design.sweep.study import AllFailed, Progress
 from feedsim.design.sweep.study import run as run_study
 from feedsim.design.sweep.table import RECORD, Format, Table
 from feedsim.foundation.arguments import settings
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.jobs.parameters import (
     NO_WATCH,
     Archives,

@@ -9,8 +9,7 @@ from typing import Annotated, Any, get_args, overload
 from feedsim.files import trace
 from feedsim.foundation.arguments import spell_argument, split_names
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.outputs import check_file, content_check
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder, check_file, content_check
 from feedsim.jobs.examples import Example, copy, examples
 from feedsim.jobs.parameters import Argument, File, Force, Option, job, out_file
 from feedsim.jobs.result import Made, MadeKind

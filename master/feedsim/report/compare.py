@@ -20,8 +20,7 @@ import numpy as np
 from feedsim.comparison import Comparison, Curves, Variable, interpolate_at, percent, seconds
 from feedsim.files.trace.files import is_stream, written_whole
 from feedsim.foundation.errors import Finding, OutputError
-from feedsim.foundation.outputs import begins_with, check_file
-from feedsim.foundation.owned import claim_folder
+from feedsim.foundation.outputs import begins_with, check_file, claim_folder
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import Paragraph, Part, Picture, Report, Section, Span, Table, Text, Tile, code
 from feedsim.report.formatting import (

@@ -12,7 +12,7 @@ import numpy as np
 from feedsim.analysis import Contour, Figure, Turn, contour
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.compensation import Compensation, Quality, Variation
-from feedsim.foundation import outputs
+from feedsim.files import sheets
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel, spans
 from feedsim.report.content import (
     Picture,
@@ -347,7 +347,7 @@ def table_csv(compensation: Compensation) -> str:
     for what, change, unit, quality in rows_of(compensation):
         numbers = [*quality.peak.values(), *quality.dip.values(), quality.G]
         rows.append([what, f"{change:.6g}", unit, *(f"{1e6 * number:.6g}" for number in numbers)])
-    return outputs.text_of(rows)
+    return sheets.text_of(rows)
 
 
 def friction_files(files: Mapping[str, Path]) -> list[InputFile]:

@@ -14,7 +14,7 @@ import numpy as np
 from feedsim.analysis import Figure
 from feedsim.analysis.history import ERROR_RATE, MIN_RECORDS, Change, FittedChange, LimitCrossing, Scatter, testable
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.foundation import outputs
+from feedsim.files import sheets
 from feedsim.foundation.errors import Finding
 from feedsim.report import formatting
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
@@ -454,7 +454,7 @@ def values_csv(history: History) -> str:
         if one.series.name in history.simulated
         for day, value in zip(one.series.days, one.series.value, strict=True)
     ]
-    return outputs.text_of((heads, *rows, *runs))
+    return sheets.text_of((heads, *rows, *runs))
 
 
 def changes_csv(history: History) -> str:
@@ -509,7 +509,7 @@ def changes_csv(history: History) -> str:
                 *limit,
             )
         )
-    return outputs.text_of((heads, *rows))
+    return sheets.text_of((heads, *rows))
 
 
 def figures_of(history: History) -> Iterator[tuple[str, Figure]]:

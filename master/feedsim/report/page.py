@@ -20,7 +20,7 @@ from feedsim.files.trace import Trace
 from feedsim.files.trace.files import header_line, lines_of
 from feedsim.files.trace.trace import first_not_finite
 from feedsim.foundation.errors import OutputError
-from feedsim.foundation.owned import own_folder
+from feedsim.foundation.outputs import own_folder
 from feedsim.report.chart.model import LAYOUT, embed_charts
 from feedsim.report.content import TILES, Report, split_finding
 from feedsim.report.formatting import PALETTE, typeset

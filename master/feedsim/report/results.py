@@ -13,8 +13,13 @@ from typing import Any
 
 from feedsim.files.source import json_file
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.outputs import is_replacement_allowed, is_same_file
-from feedsim.foundation.owned import TemporaryFolder, claim_folder, defer_signals
+from feedsim.foundation.outputs import (
+    TemporaryFolder,
+    claim_folder,
+    defer_signals,
+    is_replacement_allowed,
+    is_same_file,
+)
 from feedsim.report.content import Picture, Report
 from feedsim.report.page import html
 from feedsim.report.provenance import sha256, software, to_json

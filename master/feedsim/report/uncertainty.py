@@ -11,7 +11,7 @@ import numpy as np
 
 from feedsim.analysis import Figure
 from feedsim.estimation.least_squares import NORMAL_95
-from feedsim.foundation import outputs
+from feedsim.files import sheets
 from feedsim.report.chart import Axis, Band, Chart, Curve, Panel
 from feedsim.report.content import Part, Picture, Report, Section, Table, Text, code
 from feedsim.report.formatting import SIMULATED_COLOUR, display_unit, minus, typeset
@@ -110,7 +110,7 @@ def bands_csv(uncertainty: Uncertainty) -> str:
         at = np.degrees(band.at) if band.kind == "contour" else 1e3 * band.at
         for row in zip(at, *(1e6 * values for values in (band.nominal, band.low, band.high)), strict=True):
             rows.append([band.prefix, band.kind, *(f"{value:.6g}" for value in row)])
-    return outputs.text_of(rows)
+    return sheets.text_of(rows)
 
 
 def summary_part(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 from feedsim import linear
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding
-from feedsim.foundation.owned import cache_answer
+from feedsim.foundation.outputs import cache_answer
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Drive, ForeignUnit, FrictionParameters, Machine, Scenario
 from feedsim.scenario.model import SCHEMES

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation import errors
-from feedsim.foundation.owned import file_digest
+from feedsim.foundation.outputs import file_digest
 from feedsim.scenario.structure.parts import SI, UnitSystem
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 
 if TYPE_CHECKING:
     from feedsim.simulation.nc import Program

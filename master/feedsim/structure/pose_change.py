@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from feedsim.foundation import units
 from feedsim.foundation.errors import FeedsimError, Finding, shorten_list
-from feedsim.foundation.owned import cache_answer
+from feedsim.foundation.outputs import cache_answer
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import CODE, MAX_SHOWN_LABELS, State, digest_of, state_of
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes

@@ -30,7 +30,7 @@ from feedsim.design.sweep.table import RECORD, read_table, record_of
 from feedsim.files.fields import did_you_mean
 from feedsim.foundation import units
 from feedsim.foundation.errors import FeedsimError, Finding, InputError, rank_findings
-from feedsim.foundation.owned import PREFIX, TemporaryFolder
+from feedsim.foundation.outputs import PREFIX, TemporaryFolder
 from feedsim.scenario import Base, Scenario, load
 from feedsim.scenario.study import Parameter, Study, load_study
 from feedsim.simulation import cosim

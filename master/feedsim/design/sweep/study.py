@@ -26,7 +26,7 @@ from feedsim.design.sweep.table import RECORD, STEM, Format, Table, chosen, parq
 from feedsim.files.source import json_value
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import FeedsimError, Finding, InputError, OutputError, SimulationError
-from feedsim.foundation.owned import BlockResource, claim_folder, defer_signals
+from feedsim.foundation.outputs import BlockResource, claim_folder, defer_signals
 from feedsim.scenario.study import Study
 from feedsim.simulation.cosim import fmus_directory
 

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from feedsim.design.sweep.design import Array, Design, Outcome
 from feedsim.files.fields import did_you_mean
+from feedsim.files.sheets import read_rows, write_rows
 from feedsim.files.source import json_file, json_value
 from feedsim.files.trace import matches
 from feedsim.files.trace.cells import duplicate_names, named_columns
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import Finding, InputError, OutputError, no_such_file
 from feedsim.foundation.installation import require_module
-from feedsim.foundation.outputs import read_rows, write_rows
 from feedsim.scenario.study import Parameter
 
 if TYPE_CHECKING:

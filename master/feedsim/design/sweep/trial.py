@@ -19,7 +19,7 @@ from feedsim import analysis
 from feedsim.design.sweep.bundle import Bundle
 from feedsim.design.sweep.design import Design, Outcome
 from feedsim.foundation.errors import Finding, InputError, SimulationError
-from feedsim.foundation.owned import TemporaryFolder, defer_signals
+from feedsim.foundation.outputs import TemporaryFolder, defer_signals
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import Study
 from feedsim.simulation import judge, nc

@@ -29,7 +29,7 @@ from feedsim.design.uncertainty import (
     typed_on,
 )
 from feedsim.foundation.arguments import spell_argument
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.foundation.units import parameters
 from feedsim.linear.judgement import Candidates, Loop, judge
 from feedsim.scenario import Drive, Machine, Scenario

@@ -33,7 +33,7 @@ from feedsim.files.trace import Mark, Recording, read_recording
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import BlockResource
+from feedsim.foundation.outputs import BlockResource
 from feedsim.motions.profile import speed_change
 from feedsim.scenario import Coupling, Friction, Machine
 from feedsim.scenario.loads import MotorLoad, SlideLoad

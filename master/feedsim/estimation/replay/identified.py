@@ -56,7 +56,7 @@ from feedsim.estimation.replay.moving_lines import DIES_AWAY, Line, remove_parab
 from feedsim.estimation.replay.tuning import decision, with_either
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.foundation.parallel import in_parallel
 from feedsim.scenario import Friction, Machine, load_machine
 from feedsim.structure import checked_modes

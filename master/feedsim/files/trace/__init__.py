@@ -1,6 +1,6 @@
 """Time series and frequency responses with names and units: their files, and the import of recorded data.
 
-May use how a file is read (files), units, owned and errors.
+May use how a file is read (files), units, outputs and errors.
 Start with trace.py (the Trace), then cells.py and csv.py (how a file becomes one); frequency responses are in
 response.py and response_files.py.
 """

@@ -19,7 +19,7 @@ from feedsim.files.trace.cells import TIME_NAMES, read_table, round_unit
 from feedsim.files.trace.trace import Array, Trace, first_not_finite, stretches
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.foundation.owned import defer_signals, lock_file
+from feedsim.foundation.outputs import defer_signals, lock_file
 
 
 @contextmanager

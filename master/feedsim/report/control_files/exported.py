@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
+from feedsim.files import sheets
 from feedsim.files.control import Name
 from feedsim.files.control.archive import Archive
 from feedsim.files.control.writing import WrittenFiles
-from feedsim.foundation import outputs
 from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.formatting import count_things, minus, plain_unit
@@ -118,7 +118,7 @@ def sheet(written: WrittenFiles) -> str:
          "yes" if change.name.confirmed else "no", "yes" if change.written else "no", change.reason, change.where)
         for change in written.changes
     )  # fmt: skip
-    return outputs.text_of((heads, *rows))
+    return sheets.text_of((heads, *rows))
 
 
 def report_of(

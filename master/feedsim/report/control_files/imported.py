@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
+from feedsim.files import sheets
 from feedsim.files.control.archive import Archive
 from feedsim.files.control.reading import Reading, RefusedValue, TakenValue
-from feedsim.foundation import outputs
 from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code, provenance_section
 from feedsim.report.control_files.exported import sources_section
@@ -135,7 +135,7 @@ def sheet(reading: Reading, made: ImportedMachine) -> str:
          gone.reason, gone.where)
         for gone in (*reading.refused, *made.refused)
     )  # fmt: skip
-    return outputs.text_of((heads, *taken, *refused))
+    return sheets.text_of((heads, *taken, *refused))
 
 
 def report_of(archives: Sequence[Archive], reading: Reading, made: ImportedMachine, inputs: Sequence[Path]) -> Report:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from feedsim.analysis import ContourError
 from feedsim.analysis.contour_error import SHARE_WORDS
-from feedsim.foundation import outputs
+from feedsim.files import sheets
 from feedsim.motions.part_program import Motion
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
 from feedsim.report.chart.model import extremes
@@ -333,7 +333,7 @@ def blocks_csv(error: ContourError) -> str:
     for row, cells in enumerate(values.tolist()):
         motion = Motion(int(moves.motion[row])).name.lower()
         place = (row, names[moves.file[row]], int(moves.line[row]), moves.text(row), motion, limits[row])
-        words = outputs.text_of([place])
+        words = sheets.text_of([place])
         lines.append(f"{words.rstrip()},{(numbers % tuple(cells)).replace('nan', '')}")
     return "\n".join(lines) + "\n"
 

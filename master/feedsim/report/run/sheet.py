@@ -16,8 +16,8 @@ import numpy as np
 
 from feedsim.analysis import AccuracyTask, CircleTask, Figure, contour, tasks
 from feedsim.analysis.circularity import Turn
+from feedsim.files import sheets
 from feedsim.files.trace import Trace
-from feedsim.foundation import outputs as sheets
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.content import Picture
 from feedsim.report.formatting import minus

@@ -23,8 +23,8 @@ from feedsim.design.tune.drive import (
 from feedsim.design.tune.knobs import EFFECTS
 from feedsim.design.uncertainty import interval, share_of
 from feedsim.estimation.replay.machine_files import drive_file, drive_text
+from feedsim.files import sheets
 from feedsim.files.control import Name, names_of
-from feedsim.foundation import outputs
 from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert, parameters
@@ -184,7 +184,7 @@ def drives(tuned: TunedDrive) -> dict[str, str]:
 def sheet(tuned: TunedDrive, control: str = "") -> str:
     """Values to type: old and new, in the control's unit where its name is known."""
     heads = ("axis", "number", "name", "old", "new", "unit", "unit confirmed", "parameter")
-    return outputs.text_of((heads, *rows(tuned, control)))
+    return sheets.text_of((heads, *rows(tuned, control)))
 
 
 def rows(tuned: TunedDrive, control: str = "") -> Iterator[tuple[str, ...]]:

@@ -13,8 +13,8 @@ from feedsim.analysis.figures import Array
 from feedsim.design.tune.circles import Pair
 from feedsim.design.tune.compensators import GROUP_OF_KIND, NEVER_WORSE, Errors, JudgedCompensation, amplitude
 from feedsim.design.uncertainty import interval, share_of
+from feedsim.files import sheets
 from feedsim.files.control import Name, names_of
-from feedsim.foundation import outputs
 from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
@@ -189,7 +189,7 @@ def sheet(judged: JudgedCompensation) -> str:
             unit, display = _units(parameter)
             cells = ["", "", *(_value_text(x, unit, display) for x in (old, value)), display, ""]
         sheet_rows.append([axis, *cells, parameter])
-    return outputs.text_of(sheet_rows)
+    return sheets.text_of(sheet_rows)
 
 
 def _units(parameter: str) -> tuple[str, str]:

@@ -22,7 +22,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import BlockResource, defer_signals
+from feedsim.foundation.outputs import BlockResource, defer_signals
 from feedsim.simulation.cosim import unpacked
 from feedsim.simulation.cosim.unpacked import STORE, Content, check_there
 from feedsim.simulation.cosim.worker import mark_call, watched_process

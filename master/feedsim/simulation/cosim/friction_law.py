@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from feedsim.foundation.errors import InputError, SimulationError
 from feedsim.foundation.installation import fmus_directory, repair_advice
-from feedsim.foundation.owned import BlockResource
+from feedsim.foundation.outputs import BlockResource
 from feedsim.scenario import FrictionParameters
 from feedsim.scenario.roles import FRICTION_ROLE
 from feedsim.simulation.cosim.archive import Archive

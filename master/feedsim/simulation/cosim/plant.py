@@ -12,7 +12,7 @@ from typing import Any
 
 from feedsim.foundation import units
 from feedsim.foundation.errors import FeedsimError, Finding, InputError
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.scenario import Machine
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.unpacked import STORE

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace import Table, Trace, match_names
 from feedsim.foundation.errors import InputError
-from feedsim.foundation.owned import defer_signals
+from feedsim.foundation.outputs import defer_signals
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 from feedsim.simulation.cosim import system as wiring

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from feedsim.files.trace import Table, Trace, least_and_largest, release, stretches
 from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.foundation.installation import fmus_directory
-from feedsim.foundation.owned import BlockResource
+from feedsim.foundation.outputs import BlockResource
 from feedsim.scenario import Coupling, Drive, Level, Logging, Machine, Scenario
 from feedsim.simulation.cosim.exchange import any_foreign, choose_native_loop
 from feedsim.simulation.cosim.feedforward import TorqueFeedforward, feeders

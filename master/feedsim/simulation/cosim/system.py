@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import BlockResource
+from feedsim.foundation.outputs import BlockResource
 from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.simulation.cosim.archive import Archive

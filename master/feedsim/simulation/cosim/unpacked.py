@@ -25,7 +25,7 @@ from xml.parsers import expat
 
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.foundation.installation import repair_advice, shipped
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 
 # --- What comes from elsewhere, read with distrust: zip archives (names, sizes) and XML documents (no document
 #     type)

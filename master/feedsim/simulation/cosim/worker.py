@@ -36,7 +36,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from feedsim.foundation.errors import FeedsimError, Finding, SimulationError
-from feedsim.foundation.owned import TemporaryFolder, defer_signals
+from feedsim.foundation.outputs import TemporaryFolder, defer_signals
 
 # --- Messages between two processes of which one executes programs of other makers, which may write into the pipe
 #     or close

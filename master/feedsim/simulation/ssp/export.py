@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.model import SCHEMES
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role

@@ -16,7 +16,7 @@ import numpy as np
 from feedsim.files.source import confine_references
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.foundation.owned import TemporaryFolder
+from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import Scenario, load
 from feedsim.simulation.cosim.archive import Archive

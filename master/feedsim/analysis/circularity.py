@@ -15,8 +15,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.figures import Array, Figure, column, window
+from feedsim.analysis.figures import Array, Figure
 from feedsim.files.trace import Trace
+from feedsim.files.trace.trace import find_rows, require_column
 from feedsim.foundation.errors import InputError
 from feedsim.motions.circular import Circular
 from feedsim.motions.setpoints import RecordedGeometry
@@ -71,10 +72,10 @@ def contour(trace: Trace, turn: Turn, columns: tuple[str, str] | None = None) ->
     first, second = turn.axes
     names = columns or (f"{first}.x_a", f"{second}.x_a")
     purpose = f"circularity in the plane {first}{second}"
-    rows = window(trace, turn.begin, turn.end, purpose, least=16)
+    rows = find_rows(trace, turn.begin, turn.end, purpose, least=16)
     if trace.time[rows][-1] >= turn.end:  # the same point of the circle as the first one
         rows = slice(rows.start, rows.stop - 1)
-    x, y = (column(trace, name, purpose)[rows] - c for name, c in zip(names, turn.centre, strict=True))
+    x, y = (require_column(trace, name, purpose)[rows] - c for name, c in zip(names, turn.centre, strict=True))
     angle = np.arctan2(y, x)
     deviation = np.hypot(x, y) - turn.radius
     if np.unique(np.floor(angle / (math.pi / 4))).size < 8:

@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.figures import Array, Figure, column
+from feedsim.analysis.figures import Array, Figure
 from feedsim.files.fields import Quantity
 from feedsim.files.trace import Trace
+from feedsim.files.trace.trace import require_column
 from feedsim.motions.part_program.words import Motion
 from feedsim.motions.planner.nearest import Feet
 from feedsim.motions.program import ProgrammedGeometry
@@ -250,8 +251,8 @@ def contour_error(
     axes = programmed.moves.axes
     purpose = f"the contour error of {programmed.moves.files[0]}"
     setpoints = Setpoints(program, machine, axes)
-    x = [column(trace, f"{axis}.x_a", purpose) for axis in axes]
-    without = None if frictionless is None else [column(frictionless, f"{axis}.x_a", purpose) for axis in axes]
+    x = [require_column(trace, f"{axis}.x_a", purpose) for axis in axes]
+    without = None if frictionless is None else [require_column(frictionless, f"{axis}.x_a", purpose) for axis in axes]
     tool = [trace[name] for axis in axes if (name := f"tcp.x_{axis}") in trace.columns]
     first, behind = np.searchsorted(trace.time, [segment.start - 1e-9, segment.end + LONGEST_DELAY])
     delay = setpoints.delay(trace.time[first:behind], [positions[first:behind] for positions in x])

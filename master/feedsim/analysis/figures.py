@@ -1,4 +1,4 @@
-"""A derived figure, and small tools on time series that the analyses share."""
+"""A derived figure, and tables of them."""
 
 from __future__ import annotations
 
@@ -11,18 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files.trace import Trace
 from feedsim.files.trace.trace import suggest_name
-from feedsim.foundation.errors import InputError, UnknownName
+from feedsim.foundation.errors import UnknownName
 from feedsim.foundation.installation import require_module
 
 if TYPE_CHECKING:
     import pandas
 
 Array = NDArray[np.float64]
-
-# Instants within this share of a sampling interval count as the same: recorded times carry rounding errors.
-SAME_INSTANT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -88,60 +84,3 @@ class FigureTable(dict[str, Figure]):
         cells = ["".join(f"<td style='text-align:left'>{escape(cell)}</td>" for cell in row) for row in rows]
         heads = "".join(f"<th>{head}</th>" for head in ("figure", "value", "interval", "meaning"))
         return f"<table><tr>{heads}</tr>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
-
-
-def column(trace: Trace, name: str, purpose: str) -> Array:
-    """Column ``name`` of the trace; raises InputError that names the purpose and what was recorded instead."""
-    if name not in trace.columns:
-        recorded = ", ".join(trace.columns) or "nothing"
-        raise InputError(f"{purpose} needs {name}, which is not recorded; recorded: {recorded}")
-    return np.asarray(trace[name], dtype=np.float64)
-
-
-def window(trace: Trace, begin: float, end: float, purpose: str, *, least: int = 2) -> slice:
-    """Rows with begin <= time <= end [s]; raises InputError where the trace does not reach that far.
-
-    The window may stick out of the recording by one sampling interval.
-    """
-    time = trace.time
-    interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    slack = SAME_INSTANT * interval
-    first = int(np.searchsorted(time, begin - slack, side="left"))
-    last = int(np.searchsorted(time, end + slack, side="right"))
-    short = len(time) == 0 or begin < time[0] - interval - slack or end > time[-1] + interval + slack
-    if short or last - first < least:
-        have = f"{time[0]:.6g} to {time[-1]:.6g} s" if len(time) else "nothing"
-        raise InputError(
-            f"{purpose} needs the trace from {begin:.6g} to {end:.6g} s with {least} samples or more; "
-            f"recorded: {have}, {max(last - first, 0)} samples in that span"
-        )
-    return slice(first, last)
-
-
-def up_crossings(time: Array, signal: Array) -> Array:
-    """Instants [s], linearly interpolated, at which ``signal`` (N,) rises through zero."""
-    rise = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
-    share = signal[rise] / (signal[rise] - signal[rise + 1])
-    return np.asarray(time[rise] + share * (time[rise + 1] - time[rise]), dtype=np.float64)
-
-
-def last_outside(time: Array, deviation: Array, band: float) -> float:
-    """Last instant [s] with |deviation| > band, interpolated to the crossing of the band's edge.
-
-    -inf where the deviation never leaves the band, NaN where it is still outside at the last sample.
-    """
-    outside = np.flatnonzero(np.abs(deviation) > band)
-    if len(outside) == 0:
-        return -math.inf
-    k = int(outside[-1])
-    if k == len(time) - 1:
-        return math.nan
-    edge = math.copysign(band, deviation[k])
-    share = (deviation[k] - edge) / (deviation[k] - deviation[k + 1])
-    return float(time[k] + share * (time[k + 1] - time[k]))
-
-
-def moving_mean(values: Array, count: int) -> Array:
-    """Mean over ``count`` neighbours; fewer at the ends."""
-    ones = np.ones(min(count, len(values)))
-    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))

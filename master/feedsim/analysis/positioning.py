@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feedsim.analysis.figures import Array, Figure, column, last_outside, up_crossings, window
+from feedsim.analysis.figures import Array, Figure
 from feedsim.files.trace import Trace
+from feedsim.files.trace.trace import find_rows, require_column
 from feedsim.foundation.errors import InputError
 from feedsim.motions.positioning_cycle import Visits
 from feedsim.structure.modes import checked_modes, with_mounts, write_modes
@@ -129,7 +130,7 @@ def mounts_share(clamped: Trace, approach: Approach, settling: Figure, band: flo
 def deviation(trace: Trace, approach: Approach, name: str) -> tuple[Array, Array]:
     """Time [s] and distance beyond the target [m], positive past it, from the motion's start to its last instant."""
     rows = _rows(trace, approach)
-    return trace.time[rows], approach.sense * (column(trace, name, "positioning")[rows] - approach.target)
+    return trace.time[rows], approach.sense * (require_column(trace, name, "positioning")[rows] - approach.target)
 
 
 def ringing_frequency(time: Array, speed: Array) -> float:
@@ -150,7 +151,7 @@ def _rest_is_seen(time: Array, approach: Approach, since: float) -> bool:
 def _rows(trace: Trace, approach: Approach) -> slice:
     """The motion and what follows it, as far as it is recorded."""
     until = max(approach.end, min(approach.until, float(trace.time[-1]))) if len(trace) else approach.until
-    return window(trace, approach.start, until, f"positioning of axis {approach.axis}")
+    return find_rows(trace, approach.start, until, f"positioning of axis {approach.axis}")
 
 
 def _stop(trace: Trace, approach: Approach, name: str, band: float, what: str) -> dict[str, Figure]:
@@ -195,7 +196,7 @@ def _ringing_figure(time: Array, speed: Array, approach: Approach, what: str) ->
 
 
 def _torques(trace: Trace, approach: Approach) -> dict[str, Figure]:
-    torque = column(trace, f"{approach.axis}.M_a", "positioning")
+    torque = require_column(trace, f"{approach.axis}.M_a", "positioning")
     rows = _rows(trace, approach)
     figures = {"peak_torque": Figure(float(np.abs(torque[rows]).max()), "N.m", "largest magnitude of the motor torque")}
     if approach.steady is not None:
@@ -213,7 +214,7 @@ def _torques(trace: Trace, approach: Approach) -> dict[str, Figure]:
 def _rest_torque(trace: Trace, approach: Approach) -> Figure:
     instant = approach.end + REST_DELAY
     reached = instant <= min(approach.until, float(trace.time[-1]))
-    torque = column(trace, f"{approach.axis}.M_fr", "positioning")
+    torque = require_column(trace, f"{approach.axis}.M_fr", "positioning")
     return Figure(
         float(np.interp(instant, trace.time, torque)) if reached else math.nan,
         "N.m",
@@ -298,11 +299,34 @@ def readings(trace: Trace, visits: Visits, name: str, noise: float, rng: np.rand
     up to the last visit.
     """
     purpose = f"positioning accuracy of axis {visits.axis}"
-    position = column(trace, name, purpose)
+    position = require_column(trace, name, purpose)
     values = np.empty((len(SIDES), len(visits.targets), visits.runs))
     places = {target: i for i, target in enumerate(visits.targets)}
     for visit in visits.visits:
-        rows = window(trace, visit.begin, visit.end, purpose)
+        rows = find_rows(trace, visit.begin, visit.end, purpose)
         at = (0 if visit.sense > 0 else 1, places[visit.target], visit.run)
         values[at] = position[rows.stop - 1] - visit.target + noise * rng.standard_normal()
     return values
+
+
+def up_crossings(time: Array, signal: Array) -> Array:
+    """Instants [s], linearly interpolated, at which ``signal`` (N,) rises through zero."""
+    rise = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
+    share = signal[rise] / (signal[rise] - signal[rise + 1])
+    return np.asarray(time[rise] + share * (time[rise + 1] - time[rise]), dtype=np.float64)
+
+
+def last_outside(time: Array, deviation: Array, band: float) -> float:
+    """Last instant [s] with |deviation| > band, interpolated to the crossing of the band's edge.
+
+    -inf where the deviation never leaves the band, NaN where it is still outside at the last sample.
+    """
+    outside = np.flatnonzero(np.abs(deviation) > band)
+    if len(outside) == 0:
+        return -math.inf
+    k = int(outside[-1])
+    if k == len(time) - 1:
+        return math.nan
+    edge = math.copysign(band, deviation[k])
+    share = (deviation[k] - edge) / (deviation[k] - deviation[k + 1])
+    return float(time[k] + share * (time[k + 1] - time[k]))

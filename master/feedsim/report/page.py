@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Self
 
 from feedsim.files.trace import Trace
-from feedsim.files.trace.files import header_line, lines_of
+from feedsim.files.trace.cells import header_line, lines_of
 from feedsim.files.trace.trace import first_not_finite
 from feedsim.foundation.errors import OutputError
 from feedsim.foundation.outputs import own_folder

@@ -17,7 +17,7 @@ from feedsim.analysis.circle.geometry import ANGLE_TERMS, CircleUnderTest, Turne
 from feedsim.analysis.circle.model import ESSENTIAL, Fit
 from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circularity import fitted_centre
-from feedsim.analysis.figures import Array, moving_mean
+from feedsim.analysis.figures import Array
 from feedsim.estimation.least_squares import CHANGE_FLOOR, is_significant
 
 # --- Vibrations on a circle, between the reversals: of every axis whose position is known, else of the radius ---------
@@ -645,3 +645,9 @@ def _form(fit: Fit) -> dict[int, float]:
     matrix = np.column_stack([wave(n * angle) for n in FORM for wave in (np.cos, np.sin)])
     values = np.linalg.lstsq(matrix, off, rcond=None)[0]
     return {n: float(np.hypot(*values[2 * i : 2 * i + 2])) for i, n in enumerate(FORM)}
+
+
+def moving_mean(values: Array, count: int) -> Array:
+    """Mean over ``count`` neighbours; fewer at the ends."""
+    ones = np.ones(min(count, len(values)))
+    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))

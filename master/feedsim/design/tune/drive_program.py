@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.analysis.circularity import quadrant
-from feedsim.analysis.figures import Array, last_outside
+from feedsim.analysis.figures import Array
+from feedsim.analysis.positioning import last_outside
 from feedsim.analysis.proposals import axis_lag, check_controlled
 from feedsim.design.tune.circles import REST_TIME, RUN_IN_ANGLE, Pair, run_in, sweep_of, turn_of
 from feedsim.files.trace import Trace

@@ -1,4 +1,4 @@
-"""Cells of a CSV file by column, and numbers of them.
+"""Cells of a CSV file by column, numbers of them, and how a trace's are written.
 
 Commas, semicolons or tabs between the columns, decimal commas with the latter two, a byte-order mark, UTF-16 and
 Windows-1252, quotes. Where the table begins: layout.py; time stamps: stamps.py.
@@ -21,9 +21,18 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from pydantic_core import to_json
 
 from feedsim.files.source import content
-from feedsim.files.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recordable_values, suggest_name
+from feedsim.files.trace.trace import (
+    MAX_MAGNITUDE,
+    Array,
+    Trace,
+    check_name,
+    check_unit,
+    recordable_values,
+    suggest_name,
+)
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError, shorten_list
 from feedsim.foundation.units import NUMBER, known_unit, spell_unit
@@ -797,3 +806,41 @@ def numbers(cells: Sequence[str], decimal: Decimal, lines: Sequence[int], where:
                 f"{MAX_MAGNITUDE:g}"
             )
     return np.array([float(text) for text in plain], dtype=np.float64)
+
+
+# --- Cells as they are written ---------------------------------------------------------------------------------------
+
+
+def header_line(trace: Trace) -> bytes:
+    """The first line of a trace's file."""
+    units = [(name, trace.unit(name)) for name in trace.columns]
+    heads = ["time [s]", *(f"{name} [{unit}]" if unit or round_unit(name) else name for name, unit in units)]
+    return f"{','.join(quote_cell(cell) for cell in heads)}\n".encode()
+
+
+def lines_of(columns: Sequence[Array]) -> bytes:
+    """Rows of a file, the time being the first of the columns."""
+    text = zip(*(shortest_numbers(values) for values in columns), strict=True)
+    return "".join(f"{','.join(cells)}\n" for cells in text).encode()
+
+
+def shortest_numbers(values: Array) -> list[str]:
+    """Every number in its shortest form that reads back the same, as repr() writes it, whole ones without ".0"."""
+    if not values.size:
+        return []
+    if (values.view(np.uint64) == values[:1].view(np.uint64)).all():  # of an axis that stands: many columns
+        return [repr(float(values[0])).removesuffix(".0")] * len(values)
+    numbers, size = values.tolist(), np.abs(values)
+    # The digits are those of repr, which takes five times as long. Its exponents have two digits, and begin below 1e-4.
+    text = to_json(numbers).decode()[1:-1].replace("e-", "e-0").split(",")
+    same = (size >= 1e-9) & (size < 1e-5) | (size >= 1e-4) & (size < 1e16) | (size == 0)
+    for i in np.flatnonzero(~same).tolist():
+        text[i] = repr(numbers[i])
+    for i in np.flatnonzero(values == np.trunc(values)).tolist():
+        text[i] = text[i].removesuffix(".0")
+    return text
+
+
+def quote_cell(cell: str) -> str:
+    """A cell as it stands in a file."""
+    return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',;"') else cell

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
@@ -13,10 +13,9 @@ from tempfile import NamedTemporaryFile
 from typing import IO
 
 import numpy as np
-from pydantic_core import to_json
 
-from feedsim.files.trace.cells import TIME_NAMES, read_table, round_unit
-from feedsim.files.trace.trace import Array, Trace, first_not_finite, stretches
+from feedsim.files.trace.cells import TIME_NAMES, header_line, lines_of, read_table
+from feedsim.files.trace.trace import Trace, first_not_finite, stretches
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.foundation.outputs import defer_signals, lock_file
@@ -240,38 +239,3 @@ def write_csv(path: str | Path, trace: Trace) -> None:
         file.write(header_line(trace))
         for columns in stretches(trace.time, *trace.columns.values(), rows=ROWS):
             file.write(lines_of(columns))
-
-
-def header_line(trace: Trace) -> bytes:
-    """The first line of a trace's file."""
-    units = [(name, trace.unit(name)) for name in trace.columns]
-    heads = ["time [s]", *(f"{name} [{unit}]" if unit or round_unit(name) else name for name, unit in units)]
-    return f"{','.join(quote_cell(cell) for cell in heads)}\n".encode()
-
-
-def lines_of(columns: Sequence[Array]) -> bytes:
-    """Rows of a file, the time being the first of the columns."""
-    text = zip(*(shortest_numbers(values) for values in columns), strict=True)
-    return "".join(f"{','.join(cells)}\n" for cells in text).encode()
-
-
-def shortest_numbers(values: Array) -> list[str]:
-    """Every number in its shortest form that reads back the same, as repr() writes it, whole ones without ".0"."""
-    if not values.size:
-        return []
-    if (values.view(np.uint64) == values[:1].view(np.uint64)).all():  # of an axis that stands: many columns
-        return [repr(float(values[0])).removesuffix(".0")] * len(values)
-    numbers, size = values.tolist(), np.abs(values)
-    # The digits are those of repr, which takes five times as long. Its exponents have two digits, and begin below 1e-4.
-    text = to_json(numbers).decode()[1:-1].replace("e-", "e-0").split(",")
-    same = (size >= 1e-9) & (size < 1e-5) | (size >= 1e-4) & (size < 1e16) | (size == 0)
-    for i in np.flatnonzero(~same).tolist():
-        text[i] = repr(numbers[i])
-    for i in np.flatnonzero(values == np.trunc(values)).tolist():
-        text[i] = text[i].removesuffix(".0")
-    return text
-
-
-def quote_cell(cell: str) -> str:
-    """A cell as it stands in a file."""
-    return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',;"') else cell

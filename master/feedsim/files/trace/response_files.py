@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.files.trace.cells import Table, read_table
-from feedsim.files.trace.files import quote_cell, shortest_numbers, written_whole
+from feedsim.files.trace.cells import Table, quote_cell, read_table, shortest_numbers
+from feedsim.files.trace.files import written_whole
 from feedsim.files.trace.response import Complexes, FrequencyResponse, quotient_unit, without_zero
 from feedsim.files.trace.sinumerik_xml import SUFFIX, read_response_xml
 from feedsim.files.trace.trace import Array

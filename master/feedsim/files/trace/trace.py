@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 IN_MEMORY = 16 * 2**20
 # Rows that are worked on at a time where a column may be long.
 STRETCH = 1 << 16
+# Instants within this share of a sampling interval count as the same: recorded times carry rounding errors.
+SAME_INSTANT = 1e-6
 
 
 class Table:
@@ -350,3 +352,31 @@ def _frozen_array(values: ArrayLike, name: str) -> Array:
         raise InputError(f"column {name!r} must be one-dimensional, has shape {array.shape}")
     array.setflags(write=False)
     return array
+
+
+def require_column(trace: Trace, name: str, purpose: str) -> Array:
+    """Column ``name`` of the trace; raises InputError that names the purpose and what was recorded instead."""
+    if name not in trace.columns:
+        recorded = ", ".join(trace.columns) or "nothing"
+        raise InputError(f"{purpose} needs {name}, which is not recorded; recorded: {recorded}")
+    return np.asarray(trace[name], dtype=np.float64)
+
+
+def find_rows(trace: Trace, begin: float, end: float, purpose: str, *, least: int = 2) -> slice:
+    """Rows with begin <= time <= end [s]; raises InputError where the trace does not reach that far.
+
+    The window may stick out of the recording by one sampling interval.
+    """
+    time = trace.time
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    slack = SAME_INSTANT * interval
+    first = int(np.searchsorted(time, begin - slack, side="left"))
+    last = int(np.searchsorted(time, end + slack, side="right"))
+    short = len(time) == 0 or begin < time[0] - interval - slack or end > time[-1] + interval + slack
+    if short or last - first < least:
+        have = f"{time[0]:.6g} to {time[-1]:.6g} s" if len(time) else "nothing"
+        raise InputError(
+            f"{purpose} needs the trace from {begin:.6g} to {end:.6g} s with {least} samples or more; "
+            f"recorded: {have}, {max(last - first, 0)} samples in that span"
+        )
+    return slice(first, last)

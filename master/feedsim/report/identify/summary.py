@@ -15,7 +15,7 @@ from feedsim.estimation.identify import IdentifiedFriction, friction_file
 from feedsim.estimation.identify.friction_file import FRICTION_FILE
 from feedsim.estimation.identify.read import recording_day, recording_temperature
 from feedsim.estimation.identify.result import Balance, Estimate, Identification
-from feedsim.files.trace.files import quote_cell, shortest_numbers
+from feedsim.files.trace.cells import quote_cell, shortest_numbers
 from feedsim.foundation.errors import Finding
 from feedsim.report.formatting import Array, count_things
 from feedsim.report.identify import stribeck_plots as quantities

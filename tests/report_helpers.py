@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure, FigureTable, diagnoses
+from feedsim.analysis.proposals import of_run
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import Finding
 from feedsim.jobs.run import result_of
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.report.page import Partial
-from feedsim.report.run import proposed_changes
 from feedsim.scenario import CircleTest, Positioning, Scenario
 from feedsim.simulation.cosim.loads import Work
 from feedsim.simulation.judge import PoseUse
@@ -49,7 +49,7 @@ def write_run(
 ) -> tuple[Path, ...]:
     """What the job leaves of a run with these figures."""
     evaluated, causes = copy.copy(run), diagnoses(run)
-    own = {"figures": FigureTable(figures), "causes": causes, "changes": proposed_changes(run, figures, causes)}
+    own = {"figures": FigureTable(figures), "causes": causes, "changes": of_run(run, causes, figures)}
     vars(evaluated).update(own, page="", uncertainty=None)
     return result_of(evaluated, recorded).save(folder, figures=drawn)
 

@@ -41,7 +41,7 @@ DRIVE = "machine.axes.{}.drive.{}"
 
 def proposals(settings: Sequence[str], fmus: Path, *, searched: bool = False) -> list[Proposal]:
     result = judge_run(cosim.run(load(CIRCLE, settings), fmus=fmus))
-    return of_run(result, analysis.diagnoses(result), searched=searched)
+    return of_run(result, analysis.diagnoses(result), {}, searched=searched)
 
 
 def slow_phase_lag(machine: Machine, output: str, name: str) -> float:
@@ -156,7 +156,7 @@ def test_the_peak_that_can_fall_most_comes_first(fmus: Path) -> None:
     causes = analysis.diagnoses(result)
     peaks = {term.axis: term.value for diagnosis in causes.values() for term in diagnosis.terms if term.key == "peaks"}
     assert 0 < peaks["X"] < peaks["Y"]
-    found = of_run(result, causes)
+    found = of_run(result, causes, {})
     assert [(each.axis, each.parameter) for each in found] == [
         ("X", "drive.T_n"),
         ("X", COMPENSATION),
@@ -192,7 +192,7 @@ def test_nothing_is_proposed_for_what_another_maker_drives(fmus: Path) -> None:
     result = judge_run(cosim.run(scenario, fmus=fmus))
     causes = analysis.diagnoses(result)
     gone = scenario.machine.model_copy(update={"modes": Path("gone.csv")})
-    assert of_run(replace(result, scenario=scenario.model_copy(update={"machine": gone})), causes) == []
+    assert of_run(replace(result, scenario=scenario.model_copy(update={"machine": gone})), causes, {}) == []
 
 
 def test_try_runs_and_overlays(fmus: Path, tmp_path: Path) -> None:

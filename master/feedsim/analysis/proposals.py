@@ -21,6 +21,7 @@ from feedsim.foundation.units import convert, parameters
 from feedsim.linear.judgement import Loop, judge
 from feedsim.scenario import Cycles, Drive, Machine
 from feedsim.simulation.cosim import Run
+from feedsim.simulation.judge import JudgedRun, wrong_findings
 from feedsim.structure import Modes, checked_modes
 
 # --- Closed forms of a drive that proposals rest on: lags of slow motions, neutral T_sym, gain of the reference model -
@@ -224,20 +225,20 @@ def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -
 
 
 def of_run(
-    run: Run,
+    run: JudgedRun,
     causes: Mapping[str, Diagnosis],
-    figures: Mapping[str, Figure] | None = None,
+    figures: Mapping[str, Figure],
     *,
     searched: bool = False,
 ) -> list[Proposal]:
     """Proposals of a run: for the causes of its circles, and for the axes of its stops.
 
     causes: prefix of a circle's figures -> why it is not round. figures: of the run, by which stops that ring are
-    known. searched: as of :func:`of_circle`. Drives of other makers have none, nor have machines whose modes cannot be
-    read any more.
+    known. searched: as of :func:`of_circle`. A run that is wrong has none, nor have drives of other makers and machines
+    whose modes cannot be read any more.
     """
     machine = run.scenario.machine
-    if machine.foreign_units:
+    if machine.foreign_units or wrong_findings(run):
         return []
     try:
         modes = checked_modes(machine)
@@ -251,7 +252,7 @@ def of_run(
         if isinstance(task, PositioningTask):
             axis = task.approach.axis
             own = of_drives(machine, modes, [axis], f"stops of {axis}")
-            for proposal in own or _propose_jerk(run, task, figures or {}):
+            for proposal in own or _propose_jerk(run, task, figures):
                 proposals.setdefault(proposal.key, proposal)
     return list(proposals.values())
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from feedsim import analysis, scenario
-from feedsim.analysis.proposals import Proposal
+from feedsim.analysis.proposals import Proposal, of_run
 from feedsim.files.source import is_ssp, is_study
 from feedsim.files.trace import Array
 from feedsim.foundation.arguments import Changes, settings, spell_argument
@@ -147,7 +147,7 @@ class EvaluatedRun(JudgedRun):
     @cached_property
     def changes(self) -> Sequence[Proposal]:
         """What to change, from what to what, the first one first; none of a run that is wrong."""
-        return report.proposed_changes(self, self.figures, self.causes)
+        return of_run(self, self.causes, self.figures)
 
     @cached_property
     def _tasks(self) -> Sequence[analysis.Task]:
@@ -176,10 +176,10 @@ def result_of(run: EvaluatedRun, recorded: Partial | None = None) -> Result[Eval
         KIND,
         run,
         lambda: report.page_of(
-            run, run.figures, run.causes, page=bool(run.page), uncertainty=run.uncertainty, proposals=run.changes
+            run, run.figures, run.causes, run.changes, page=bool(run.page), uncertainty=run.uncertainty
         ),
         figures=lambda: run.figures,
-        details=lambda: report.details(run, run.figures, run.causes, run.uncertainty, run.changes),
+        details=lambda: report.details(run, run.figures, run.causes, run.changes, run.uncertainty),
         files=partial(report.files_of, run, run.page, recorded, run.uncertainty),
         inputs=report.input_paths(run.scenario),
         rows=lambda: [f"{run.scenario.name}: {report.summary_line(run, run.figures)}"],
@@ -246,12 +246,13 @@ def run(
             content(subject.plan, subject.program, fmus=subject.fmus)  # and so is a page
         inputs = report.input_paths(subject.plan)
         with claim_result_folder(out, KIND, watch, inputs, subject.changes, force=force):
+            recorded = None if out is None else report.growing_result(out)
             for sentence in cosim.describe_programs(subject.plan.machine, subject.fmus, subject.plan.coupling):
                 watch.announce(subject.named(sentence))
-            if out is None:
+            if out is None or recorded is None:
                 done = _run(subject, None, page, friction_share, watch)
                 return result_of(_with_draws(done, subject, cloud, uncertain, watch))
-            with _rows_kept(report.growing_result(out), watch) as recorded:
+            with _rows_kept(recorded, watch):
                 done = _run(subject, recorded, page, friction_share, watch)
                 result = result_of(_with_draws(done, subject, cloud, uncertain, watch), recorded)
                 result.save(out, figures=figures, force=force, control=control)
@@ -286,17 +287,19 @@ def _with_draws(
     """The run with what identification leaves open, where that is asked for."""
     if cloud is None:
         return result
-    from feedsim.design.uncertainty import of_run
+    from feedsim.design.uncertainty import of_run as uncertainty_of_run
 
-    return replace(result, uncertainty=of_run(result, cloud, count, fmus=subject.fmus, progress=watch.progress))
+    return replace(
+        result, uncertainty=uncertainty_of_run(result, cloud, count, fmus=subject.fmus, progress=watch.progress)
+    )
 
 
 @contextmanager
-def _rows_kept(recorded: Partial, watch: Watch) -> Iterator[Partial]:
+def _rows_kept(recorded: Partial, watch: Watch) -> Iterator[None]:
     """Say where the rows are of a run that does not come to its end."""
     try:
         with recorded:
-            yield recorded
+            yield
     except BaseException:
         if recorded.has_rows:
             watch.announce(f"the rows up to {recorded.time:.9g} s are kept in {recorded.path}")

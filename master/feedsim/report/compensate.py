@@ -359,7 +359,7 @@ def details(
     compensation: Compensation, files: Mapping[str, Path], uncertainty: Uncertainty | None = None
 ) -> dict[str, Any]:
     """What summary.json has besides the figures: that of the compensated run, and the compensation."""
-    content = details_of_run(compensation.after, compensation.figures, uncertainty=uncertainty)
+    content = details_of_run(compensation.after, compensation.figures, {}, (), uncertainty)
     machine = compensation.scenario.machine
     content["inputs"] += inputs_part(friction_files(files))
     content["compensation"] = {

@@ -365,6 +365,11 @@ class JudgedRun(Run):
     warnings: tuple[Finding, ...]
 
 
+def wrong_findings(run: JudgedRun) -> list[Finding]:
+    """Findings with which nobody may read figures of the run."""
+    return [finding for finding in run.warnings if finding.severity == "wrong"]
+
+
 def judge_run(run: Run, *, keep: bool = True) -> JudgedRun:
     """The run with its doubts: those of its units, of the parameters, of the pose, and what the run itself shows.
 

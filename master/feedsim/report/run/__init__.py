@@ -9,22 +9,19 @@ from feedsim.report.page import PARTIAL
 from feedsim.report.provenance import input_paths
 from feedsim.report.run.files import FILES, details, files_of, growing_result, page_of
 from feedsim.report.run.files import require_workbooks as workbook_needed
-from feedsim.report.run.report import answers, first_proposals, proposed_changes, summary_line
+from feedsim.report.run.report import summary_line
 from feedsim.report.run.sheet import in_workbook
 
 __all__ = [
     "FILES",
     "PARTIAL",
     "action",
-    "answers",
     "details",
     "files_of",
-    "first_proposals",
     "growing_result",
     "in_workbook",
     "input_paths",
     "page_of",
-    "proposed_changes",
     "summary_line",
     "workbook_needed",
 ]

@@ -46,7 +46,6 @@ from feedsim.report.run.report import (
     draw,
     first_proposals,
     leading_names,
-    proposed_changes,
     real_time_factor,
     report_of,
     signal_unit,
@@ -177,13 +176,13 @@ def page_of(
     run: JudgedRun,
     figures: Mapping[str, Figure],
     causes: Mapping[str, Diagnosis],
+    proposals: Sequence[Proposal],
     *,
     page: bool,
     uncertainty: Uncertainty | None,
-    proposals: Sequence[Proposal] | None = None,
 ) -> Report:
     """Content of the report, with the intervals where there are some."""
-    report = report_of(run, figures, draw(run, figures, causes), causes, page=page, proposals=proposals)
+    report = report_of(run, figures, draw(run, figures, causes), causes, proposals, page=page)
     return report if uncertainty is None else with_intervals(report, uncertainty, figures, leading_names(figures))
 
 
@@ -223,14 +222,12 @@ def files_of(
 def details(
     run: JudgedRun,
     figures: Mapping[str, Figure],
-    causes: Mapping[str, Diagnosis] | None = None,
+    causes: Mapping[str, Diagnosis],
+    proposals: Sequence[Proposal],
     uncertainty: Uncertainty | None = None,
-    proposals: Sequence[Proposal] | None = None,
 ) -> dict[str, Any]:
     """What summary.json has besides the figures; a figure that could not be determined has the value null."""
-    causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
-    proposals = proposed_changes(run, figures, causes) if proposals is None else proposals
     return {
         "format": FORMAT,
         "action": action(first_proposals(proposals, causes), machine),

@@ -24,9 +24,8 @@ from feedsim.analysis import (
     tasks,
 )
 from feedsim.analysis.circle import worth_telling
-from feedsim.analysis.proposals import Proposal, of_run, waits_for_ringing
+from feedsim.analysis.proposals import Proposal, waits_for_ringing
 from feedsim.files.trace import Trace
-from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import show
 from feedsim.report import content
 from feedsim.report.changes import action, change_words, changes_section, control_section
@@ -51,7 +50,7 @@ from feedsim.report.run.axis_plots import (
 from feedsim.report.run.contour import contour_pictures, contour_section, contour_words
 from feedsim.report.run.pose import cause_tile, diagnosis_section, pose_section
 from feedsim.scenario import Drive, Level, Logging
-from feedsim.simulation.judge import JudgedRun
+from feedsim.simulation.judge import JudgedRun, wrong_findings
 
 # --- What a stop and a positioning cycle come to, in a sentence or two: the answer, its meaning, what to do next ------
 
@@ -110,7 +109,7 @@ def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequen
     scenario = run.scenario
     if scenario.file.suffix == ".ssp":
         return None
-    if wrong := wrong_ones(run):
+    if wrong := wrong_findings(run):
         setting = wrong[0].remedy if wrong[0].code == "loop-unstable" else ""
         stable = {"scenario": scenario.file, "set": [*scenario.overrides, setting], "out": f"{FOLDER}_stable"}
         return Step("Run it with a gain that is stable", "run", stable) if setting else None
@@ -145,11 +144,6 @@ def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequen
     if scenario.machine.foreign_units:
         return None
     return Step("See how each axis answers", "frf", {"subject": scenario.file})
-
-
-def wrong_ones(run: JudgedRun) -> list[Finding]:
-    """Findings with which nobody may read figures of the run."""
-    return [finding for finding in run.warnings if finding.severity == "wrong"]
 
 
 def travels(trace: Trace) -> dict[str, float]:
@@ -237,20 +231,19 @@ def report_of(
     run: JudgedRun,
     figures: Mapping[str, Figure],
     pictures: Sequence[Picture],
-    causes: Mapping[str, Diagnosis] | None = None,
+    causes: Mapping[str, Diagnosis],
+    proposals: Sequence[Proposal],
     *,
     page: bool = False,
-    proposals: Sequence[Proposal] | None = None,
 ) -> Report:
     """Content of the report.
 
-    causes: prefix of a circle's figures -> why it is not round. page: there is a machine page beside it. proposals:
-    what to change, where that is known already.
+    causes: prefix of a circle's figures -> why it is not round. proposals: what to change. page: there is a machine
+    page beside it.
     """
     scenario, machine = run.scenario, run.scenario.machine
-    unstable = bool(wrong_ones(run))
-    causes = {} if unstable else causes or {}
-    proposals = proposed_changes(run, figures, causes) if proposals is None else proposals
+    unstable = bool(wrong_findings(run))
+    causes = {} if unstable else causes
     footer = f"Values in full precision: summary.json; time series: result.csv. {speed_line(run).capitalize()}."
     return Report(
         scenario.name,
@@ -293,11 +286,6 @@ def accuracy_sections(run: JudgedRun) -> list[Section]:
     ]
 
 
-def proposed_changes(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Proposal]:
-    """What to change; nothing of a run that is wrong, which shows nothing else."""
-    return [] if wrong_ones(run) else of_run(run, causes, figures)
-
-
 def first_proposals(proposals: Sequence[Proposal], causes: Mapping[str, Diagnosis]) -> Sequence[Proposal]:
     """The proposals where the first one is for the main cause of the first circle, or for a stop; else none."""
     named = [term.key for diagnosis in list(causes.values())[:1] for term in worth_telling(diagnosis)[:1]]
@@ -308,12 +296,11 @@ def answers(
     run: JudgedRun,
     figures: Mapping[str, Figure],
     causes: Mapping[str, Diagnosis],
-    proposals: Sequence[Proposal] | None = None,
+    proposals: Sequence[Proposal],
 ) -> list[str]:
     """What circles, stops and positioning cycles are, why, and what to do: a line each; none of a run that is wrong."""
-    if wrong_ones(run):
+    if wrong_findings(run):
         return []
-    proposals = proposed_changes(run, figures, causes) if proposals is None else proposals
     first = first_proposals(proposals, causes)
     remedies = {prefix: first[0].what for prefix in list(causes)[:1] if first}
     result = [
@@ -507,7 +494,7 @@ def speed_line(run: JudgedRun) -> str:
 
 def summary_line(run: JudgedRun, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
-    shown = [] if wrong_ones(run) else [f"{name} {figures[name]}" for name in leading_names(figures)]
+    shown = [] if wrong_findings(run) else [f"{name} {figures[name]}" for name in leading_names(figures)]
     return ", ".join([*shown, speed_line(run)])
 
 

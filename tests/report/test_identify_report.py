@@ -237,7 +237,7 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
         Finding("parameter-held", "doubt", "v_s is not estimated but held at 2: another reason", "v_s"),
     )
     whole = identified(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
-    assert terminal_warnings(whole) == list(telling)
+    assert terminal_warnings(whole.warnings, whole.found.estimates.values()) == list(telling)
     assert whole.warnings == [*repeating, *telling]
 
 

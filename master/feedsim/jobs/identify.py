@@ -50,7 +50,8 @@ def result_of(
 ) -> Result[IdentifiedFriction]:
     """Friction of an axis, identified. inputs: files that it rests on. place: the folder that it is written to."""
     found = identified.found
-    in_table = page.terminal_warnings(identified)
+    warnings = identified.warnings
+    in_table = page.terminal_warnings(warnings, found.estimates.values())
     return Result(
         KIND,
         identified,
@@ -62,7 +63,7 @@ def result_of(
         files=partial(page.files_of, identified),
         inputs=inputs,
         lines=lambda: page.terminal_lines(identified, place),
-        in_lines=[finding for finding in identified.warnings if finding not in in_table],
+        in_lines=[finding for finding in warnings if finding not in in_table],
         place=place,
     )
 

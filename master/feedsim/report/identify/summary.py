@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -110,12 +110,10 @@ def table_lines(identified: IdentifiedFriction) -> list[str]:
     return lines
 
 
-def terminal_warnings(identified: IdentifiedFriction) -> list[Finding]:
+def terminal_warnings(warnings: Iterable[Finding], estimates: Iterable[Estimate]) -> list[Finding]:
     """Warnings without those that say no more than the reason of a parameter, which the table holds."""
-    estimates = [estimate for estimate in identified.found.estimates.values() if estimate.reason]
-    return [
-        finding for finding in identified.warnings if not any(_repeats(finding, estimate) for estimate in estimates)
-    ]
+    reasoned = [estimate for estimate in estimates if estimate.reason]
+    return [finding for finding in warnings if not any(_repeats(finding, estimate) for estimate in reasoned)]
 
 
 def _repeats(finding: Finding, estimate: Estimate) -> bool:

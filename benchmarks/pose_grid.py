@@ -180,7 +180,7 @@ def frf_rows(
 ) -> tuple[list[str], dict[str, Floats]]:
     """Rows of the table of frequency responses at both ends of the travel, and curves for the figure."""
     frequency = np.geomspace(5, 500, 2000)
-    one = read_modes(machine.modes, list(machine.axes))
+    one = read_modes(machine.modes.file, list(machine.axes))
     rows, curves = [], {"frequency": frequency}
     ports = {"n/M": (f"n_{AXIS}", f"n_{AXIS}"), "x_a/M": (f"n_{AXIS}", f"x_{AXIS}"), "tool x/F": ("tcp_Z", "tcp_Z")}
     assert all(port in one.ports for pair in ports.values() for port in pair)
@@ -226,7 +226,7 @@ def study(out: Path, counts: Sequence[int], feed: float, rest: float, fine: floa
         expected, check = (full(edges(recorded, low, high, width, 10 * width)) for width in (fine, 2 * fine))
         print(f"reference: {time.monotonic() - begun:.0f} s since the start", flush=True)
         lines = table_head()
-        own = drive(cosim.fmus_directory() / "plant.fmu", machine, recorded, machine.modes)
+        own = drive(cosim.fmus_directory() / "plant.fmu", machine, recorded, machine.modes.file)
         lines.append(row("1, at 100 mm", np.nan, own, errors(own.outputs, expected, recorded)))
         by_grid, alone = {}, {}
         for count in counts:

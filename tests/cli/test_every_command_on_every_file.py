@@ -70,6 +70,7 @@ NEEDED = {
     "circle": ["--feed", "1000 mm/min"],
     "sweep": ["--workers", "1"],
     "machine import": ["--axes", "Z"],
+    "tune compensation": ["--kind", "model"],
     "tune drive": ["--axes", "Z", "--evaluations", "10"],
     "machine export": ["--like", "mill.tea", "--axes", "Z"],
 }

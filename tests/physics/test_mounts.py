@@ -18,6 +18,7 @@ from plant_unit import AXES, H
 
 import feedsim
 from feedsim import scenario
+from feedsim.files.fields import FileContent
 from feedsim.foundation.errors import InputError
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim import Run
@@ -137,7 +138,9 @@ def test_factors_reach_the_plant(rubber: Path, fmus: Path) -> None:
 def plant(machine: Path, fmus: Path, folder: Path) -> Archive:
     pose = {"X": 0.8, "Y": 0.327, "Z": 0.1}
     out = folder / "plant.fmu"
-    pack(fmus / "plant.fmu", out, modes=machine / "modes.csv", pose=pose, mounts=machine / "mounts.csv")
+    pack(
+        fmus / "plant.fmu", out, modes=FileContent.read(machine / "modes.csv"), pose=pose, mounts=machine / "mounts.csv"
+    )
     return Archive.unpack(out, folder / "plant")
 
 

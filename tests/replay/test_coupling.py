@@ -49,7 +49,7 @@ torque: {{column: {axis}.M_a}}
 def machine_with(folder: Path, shape: float, mode: ElasticMode = MODE) -> Path:
     """The measured machine with a mode of X that moves the scale of Y by `shape` of the rigid motion of X."""
     elastic = with_modes(load_machine(rigid_copy(MACHINES / "sinumerik_840d", folder)), "X", [mode])
-    header, *rows = elastic.modes.read_text().splitlines()
+    header, *rows = (elastic.modes.content or b"").decode().splitlines()
     names, values = header.split(","), rows[-1].split(",")
     rigid = dict(zip(names, rows[0].split(","), strict=True))
     values[names.index("x_Y")] = values[names.index("tcp_Y")] = repr(shape * float(rigid["x_X"]))

@@ -141,7 +141,7 @@ def test_a_run_takes_what_was_found(identified: Path, fmus: Path) -> None:
 def test_speed_and_accelerometer_say_the_same(rubber: Machine, fmus: Path, tmp_path: Path) -> None:
     """Actual speed with its setpoint, and a universal file of an accelerometer whose clock is its own."""
     truth = with_factors(rubber, {"K_e": 0.9, "F_max": 1.2})
-    seen = with_accelerometer(truth, tmp_path)
+    seen = with_accelerometer(truth)
     logs, files = [], []
     random = np.random.default_rng(6)
     for jerk in (150, 500):

@@ -90,7 +90,8 @@ def test_an_elastic_mode_that_nobody_asked_for(tmp_path: Path, monkeypatch: pyte
     elastic = with_modes(load_machine(rigid), "X", [ElasticMode(60.0, 0.03, 0.3, 0.2)])
     (tmp_path / "moves.yaml").write_text(MOVES.format(machine=rigid))
     own = ("drive.K_p=4.8 N.m.s/rad", "drive.T_n=3.4 ms", "max_acceleration=10 m/s^2", "friction.F_log=0 N.m")
-    changes = [f"machine.modes={elastic.modes}", *(f"machine.axes.X.{each}" for each in own)]
+    (tmp_path / "modes.csv").write_bytes(elastic.modes.content or b"")
+    changes = [f"machine.modes={tmp_path / 'modes.csv'}", *(f"machine.axes.X.{each}" for each in own)]
     log = run(load(tmp_path / "moves.yaml", changes)).log
     assert log is not None
     write_csv(tmp_path / "log.csv", log)

@@ -96,7 +96,7 @@ def test_shipped_tables_are_what_the_structures_give(name: str) -> None:
 
 def test_a_table_of_another_structure_is_told() -> None:
     machine = load_machine(MACHINES / "one_axis")
-    shipped = read_modes(machine.modes, ["X"])
+    shipped = read_modes(machine.modes.file, ["X"])
     assert machine.structure is not None
     elsewhere = build(load_structure(machine.structure), {"X": 0.45}).solution.modes
     assert "the structure gives" in describe_stale_table(shipped, elsewhere)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim import scenario
+from feedsim.files.fields import FileContent
 from feedsim.foundation.errors import InputError
 from feedsim.structure import checked_modes, read_modes
 
@@ -62,7 +63,7 @@ def test_broken_table_is_refused_with_its_line(tmp_path: Path, change: Change, m
     broken = tmp_path / "modes.csv"
     lines = change((MACHINE / "modes.csv").read_text().splitlines())
     broken.write_text("".join(line + "\n" for line in lines))
-    machine = scenario.load_machine(MACHINE).model_copy(update={"modes": broken})
+    machine = scenario.load_machine(MACHINE).model_copy(update={"modes": FileContent.read(broken)})
     with pytest.raises(InputError, match=message):
         checked_modes(machine)
 

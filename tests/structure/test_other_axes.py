@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from feedsim import cli, scenario
+from feedsim.files.fields import FileContent
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.scenario import load_machine
 from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim.archive import Archive
-from feedsim.simulation.cosim.plant import axes_of, open_plant
+from feedsim.simulation.cosim.plant import axes_of, modes_file, open_plant
 from feedsim.structure import read_modes
 from feedsim.structure.build import build
 from feedsim.structure.modes import write_modes
@@ -32,6 +33,10 @@ MACHINES = {
     "five axes": {"X": 0.5, "Y": 0.3, "Z": 0.1, "U": 0.2, "W": 0.4},
     "other order": {"Z": 0.1, "X": 0.5, "Y": 0.3},
 }
+
+
+def table_in(folder: Path) -> FileContent:
+    return FileContent.read(folder / "modes.csv")
 
 
 def move(axis: str) -> dict[str, Any]:
@@ -93,7 +98,7 @@ def test_own_archive_gives_the_numbers_of_the_table(tmp_path: Path, fmus: Path) 
     """The default axes, by modes_file of the general unit and by an archive under `plant`: the same bits."""
     pose = {"X": 0.5, "Y": 0.3, "Z": 0.1}
     by_file = trace_of(tmp_path, pose, "X", fmus)
-    packed = pack(fmus / "plant.fmu", tmp_path / "own.fmu", modes=tmp_path / "modes.csv", pose=pose)
+    packed = pack(fmus / "plant.fmu", tmp_path / "own.fmu", modes=table_in(tmp_path), pose=pose)
     by_archive = trace_of(tmp_path, pose, "X", fmus, plant="own.fmu")
     assert by_archive["guid"] == packed.guid != by_file["guid"]
     for name in by_file.keys() - {"guid"}:
@@ -102,15 +107,16 @@ def test_own_archive_gives_the_numbers_of_the_table(tmp_path: Path, fmus: Path) 
 
 def test_general_archive_serves_its_own_axes_unpacked(fmus: Path) -> None:
     machine = load_machine(MACHINE)
-    plant, modes_file = open_plant(machine, fmus)
+    plant, takes_modes = open_plant(machine, fmus)
     with plant as archive:
         assert archive.path == fmus / "plant.fmu"
-        assert modes_file == machine.modes
+        assert takes_modes
+    assert modes_file(machine.modes).read_bytes() == machine.modes.file.read_bytes()
 
 
 def test_archive_of_other_modes_or_axes_is_refused(tmp_path: Path, fmus: Path) -> None:
     write_machine(tmp_path, {"Q": 0.1})
-    pack(fmus / "plant.fmu", tmp_path / "own.fmu", modes=tmp_path / "modes.csv", pose={"Q": 0.1})
+    pack(fmus / "plant.fmu", tmp_path / "own.fmu", modes=table_in(tmp_path), pose={"Q": 0.1})
     path = write_machine(tmp_path, {"Q": 0.1}, plant="own.fmu")
     with open_plant(load_machine(path), fmus)[0] as archive:
         assert axes_of(archive) == ("Q",)
@@ -175,7 +181,14 @@ def test_pack_command_computes_the_modes_of_another_pose(tmp_path: Path, fmus: P
     # Directly from the modes, the same archive.
     table = tmp_path / "modes.csv"
     write_modes(table, built)
-    pack(fmus / "plant.fmu", tmp_path / "direct.fmu", modes=table, pose=pose, name=machine.name, note=machine.note)
+    pack(
+        fmus / "plant.fmu",
+        tmp_path / "direct.fmu",
+        modes=table_in(tmp_path),
+        pose=pose,
+        name=machine.name,
+        note=machine.note,
+    )
     assert (tmp_path / "direct.fmu").read_bytes() == out.read_bytes()
 
 
@@ -205,18 +218,18 @@ def test_pack_command_refuses(
 def test_archive_that_cannot_be_written_is_told(tmp_path: Path, fmus: Path) -> None:
     write_machine(tmp_path, {"Q": 0.1})
     with pytest.raises(OutputError, match="cannot write"):
-        pack(fmus / "plant.fmu", tmp_path, modes=tmp_path / "modes.csv", pose={"Q": 0.1})  # a folder is in the way
+        pack(fmus / "plant.fmu", tmp_path, modes=table_in(tmp_path), pose={"Q": 0.1})  # a folder is in the way
     assert not list(tmp_path.parent.glob(".*.part"))
 
 
 def test_base_that_carries_no_table_is_refused(tmp_path: Path, fmus: Path) -> None:
     write_machine(tmp_path, {"Q": 0.1})
     with pytest.raises(InputError, match="controller: takes no resources"):
-        pack(fmus / "controller.fmu", tmp_path / "x.fmu", modes=tmp_path / "modes.csv", pose={"Q": 0.1})
+        pack(fmus / "controller.fmu", tmp_path / "x.fmu", modes=table_in(tmp_path), pose={"Q": 0.1})
     with zipfile.ZipFile(fmus / "plant.fmu") as whole, zipfile.ZipFile(tmp_path / "old.fmu", "w") as old:
         for name in whole.namelist():
             if name != "sources/variables.json":
                 old.writestr(name, whole.read(name))
     with pytest.raises(InputError, match=r"old\.fmu: has no sources/variables\.json.*build it anew"):
-        pack(tmp_path / "old.fmu", tmp_path / "x.fmu", modes=tmp_path / "modes.csv", pose={"Q": 0.1})
+        pack(tmp_path / "old.fmu", tmp_path / "x.fmu", modes=table_in(tmp_path), pose={"Q": 0.1})
     assert not (tmp_path / "x.fmu").exists()

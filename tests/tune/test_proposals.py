@@ -26,6 +26,7 @@ from feedsim.analysis.proposals import (
 )
 from feedsim.cli import main
 from feedsim.design.tune import Proposal, of_circle, of_run
+from feedsim.files.fields import FileContent
 from feedsim.linear.judgement import judge
 from feedsim.linear.system import LinearSystem
 from feedsim.report.changes import changes_part, changes_section
@@ -191,7 +192,7 @@ def test_nothing_is_proposed_for_what_another_maker_drives(fmus: Path) -> None:
     scenario: Scenario = load(CIRCLE)
     result = judge_run(cosim.run(scenario, fmus=fmus))
     causes = analysis.diagnoses(result)
-    gone = scenario.machine.model_copy(update={"modes": Path("gone.csv")})
+    gone = scenario.machine.model_copy(update={"modes": FileContent.read(Path("gone.csv"))})
     assert of_run(replace(result, scenario=scenario.model_copy(update={"machine": gone})), causes, {}) == []
 
 

@@ -5,9 +5,10 @@ May use: variables, units, errors. Start reading at Quantity.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from math import inf, isfinite
 from pathlib import Path
@@ -221,18 +222,57 @@ _AXIS = {"type": "string", "pattern": f"^{_NAME_PATTERN}$", "description": "Axis
 AxisName = Annotated[str, PlainValidator(_axis), WithJsonSchema(_AXIS)]
 
 
+@dataclass(frozen=True)
+class FileContent:
+    """The bytes of a file, read once: who holds them sees no later change. Printed, it is the file's name.
+
+    Attributes:
+        file: name that messages call it by; it need not be on any disk.
+        content: None: there is no such file.
+    """
+
+    file: Path
+    content: bytes | None = field(repr=False)
+
+    def __str__(self) -> str:
+        return str(self.file)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the content."""
+        return hashlib.sha256(self.content or b"").hexdigest()
+
+    @classmethod
+    def read(cls, file: Path) -> FileContent:
+        """The content of a file. InputError: it is there, and cannot be read."""
+        try:
+            return cls(file, file.read_bytes())
+        except FileNotFoundError:
+            return cls(file, None)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+
+
+@dataclass(frozen=True)
 class ExistingFile:
-    """A file that is there. In a file's text the path is relative to that file."""
+    """A file that is there. In a file's text the path is relative to that file. read: its content is the value."""
+
+    read: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(value: Any, info: ValidationInfo) -> Path:
+        def validate(value: Any, info: ValidationInfo) -> Path | FileContent:
+            if self.read and isinstance(value, FileContent):
+                return value
             if not isinstance(value, (str, Path)) or not str(value):
                 raise fault(f"{brief(value)} is no file name")
             path = Path(value)
             if not path.is_file():
                 other = " (it is a folder)" if path.is_dir() else " (it is a pipe or a device)" if path.exists() else ""
                 raise fault(f"no such file: {value}{other}" if other else no_such_file(value))
-            return path
+            try:
+                return FileContent.read(path) if self.read else path
+            except InputError as error:
+                raise fault(str(error)) from None
 
         return core_schema.with_info_plain_validator_function(
             validate, serialization=core_schema.plain_serializer_function_ser_schema(str)
@@ -245,6 +285,7 @@ class ExistingFile:
 
 
 File = Annotated[Path, ExistingFile()]
+Content = Annotated[FileContent, ExistingFile(read=True)]
 
 
 def brief(value: Any) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from feedsim import scenario
 from feedsim.analysis import check
+from feedsim.files.fields import FileContent
 from feedsim.files.source import is_ssp
 from feedsim.foundation import units
 from feedsim.foundation.arguments import Changes, Pairs, Value, by_name, pairs, settings, spell_argument, split_names
@@ -46,7 +47,7 @@ from feedsim.structure import checked_modes
 from feedsim.structure import pack as archive
 from feedsim.structure.build import build
 from feedsim.structure.geometry.assemble import movable
-from feedsim.structure.modes import read_modes, write_modes
+from feedsim.structure.modes import parse_modes, table_of_modes
 from feedsim.structure.mounts import MOUNTS_FILE, table_of, write_mounts
 from feedsim.structure.pose_change import table_mismatch
 from feedsim.structure.poses import GridAxis, grid_axis, pose_grid, write_poses
@@ -466,12 +467,12 @@ def machine_pack(
     # The archive that the machine file names as its plant, and one that is packed in place, are made anew here.
     made = [path for path in (loaded.plant, own) if path is not None]
     files = [file for _, file in described.files if not any(is_same_file(file, path) for path in made)]
-    read = [Path(machine), loaded.modes, *files]
+    read = [Path(machine), loaded.modes.file, *files]
     with PLANT_KIND.checked(out, read, force=force) as path:
         announce_archive(watch, own, "the packed plant's trial")
         pose = _pose_of(loaded, at)
         with TemporaryFolder() as folder:
-            modes = _modes_at(loaded, pose, folder / "modes.csv") if at else loaded.modes
+            modes = _modes_at(loaded, pose, folder) if at else loaded.modes
             # what a run would refuse should not be packed
             checked_modes(loaded.model_copy(update={"modes": modes} | ({"mounts": None} if at else {})))
             if not at and (doubt := table_mismatch(loaded)) is not None:
@@ -530,9 +531,9 @@ def _pose_of(machine: Machine, at: Positions) -> dict[str, float]:
     return pose
 
 
-def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
-    """Table of the machine's modes at `pose` [m], computed from its structure and written to `out`; that of its mounts
-    beside it, where the machine has some that are not linear.
+def _modes_at(machine: Machine, pose: Mapping[str, float], folder: Path) -> FileContent:
+    """Table of the machine's modes at `pose` [m], computed from its structure; that of its mounts is written to
+    `folder`, where the machine has some that are not linear.
 
     Raises:
         InputError: the machine has no structure, its kind is known at one pose only, or it is faulty.
@@ -543,18 +544,17 @@ def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
             f"leave {spell_argument('at')} out"
         )
     built = build(load_structure(machine.structure), pose)
-    write_modes(out, built.solution.modes)
     if machine.mounts is not None:
         if (mounts := table_of(built.assembly, built.solution.shapes)) is None:
             raise InputError(
                 f"{machine.structure}: all of its mounts are linear; the machine file names a table of others"
             )
-        write_mounts(out.with_name(MOUNTS_FILE), mounts)
-    return out
+        write_mounts(folder / MOUNTS_FILE, mounts)
+    return table_of_modes(built.solution.modes, folder / "modes.csv")
 
 
 def _write_grid(
-    machine: Machine, pose: Mapping[str, float], modes: Path, asked: Pairs[Value], watch: Watch, out: Path
+    machine: Machine, pose: Mapping[str, float], modes: FileContent, asked: Pairs[Value], watch: Watch, out: Path
 ) -> str:
     """Compute the grid that is asked for, about `pose` [m], and write it to `out`; returns what was made, in words.
 
@@ -572,7 +572,7 @@ def _write_grid(
     movable(structure)
     grid = grid_axes(machine, asked)
     axes = list(machine.axes)
-    watch.say(_size(machine, pose, grid, len(read_modes(modes, axes).frequency)))
+    watch.say(_size(machine, pose, grid, len(parse_modes(modes, tuple(axes)).frequency)))
     poses = pose_grid(structure, pose, grid, axes=axes, progress=watch.of(machine.name))
     size = write_poses(out, poses)
     cells = " x ".join(f"{len(axis.centres)} in {axis.axis}" for axis in grid)

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from feedsim.analysis import FigureTable
 from feedsim.estimation.replay.identified import identify_drives
-from feedsim.estimation.replay.machine_files import MOST_MODES
+from feedsim.estimation.replay.machine_files import MOST_MODES, file_names
 from feedsim.foundation.arguments import Value, quantity, spell_argument
 from feedsim.foundation.errors import InputError
 from feedsim.jobs.parameters import (
@@ -119,14 +119,13 @@ def identify_drive(
     cycle = quantity("position_cycle", position_cycle, "s", "1 ms") if position_cycle else None
     count = count_of_modes(modes, asked.machine is not None)
     archives = None if fmus is None else Path(fmus)
-    with claim_result_folder(
-        out, replace(KIND, may_write=page.files_of(asked.axes)), watch, asked.inputs, asked.asked_for, force=force
-    ):
+    kind = replace(KIND, may_write=file_names(asked.axes))
+    head = page.head(path, asked.window, date.today().isoformat())
+    with claim_result_folder(out, kind, watch, asked.inputs, asked.asked_for, force=force):
         watch.progress("reading", 0, 1)
         read, records, refused = asked.each_axis()
         if asked.machine is not None:
             announce_programs(watch, asked.machine, archives)
-        head = page.head(path, asked.window, date.today().isoformat())
         drives_found = identify_drives(
             read,
             records,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from feedsim.analysis import FigureTable
@@ -139,7 +138,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
     chosen = {name: str(value) for name, value in asked.items() if value is not None}
     inputs = [*files, *([Path(columns)] if columns is not None else []), *(file for _, file in subject.files)]
     asked_for = [*texts, *(f"{name}={text}" for name, text in chosen.items())]
-    with claim_result_folder(out, KIND, watch, inputs, asked_for, force=force), TemporaryDirectory() as folder:
+    with claim_result_folder(out, KIND, watch, inputs, asked_for, force=force):
         watch.progress("reading", 0, 1)
         stops, notes = [], list[Finding]()
         for file, jerk in zip(files, each_jerk, strict=True):
@@ -149,7 +148,7 @@ them (key mounts of the machine file, written by machine build), whose friction 
             stops.append(log)
             notes += said
         announce_programs(watch, own, None if fmus is None else Path(fmus))
-        seen = own if sensor is None else with_accelerometer(own, Path(folder))
+        seen = own if sensor is None else with_accelerometer(own)
         mounts = identified(seen, stops, None if fmus is None else Path(fmus), watch.progress)
         findings = [*dict.fromkeys(notes), *damped_twice(own)]
         result = result_of(page.MountsReport(mounts, files, subject, chosen, findings))

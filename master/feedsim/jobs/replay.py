@@ -233,7 +233,7 @@ def replay(
     assert asked.subject is not None
     own = asked.subject.machine
     archives = None if fmus is None else Path(fmus)
-    inputs = [*asked.inputs, own.modes]
+    inputs = [*asked.inputs, own.modes.file]
     asked_for = [*asked.asked_for, *(["open_loop=yes"] if open_loop else [])]
     with claim_result_folder(out, KIND, watch, inputs, asked_for, force=force):
         watch.progress("reading", 0, 3)

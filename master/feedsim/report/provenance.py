@@ -60,7 +60,7 @@ def input_paths(scenario: Scenario) -> list[Path]:
 
 def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
     named = [(place or "scenario", path) for place, path in scenario.files]
-    named.append(("modes", scenario.machine.modes))
+    named.append(("modes", scenario.machine.modes.file))
     if scenario.machine.plant is not None:
         named.append(("plant archive", scenario.machine.plant))
     named += [(f"{unit.role.name} of {axis}", unit.fmu) for axis, unit in scenario.machine.foreign_units]
@@ -171,13 +171,14 @@ def figures_part(figures: Mapping[str, Figure]) -> dict[str, Any]:
 def machine_part(machine: Machine) -> dict[str, Any]:
     """A machine's pose, cycles, limits, structure and the parameters of its axes in SI."""
     cycles, path = machine.cycles, machine.path
-    files = {"modes": machine.modes, "structure": machine.structure, "plant": machine.plant}
+    files = {"structure": machine.structure, "plant": machine.plant}
     return {
         "name": machine.name,
         "note": machine.note,
         "pose": {a: quantity(x, "m") for a, x in machine.pose.items()},
         "cycles": {name: quantity(getattr(cycles, name), "s") for name in ("control", "position", "interpolation")},
         "path": {"jerk": quantity(path.jerk, "m/s^3"), "acceleration": quantity(path.acceleration, "m/s^2")},
+        "modes": {"name": machine.modes.file.name, "sha256": machine.modes.digest},
         **{name: {"name": file.name, "sha256": sha256(file)} for name, file in files.items() if file is not None},
         "errors": machine.errors,
         "axes": {

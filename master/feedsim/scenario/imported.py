@@ -61,7 +61,7 @@ class ImportedMachine:
 
     def files(self) -> dict[str, str | bytes]:
         """Name -> content, of the whole folder."""
-        modes = {} if self.base is None else {MODES_TABLE: self.base.modes.read_bytes()}
+        modes = {} if self.base is None else {MODES_TABLE: self.base.modes.content or b""}
         return {Machine.IN_FOLDER: self.text(), **modes}
 
 

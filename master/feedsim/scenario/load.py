@@ -25,7 +25,7 @@ from feedsim.files.checked import (
     spread,
 )
 from feedsim.files.control import Name, find_name
-from feedsim.files.fields import AxisName, File, Model, Quantity, brief
+from feedsim.files.fields import AxisName, File, FileContent, Model, Quantity, brief
 from feedsim.files.source import Mark, Place, Source, is_program, places, read_yaml
 from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import InputError, no_such_file
@@ -344,7 +344,7 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
         files = tuple((place or "scenario", named) for place, named in scenario.files)
         name, kind, notes, settings = scenario.name, "scenario", [machine.note, scenario.note], scenario.settings
     kept = tuple(note for note in notes if note)
-    files = (*files, ("modes", machine.modes))
+    files = (*files, ("modes", machine.modes.file))
     if machine.mounts is not None:
         files = (*files, ("mounts", machine.mounts.table))
     return Subject(machine, kind, name, file, kept, settings, tuple(spread(overrides)), files, scenario)
@@ -471,7 +471,7 @@ def _of_scenario(path: Path) -> MachineDescription:
         structure = load_structure(machine.structure)
         files.append(("structure", machine.structure))
     return MachineDescription(
-        machine.name, machine.note, structure, machine, machine.modes, dict(machine.pose), tuple(files), ()
+        machine.name, machine.note, structure, machine, machine.modes.file, dict(machine.pose), tuple(files), ()
     )
 
 
@@ -501,7 +501,7 @@ def _of_machine(path: Path, source: Source) -> MachineDescription:
     structure = load_structure(file)
     if problems := list(_contradictions(source, machine, structure, file)):
         raise InputError.of(f"{path}: contradicts its structure", problems)
-    machine = machine.model_copy(update={"modes": table} if table is not None else {})
+    machine = machine.model_copy(update={"modes": FileContent.read(table)} if table is not None else {})
     machine._directory = path.parent
     files = (("machine", path), ("structure", file))
     return MachineDescription(machine.name, machine.note, structure, machine, modes, dict(machine.pose), files, ())

@@ -18,7 +18,7 @@ from pydantic import (
     field_validator,
 )
 
-from feedsim.files.fields import AxisName, File, Model, Quantity, fault, is_multiple, parameter
+from feedsim.files.fields import AxisName, Content, File, Model, Quantity, fault, is_multiple, parameter
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError
 from feedsim.motions.planner import Limits
@@ -229,7 +229,7 @@ class Machine(Model):
     control: Literal["sinumerik", "twincat", "heidenhain", "linuxcnc"] | None = Field(
         default=None, description="Control that the machine has; reports show parameters in its names and units, too"
     )
-    modes: File = Field(description="Table of the structure's modes (CSV), relative to this file")
+    modes: Content = Field(description="Table of the structure's modes (CSV), relative to this file")
     structure: File | None = Field(
         default=None, description="Structure file that the modes were computed from (feedsim machine build)"
     )

@@ -22,8 +22,8 @@ from feedsim.simulation import cosim
 from feedsim.simulation.cosim import Crossings, Run
 from feedsim.simulation.cosim.loads import LOAD_TAKEN_UP, ActingLoad, at_motor
 from feedsim.simulation.nc import Program
-from feedsim.structure import Modes, checked_modes, read_modes
-from feedsim.structure.modes import damped_twice
+from feedsim.structure import Modes, checked_modes
+from feedsim.structure.modes import damped_twice, parse_modes
 from feedsim.structure.mounts import read_mounts, scale_elements
 from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, table_mismatch, warnings
 
@@ -430,7 +430,7 @@ def warn_mount_damping(machine: Machine) -> list[Finding]:
     """Damping of mounts that the table of modes has besides."""
     if machine.mounts is None:
         return []
-    modes = read_modes(machine.modes, list(machine.axes))
+    modes = parse_modes(machine.modes, tuple(machine.axes))
     table = read_mounts(machine.mounts.table, len(modes.frequency))
     return damped_twice(modes, table, scale_elements(table, machine.mounts.parameters()))
 

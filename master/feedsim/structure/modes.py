@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.files.fields import FileContent
 from feedsim.files.trace.cells import duplicate_names, named_columns
 from feedsim.files.trace.files import written_whole
 from feedsim.foundation.errors import Finding, InputError
@@ -93,23 +94,24 @@ class Modes:
 
 
 def read_modes(file: Path, axes: Sequence[str]) -> Modes:
-    """Read a mode table with the ports of `axes`.
+    """Modes of a file with the ports of `axes`; errors as :func:`parse_modes`."""
+    return parse_modes(FileContent.read(file), tuple(axes))
+
+
+@lru_cache(maxsize=8)  # a run asks several times, many runs of a machine ask for the same
+def parse_modes(table: FileContent, axes: tuple[str, ...]) -> Modes:
+    """Modes of a table with the ports of `axes`.
 
     Raises:
         InputError: lists what is wrong, with file and line.
     """
+    file = table.file
+    if table.content is None:
+        raise InputError(f"{file}: no such file (table of modes)")
     try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            text = stream.read()
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file (table of modes)") from None
-    except (OSError, UnicodeDecodeError) as error:
+        text = table.content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
         raise InputError(f"{file}: cannot be read as a table of modes: {error}") from error
-    return _read_table(file, text, tuple(axes))
-
-
-@lru_cache(maxsize=8)  # a run asks several times, many runs of a machine ask for the same
-def _read_table(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
     try:
         rows = named_columns(list(csv.reader(io.StringIO(text, newline=""))))
     except csv.Error as error:
@@ -121,9 +123,9 @@ def _read_table(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
         problems = [f"{file}: empty: a header, but no modes"]
     if problems:
         raise InputError.of(f"{file}: not a table of modes", problems)
-    table, problems = _numbers(file, header, rows[1:])
-    table.setflags(write=False)
-    columns = dict(zip(header, table.T, strict=True))
+    numbers, problems = _numbers(file, header, rows[1:])
+    numbers.setflags(write=False)
+    columns = dict(zip(header, numbers.T, strict=True))
     if not problems:
         problems = [
             f"{file}: column '{port}': all zero, nothing moves there"
@@ -143,6 +145,11 @@ def write_modes(path: Path, modes: Modes) -> None:
     """
     with written_whole(path) as file:
         file.write(modes_text(modes).encode())
+
+
+def table_of_modes(modes: Modes, file: Path) -> FileContent:
+    """A mode table as a machine holds it, by this name."""
+    return FileContent(file, modes_text(modes).encode())
 
 
 def modes_text(modes: Modes) -> str:
@@ -310,7 +317,7 @@ def checked_modes(machine: Machine, amplitude: float = 0.0) -> Modes:
         InputError: the table is broken or contradicts the machine file.
     """
     axes = list(machine.axes)
-    modes = read_modes(machine.modes, axes)
+    modes = parse_modes(machine.modes, tuple(axes))
     problems = []
     for (name, axis), lead in zip(machine.axes.items(), np.diag(modes.leads(axes)), strict=True):
         if abs(lead - axis.I_P) > LEAD_TOLERANCE * axis.I_P:

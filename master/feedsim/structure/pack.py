@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from feedsim.files.fields import FileContent
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.foundation.outputs import TemporaryFolder
 
@@ -48,7 +49,7 @@ def pack(
     base: Path,
     out: Path,
     *,
-    modes: Path,
+    modes: FileContent,
     pose: Mapping[str, float],
     poses: Path | None = None,
     mounts: Path | None = None,
@@ -93,7 +94,7 @@ def translate_packager_errors() -> Iterator[None]:
 
 
 def plant_tables(
-    modes: Path, pose: Mapping[str, float], poses: Path | None, mounts: Path | None = None
+    modes: FileContent, pose: Mapping[str, float], poses: Path | None, mounts: Path | None = None
 ) -> MachineTables:
     """A machine's files as an archive holds them, checked; arguments as those of `pack`."""
     from feedsim_packager import machine_tables
@@ -101,7 +102,7 @@ def plant_tables(
 
     return machine_tables.check(
         File("axes.csv", machine_tables.axes_csv(pose)),
-        File.at(modes),
+        File(str(modes), modes.content or b""),
         *(File.at(path) if path is not None else None for path in (poses, mounts)),
     )
 

@@ -22,7 +22,7 @@ from feedsim.foundation.errors import FeedsimError, Finding, shorten_list
 from feedsim.foundation.outputs import cache_answer
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import CODE, MAX_SHOWN_LABELS, State, digest_of, state_of
-from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
+from feedsim.structure.modes import TOOL_PORTS, Modes, parse_modes
 from feedsim.structure.mounts import MountTable, read_mounts, table_of
 
 if TYPE_CHECKING:
@@ -402,12 +402,12 @@ def table_mismatch(machine: Machine) -> Finding | None:
         built = _modes_of_table(structure, state_of(structure), tuple(machine.pose.items()))
         if built is None:
             return ""
-        table = read_modes(machine.modes, list(machine.axes))
+        table = parse_modes(machine.modes, tuple(machine.axes))
         return describe_stale_table(table, built[0], SAME_FREQUENCY) or _other_mounts(machine, table, built[1])
 
     try:
-        paths = (structure, machine.modes, *([machine.mounts.table] if machine.mounts is not None else []))
-        files = [digest_of(path, state_of(path)) for path in paths]
+        paths = (structure, *([machine.mounts.table] if machine.mounts is not None else []))
+        files = [*(digest_of(path, state_of(path)) for path in paths), machine.modes.digest]
         how = cache_answer("table-of-modes", [files, [*machine.pose.items()], [*machine.axes]], CODE, find)
     except (OSError, FeedsimError):
         return None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -28,15 +27,15 @@ from feedsim.design.uncertainty import (
     typed_drive,
     typed_on,
 )
+from feedsim.files.fields import FileContent
 from feedsim.foundation.arguments import spell_argument
-from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.foundation.units import parameters
 from feedsim.linear.judgement import Candidates, Loop, judge
 from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.scenario.axis_units import Parameter
 from feedsim.simulation.cosim.plant import plant_modes
 from feedsim.structure import Modes
-from feedsim.structure.modes import with_transmissions, write_modes
+from feedsim.structure.modes import table_of_modes, with_transmissions
 
 # --- A tuned drive: limits, margins, candidates, errors before and after ----------------------------------------------
 
@@ -430,9 +429,9 @@ def tune_drive(
 
     Raises InputError, and as :func:`feedsim.simulation.cosim.run`.
     """
-    with _Search.begin_search(scenario, axis, limits, poses or {}, fmus, progress, evaluations, cloud) as search:
-        tuned = search.tuned()
-        return tuned if cloud is None else replace(tuned, drawn=search.drawn(tuned, cloud, count))
+    search = _Search.begin(scenario, axis, limits, poses or {}, fmus, progress, evaluations, cloud)
+    tuned = search.tuned()
+    return tuned if cloud is None else replace(tuned, drawn=search.drawn(tuned, cloud, count))
 
 
 @dataclass(eq=False)
@@ -451,7 +450,7 @@ class _Search:
     structures: Mapping[str, Modes]
     draws: tuple[Machine, ...]
     drawn_judges: Mapping[str, Judge]
-    scaled_files: Mapping[float, Path]
+    scaled_tables: Mapping[float, FileContent]
     parts: tuple[Part, ...]
     before: tuple[Errors, ...]
     margins_before: Margins
@@ -462,36 +461,34 @@ class _Search:
     runs: int = 0
 
     @classmethod
-    @contextmanager
-    def begin_search(
+    def begin(
         cls, scenario: Scenario, axis: str, limits: Limits, poses: Mapping[str, Modes], fmus: Path | None,
         progress: Progress, evaluations: int, cloud: Cloud | None = None,
-    ) -> Iterator[_Search]:  # fmt: skip
+    ) -> _Search:  # fmt: skip
         """Plan, judge and run the drive as it is."""
         machine = scenario.machine
         own, _ = plant_modes(_without_transmissions(machine))  # tables hold structures; contacts come behind
         partner = partner_of(scenario, axis)
-        with TemporaryFolder() as folder:
-            scaled_files = {1.0: machine.modes}
-            for factor in FREQUENCY_FACTORS[1:]:
-                scaled_files[factor] = folder / f"modes_{factor}.csv"
-                write_modes(scaled_files[factor], scale_frequencies(own, factor))
-            structures = {"pose of the machine file": own, **poses}
-            factors = FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]
-            judges = judges_of(machine, axis, structures, factors)
-            draws = tuple(cloud.draws(SEARCH_DRAWS, SEARCH_SEED)) if cloud is not None else ()
-            drawn_judges: dict[str, Judge] = {}
-            for k, draw in enumerate(draws, start=1):
-                drawn_judges |= judges_of(machine, axis, structures, factors, draw, f"draw {k} of {len(draws)}")
-            elastic = not with_transmissions(machine, own).rigid.all()
-            knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis), elastic)
-            search = cls(
-                scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges, structures, draws,
-                drawn_judges, scaled_files, (), (), margins_of(judges, knobs.drive), [], [], [],
-            )  # fmt: skip
-            search.parts = search.of(SEARCHED_MOVES)
-            search.before = search.errors(search.parts, machine)
-            yield search
+        scaled_tables = {1.0: machine.modes} | {
+            factor: table_of_modes(scale_frequencies(own, factor), machine.modes.file)
+            for factor in FREQUENCY_FACTORS[1:]
+        }
+        structures = {"pose of the machine file": own, **poses}
+        factors = FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]
+        judges = judges_of(machine, axis, structures, factors)
+        draws = tuple(cloud.draws(SEARCH_DRAWS, SEARCH_SEED)) if cloud is not None else ()
+        drawn_judges: dict[str, Judge] = {}
+        for k, draw in enumerate(draws, start=1):
+            drawn_judges |= judges_of(machine, axis, structures, factors, draw, f"draw {k} of {len(draws)}")
+        elastic = not with_transmissions(machine, own).rigid.all()
+        knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis), elastic)
+        search = cls(
+            scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges, structures, draws,
+            drawn_judges, scaled_tables, (), (), margins_of(judges, knobs.drive), [], [], [],
+        )  # fmt: skip
+        search.parts = search.of(SEARCHED_MOVES)
+        search.before = search.errors(search.parts, machine)
+        return search
 
     def of(self, wanted: tuple[Sequence[tuple[float, float]], ...]) -> tuple[Part, ...]:
         """Moves with every factor on the modes, which shake most behind a stop, and circles with the modes as they
@@ -735,7 +732,7 @@ class _Search:
         """A machine whose elastic modes have other frequencies."""
         if factor == 1:
             return machine
-        return machine.model_copy(update={"modes": self.scaled_files[factor], "plant": None, "structure": None})
+        return machine.model_copy(update={"modes": self.scaled_tables[factor], "plant": None, "structure": None})
 
 
 def _program(

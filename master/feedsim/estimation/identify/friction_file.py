@@ -24,7 +24,7 @@ from feedsim.files.checked import read_group
 from feedsim.files.fields import Quantity
 from feedsim.foundation import units
 from feedsim.foundation.arguments import amount
-from feedsim.foundation.errors import Finding, InputError, OutputError
+from feedsim.foundation.errors import Finding, InputError, OutputError, rank_findings
 from feedsim.scenario import Friction, FrictionParameters, GmsFriction, Subject
 from feedsim.scenario.roles import GMS
 
@@ -74,9 +74,9 @@ class IdentifiedFriction:
 
     @property
     def warnings(self) -> list[Finding]:
-        """Of reading and of identifying, each once."""
+        """Of reading and of identifying."""
         reading = (warning for source in self.sources for warning in source.warnings)
-        return list(dict.fromkeys((*reading, *self.found.warnings)))
+        return rank_findings((*reading, *self.found.warnings))
 
     @property
     def notes(self) -> list[str]:

@@ -58,9 +58,9 @@ from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.outputs import TemporaryFolder
 from feedsim.foundation.parallel import in_parallel
-from feedsim.scenario import Friction, Machine, load_machine
+from feedsim.scenario import Drive, Friction, Machine, load_machine
 from feedsim.structure import checked_modes
-from feedsim.structure.modes import modes_text
+from feedsim.structure.modes import table_of_modes
 
 # --- Axes that move one another: a mode of one axis that is seen at the scale of another one, out of records ----------
 # An axis that stands still while another one moves shows it: what its position does there follows the mode, whose
@@ -159,9 +159,7 @@ def _with_trial(machine: Machine, k: int, mover: str, still: str) -> Machine:
     size = TRIAL_SHAPE * float(np.max(np.abs(table.ports[f"x_{mover}"][table.rigid])))
     ports = {port: np.array(column) for port, column in table.ports.items()}
     ports[f"x_{still}"][k] += size
-    path = machine.modes.with_name(f"{machine.modes.stem}_trial_{k}_{still}.csv")  # a plant is known by its file
-    path.write_text(modes_text(replace(table, ports=ports)), encoding="utf-8")
-    return machine.model_copy(update={"modes": path})
+    return machine.model_copy(update={"modes": table_of_modes(replace(table, ports=ports), machine.modes.file)})
 
 
 def _vary_mode(machine: Machine, k: int, mover: str, spread: Sequence[float]) -> Iterator[Machine]:
@@ -177,10 +175,8 @@ def _vary_mode(machine: Machine, k: int, mover: str, spread: Sequence[float]) ->
         else:
             port = ports[f"{'nx'[which - 2]}_{mover}"]
             port[k] += sigma * np.max(np.abs(port[table.rigid]))
-        path = machine.modes.parent / f"modes_off_{k}_{which}.csv"
         off = replace(table, frequency=frequency, damping=damping, ports=ports)
-        path.write_text(modes_text(off), encoding="utf-8")
-        yield machine.model_copy(update={"modes": path})
+        yield machine.model_copy(update={"modes": table_of_modes(off, machine.modes.file)})
 
 
 def _shapes(D: Array, e: Array) -> list[tuple[float, float] | None]:
@@ -304,14 +300,15 @@ def identify_drives(
         def drive(axis: str, say: Callable[..., None]) -> DriveFound | str:
             """Of one axis; or why it has none."""
             each, begin = fitted[axis], begins[axis]
-            if begin is not None:
-                begin = replace(begin, starts=[of_cycle(start, cycle, interval) for start in begin.starts])
-            axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
             try:
-                with (
-                    _starting_machine(machine, name, note, axes, interval, cycle) as own,
-                    Replay(own, {axis: each}, fmus=fmus, only_motion=modes == 0) as replay,
-                ):
+                if machine is not None:
+                    own = machine
+                else:
+                    assert begin is not None
+                    begin = replace(begin, starts=[of_cycle(start, cycle, interval) for start in begin.starts])
+                    axes = {axis: _starting_axis(each, begin.starts[0])}
+                    own = _read_machine(machine_files(name, note, axes, interval, cycle))
+                with Replay(own, {axis: each}, fmus=fmus, only_motion=modes == 0) as replay:
                     return identify_drive(
                         own, each, read[axis].records, replay, structure_known=machine is not None, begin=begin,
                         beside_cycle=_other_cycle(cycle, interval) if machine is None else None, modes=modes,
@@ -348,8 +345,8 @@ def identify_drives(
         else:
             values = friction | {"J": one.estimates["J"].value, "M_0": one.machine.axes[axis].M_0}
             rigid[axis] = replace(
-                rigid_axis(each, begin.starts[0]), drive=drive, values=values, estimates=one.estimates, head=head,
-                modes=one.modes, correlation=one.correlation, setpoints=limits_of_setpoints.get(axis),
+                _rigid_axis(each, drive, values), estimates=one.estimates, head=head, modes=one.modes,
+                correlation=one.correlation, setpoints=limits_of_setpoints.get(axis),
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle, control)
@@ -359,13 +356,12 @@ def identify_drives(
             found = {axis: replace(one, modes=beside[axis]) for axis, one in found.items()}
             rigid = {axis: replace(each, modes=beside[axis]) for axis, each in rigid.items()}
             files = machine_files(name, note, rigid, interval, cycle, control)
-    with _folder(files if rigid else {}) as folder:
-        made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
+    made = dict.fromkeys(found, _read_machine(files)) if rigid else {axis: one.machine for axis, one in found.items()}
 
-        def comparison(axis: str, _: object) -> Comparison:
-            return replace(replay_records(made[axis], {axis: records[axis]}, fmus, records)[axis], clipped=())
+    def comparison(axis: str, _: object) -> Comparison:
+        return replace(replay_records(made[axis], {axis: records[axis]}, fmus, records)[axis], clipped=())
 
-        comparisons = in_parallel([partial(comparison, axis) for axis in records if axis in found])
+    comparisons = in_parallel([partial(comparison, axis) for axis in records if axis in found])
     return DrivesFound(found, comparisons, files, outside, clipped, undecided, failed, limits_of_setpoints)
 
 
@@ -402,9 +398,8 @@ def _couple_modes(
     first = len(modes)  # the table begins with a rigid mode of every axis
     if len(records) > 1 and any(modes.values()) and same_time(records):
         every = [mode for own in modes.values() for mode in own]
-        with _folder(files) as folder:
-            spread = {first + i: mode.sigma for i, mode in enumerate(every) if np.all(np.isfinite(mode.sigma))}
-            shapes = fit_coupled_shapes(load_machine(folder), records, fmus, spread)
+        spread = {first + i: mode.sigma for i, mode in enumerate(every) if np.all(np.isfinite(mode.sigma))}
+        shapes = fit_coupled_shapes(_read_machine(files), records, fmus, spread)
     found, k = {}, first
     for axis, own in modes.items():
         found[axis] = tuple(
@@ -444,35 +439,27 @@ def _other_cycle(position_cycle: float, interval: float) -> float:
     return interval if position_cycle < interval else control_cycle(interval)
 
 
-@contextmanager
-def _folder(files: Mapping[str, str]) -> Iterator[Path]:
-    """A temporary folder with files. A message names them as what the record gives."""
+def _read_machine(files: Mapping[str, str]) -> Machine:
+    """The machine of these files, read as a user's would be. A message names them as what the record gives."""
     with TemporaryFolder() as folder:
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         try:
-            yield folder
+            return load_machine(folder)
         except InputError as error:
             here = re.compile(rf"{re.escape(str(folder))}{re.escape(os.sep)}([\w.]+)(:\d+)?")
             raise InputError(here.sub(r"\1, as the record gives it", str(error))) from None
 
 
-@contextmanager
-def _starting_machine(
-    known: Machine | None, name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, cycle: float
-) -> Iterator[Machine]:
-    """The machine that is known, or one of rigid axes, for as long as its files are there."""
-    files = machine_files(name, note, axes, interval, cycle) if known is None else {}
-    with _folder(files) as folder:
-        yield known or load_machine(folder)
+def _rigid_axis(each: AxisRecord, drive: Drive, values: Mapping[str, float]) -> RigidAxis:
+    """An axis that has moved as the record has it. values: of the friction, J and M_0, SI."""
+    return RigidAxis(2 * pi * each.I_P, float(each.setpoint[0]), limits(each), drive, values, {})
 
 
-def rigid_axis(each: AxisRecord, begin: Mapping[str, float]) -> RigidAxis:
+def _starting_axis(each: AxisRecord, begin: Mapping[str, float]) -> RigidAxis:
     """An axis to begin on. begin: as start_values gives them."""
-    most = limits(each)
-    friction = {**begin, "F_S": begin["F_C"] + begin[EXCESS]}
-    pitch = 2 * pi * each.I_P
-    return RigidAxis(pitch, float(each.setpoint[0]), most, simple_drive(begin, most["torque"]), friction, {})
+    drive = simple_drive(begin, limits(each)["torque"])
+    return _rigid_axis(each, drive, {**begin, "F_S": begin["F_C"] + begin[EXCESS]})
 
 
 def friction_of(found: DriveFound, axis: str) -> dict[str, float]:

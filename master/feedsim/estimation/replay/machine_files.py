@@ -6,11 +6,9 @@ may move the scales of others.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, pi, sqrt
-from threading import get_ident
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,7 @@ from feedsim.files.trace.trace import Array
 from feedsim.scenario import Drive, Filter, Friction, Machine
 from feedsim.scenario.axis_units import ParameterGroup
 from feedsim.structure import checked_modes
-from feedsim.structure.modes import Modes, modes_text
+from feedsim.structure.modes import Modes, table_of_modes
 
 # --- Elastic modes of an axis in a record: how many, where they are, and what they are in the units -------------------
 # What a rigid axis leaves of the position is regressed on the axis' own acceleration a, seen by a resonance:
@@ -128,25 +126,19 @@ def _solve_least_squares(A: Array, y: Array) -> Array:
 
 
 def with_modes(machine: Machine, axis: str, modes: Sequence[ElasticMode]) -> Machine:
-    """The machine with modes of an axis added to its table, which is written beside that of the machine."""
+    """The machine with modes of an axis added to its table."""
     table = checked_modes(machine)
     n_0 = 1 / sqrt(table.J_tot(axis))
     x_0 = n_0 * machine.axes[axis].I_P
     further = [{f"n_{axis}": mode.motor * n_0, f"x_{axis}": mode.scale * x_0, f"tcp_{axis}": mode.scale * x_0}
                for mode in modes]  # fmt: skip
     whole = Modes(
-        machine.modes,
+        machine.modes.file,
         np.append(table.frequency, [mode.frequency for mode in modes]),
         np.append(table.damping, [mode.damping for mode in modes]),
         {port: np.append(column, [moved.get(port, 0.0) for moved in further]) for port, column in table.ports.items()},
     )
-    name = hashlib.sha256(repr(modes).encode()).hexdigest()[:16]
-    path = machine.modes.parent / f"modes_{name}.csv"
-    if not path.exists():  # of a temporary folder: no need for a disk; another thread may read it already
-        fresh = path.with_name(f"{name}_{get_ident()}")
-        fresh.write_text(modes_text(whole), encoding="utf-8")
-        fresh.replace(path)
-    return machine.model_copy(update={"modes": path})
+    return machine.model_copy(update={"modes": table_of_modes(whole, machine.modes.file)})
 
 
 KEYS = ("mode_f", "mode_D", "mode_u", "mode_v")
@@ -224,6 +216,11 @@ def machine_files(
             axis, rigid_axis.values, rigid_axis.estimates, rigid_axis.head, rigid_axis.correlation
         )
     return files
+
+
+def file_names(axes: Sequence[str]) -> list[str]:
+    """Names of all files that the folder of these axes may have."""
+    return ["machine.yaml", "modes.csv", *(file for axis in axes for file in (drive_file(axis), friction_file(axis)))]
 
 
 def drive_file(axis: str) -> str:

@@ -44,7 +44,7 @@ from feedsim.scenario.structure.checks import load_structure
 from feedsim.simulation.cosim import Follower
 from feedsim.simulation.nc import Program, plan
 from feedsim.structure.build import build
-from feedsim.structure.modes import checked_modes, write_modes
+from feedsim.structure.modes import checked_modes, table_of_modes
 from feedsim.structure.pose_change import SAME_FREQUENCY, describe_stale_table
 
 MEANINGS = {
@@ -259,9 +259,9 @@ class Accelerometer:
         return piece.time - piece.time[0], factor * read[name][piece.first : piece.last]
 
 
-def with_accelerometer(machine: Machine, folder: Path) -> Machine:
+def with_accelerometer(machine: Machine) -> Machine:
     """The machine whose tool signals are those of an accelerometer, the absolute motion of the tool in place of that
-    against the workpiece; its table of modes is written to the folder.
+    against the workpiece.
 
     Raises InputError: no structure of beams and masses, or another one than that of the table of modes.
     """
@@ -283,9 +283,7 @@ def with_accelerometer(machine: Machine, folder: Path) -> Machine:
     if shapes.shape[1] < len(modes.frequency):
         raise InputError(f"{machine.modes}: has pseudo-modes, or is cut off above that of {machine.structure}")
     ports = dict(modes.ports) | {f"tcp_{letter}": row for letter, row in zip("XYZ", shapes, strict=True)}
-    path = folder / "modes.csv"
-    write_modes(path, replace(modes, ports=ports))
-    return machine.model_copy(update={"modes": path})
+    return machine.model_copy(update={"modes": table_of_modes(replace(modes, ports=ports), machine.modes.file)})
 
 
 def rests(program: Program) -> list[tuple[float, float]]:

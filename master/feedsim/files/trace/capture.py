@@ -515,13 +515,13 @@ def _read_content(stream: JsonStream, path: Path) -> _Content:
 
 
 def _message(stream: JsonStream, content: _Content, number: int) -> None:
-    no_list = InputError(f"{content.path}: Payload, message {number + 1}: no list of rows under HFData")
+    no_list = f"{content.path}: Payload, message {number + 1}: no list of rows under HFData"
     if stream.peek() != "{":
-        raise no_list
+        raise InputError(no_list)
     for key in stream.members():
         if key == "HFData":
             if stream.peek() != "[":
-                raise no_list
+                raise InputError(no_list)
             for _ in stream.items():
                 _row(content, stream.value())
         else:

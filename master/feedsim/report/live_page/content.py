@@ -450,7 +450,7 @@ def content(scenario: Scenario, program: Program, wanted: Sequence[str] = (), fm
     planned = all(isinstance(motion, Move | Circle | Dwell) for motion in scenario.motions)
     knobs = chosen(scenario, wanted, planned=planned)
     evaluated = [item for item in scenario.evaluate if _is_computable(item, scenario)]
-    values = {**plant_parameters(machine, None), **parameters(machine, scenario.coupling, built_in=False)}
+    values = {**plant_parameters(machine, False), **parameters(machine, scenario.coupling, built_in=False)}
     with open_whole(machine, folder) as archive:
         code = read_page_module(folder, archive.guid)
         resources = archive.directory / "resources"

@@ -255,11 +255,6 @@ def _position_cycle(axis: str, one: DriveFound, other: OtherCycle, undecided: bo
     return Finding("position-cycle-open", "note", f"axis {axis}: {cycles} fit alike. {remedy}", axis, remedy)
 
 
-def files_of(axes: Sequence[str]) -> list[str]:
-    """Names of files that results of the axes may have besides report.html and summary.json."""
-    return [MACHINE, MODES_FILE, *(file for axis in axes for file in (drive_file(axis), friction_file(axis)))]
-
-
 def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str]:
     """Comment at the top of the files."""
     part = f", {window[0]:g} to {window[1]:g} s" if window is not None else ""

@@ -257,7 +257,7 @@ def _events(replayed: ReplayReport) -> Section | None:
 def _files(replayed: ReplayReport) -> list[tuple[str, Path]]:
     result = [("record", source.file) for source in replayed.sources]
     result += [("mapping", source.mapping) for source in replayed.sources if source.mapping is not None]
-    return [*result, *replayed.subject.files, ("modes", replayed.subject.machine.modes)]
+    return [*result, *replayed.subject.files, ("modes", replayed.subject.machine.modes.file)]
 
 
 def details(replayed: ReplayReport) -> dict[str, Any]:

@@ -5,11 +5,13 @@ And the modes that it has where the machine stands: the table's, or those of a c
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from feedsim.files.fields import FileContent
 from feedsim.foundation import units
 from feedsim.foundation.errors import FeedsimError, Finding, InputError
 from feedsim.foundation.outputs import TemporaryFolder
@@ -25,11 +27,12 @@ MAX_PACKED_PLANTS = 4  # packed archives, of about 1 MB each: studies run the sa
 # With the archive in it, by content of what it is packed from; those used last stand last.
 _PACKED_ARCHIVES: dict[Any, TemporaryFolder] = {}
 _PACKING_LOCK = threading.Lock()
+_TABLES: dict[int, TemporaryFolder] = {}  # process -> its tables of modes, named by their content
 
 
-def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
-    """The machine's plant archive, unpacked; the caller closes it. And the table of modes that the unit is to read in
-    place of the archive's; None where the archive's own counts.
+def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, bool]:
+    """The machine's plant archive, unpacked; the caller closes it. And whether the unit is to read the machine's table
+    of modes in place of the archive's (:func:`modes_file`).
 
     A machine that names an archive under `plant` has that. Otherwise plant.fmu in the folder `fmus` serves with the
     machine's table of modes; where it has other axes than the machine, or the machine has mounts that are not linear,
@@ -39,10 +42,10 @@ def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
         InputError: no such archive, or it does not fit the machine.
     """
     if machine.plant is not None:
-        return open_own(machine.plant, machine), None
+        return open_own(machine.plant, machine), False
     general = Archive(fmus / "plant.fmu")
     if machine.mounts_table is None and set(axes_of(general)) == set(machine.axes):
-        return general, machine.modes
+        return general, True
     general.close()
 
     def make(out: Path) -> None:
@@ -51,7 +54,20 @@ def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
             mounts=machine.mounts_table, name=machine.name, note=machine.note, trial=False, level=0,
         )  # fmt: skip
 
-    return packed_for(machine, general.path, make), None
+    return packed_for(machine, general.path, make), False
+
+
+def modes_file(table: FileContent) -> Path:
+    """A file of this process with a table of modes: the unit reads one, once for every name."""
+    if (process := os.getpid()) not in _TABLES:
+        _TABLES[process] = TemporaryFolder()
+    path = _TABLES[process].path / f"{table.digest}.csv"
+    if not path.is_file():
+        fresh = path.with_suffix(f".{threading.get_ident()}")  # another thread may read it already
+        fresh.parent.mkdir(exist_ok=True)  # cleaners take what has been idle for long
+        fresh.write_bytes(table.content or b"")
+        fresh.replace(path)
+    return path
 
 
 def open_own(plant: Path, machine: Machine) -> Archive:
@@ -70,9 +86,9 @@ def packed_for(machine: Machine, general: Path, make: Callable[[Path], None]) ->
 
     `make` need not try it, which is instantiated next anyway, nor compress it: it is unpacked at once.
     """
-    files = (general, *(file for file in (machine.modes, machine.plant, machine.mounts_table) if file is not None))
+    files = (general, *(file for file in (machine.plant, machine.mounts_table) if file is not None))
     try:
-        contents = tuple(map(STORE.digest, files))
+        contents = (*map(STORE.digest, files), machine.modes.digest)
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
     key = *contents, *((axis, machine.pose[axis]) for axis in machine.axes), machine.name, machine.note
@@ -113,7 +129,6 @@ def _check_own(archive: Archive, machine: Machine) -> None:
         )
     try:
         inside = (archive.directory / MODES_IN_ARCHIVE).read_bytes()
-        outside = machine.modes.read_bytes()
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
     mounts = archive.directory / MOUNTS_IN_ARCHIVE
@@ -130,7 +145,7 @@ def _check_own(archive: Archive, machine: Machine) -> None:
             raise InputError(
                 f"{archive.path}: its table of mounts is not the machine's, {machine.mounts_table}; {pack_anew}"
             )
-    if inside != outside:
+    if inside != machine.modes.content:
         packed = _packed_pose(archive)
         if any(abs(packed.get(axis, position) - position) > SAME_POSITION for axis, position in machine.pose.items()):
             there, here = (
@@ -164,8 +179,8 @@ def plant_modes(machine: Machine, amplitude: float = 0.0) -> tuple[Modes, list[F
     try:
         with_grid = _of_cell(machine)
     except FeedsimError as error:  # who simulates meets it again; the closed form can do without the archive
-        text = f"the closed form has the modes of {machine.modes.name}, not those of the plant: {error}"
-        return table, [Finding("modes-not-of-plant", "doubt", text, machine.modes.name)]
+        text = f"the closed form has the modes of {machine.modes.file.name}, not those of the plant: {error}"
+        return table, [Finding("modes-not-of-plant", "doubt", text, machine.modes.file.name)]
     return (with_transmissions(machine, with_grid[0]), with_grid[1]) if with_grid else (table, [])
 
 

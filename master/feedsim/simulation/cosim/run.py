@@ -248,7 +248,7 @@ class Crossings:
 
 def grid_of(system: System) -> tuple[GridAxis, ...]:
     """The axes whose pose the plant of a system follows; none where it has one pose."""
-    if system.plant_modes_file is not None:
+    if system.takes_modes:
         return ()
     file = system.plant.archive.directory / POSES_IN_ARCHIVE
     if not file.is_file():

@@ -15,7 +15,7 @@ from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.exchange import is_shipped
-from feedsim.simulation.cosim.plant import axes_of, open_plant
+from feedsim.simulation.cosim.plant import axes_of, modes_file, open_plant
 from feedsim.simulation.cosim.roles import RoleUnit, archive_path, check_instances, fill_role
 from feedsim.simulation.cosim.unit import Floats, Port, Unit, UnloadedUnit
 from feedsim.simulation.nc import Program
@@ -208,7 +208,7 @@ class System(BlockResource):
             raise
 
     def _build(self, machine: Machine, fmus: Path) -> None:
-        plant, self.plant_modes_file = open_plant(machine, fmus)
+        plant, self.takes_modes = open_plant(machine, fmus)
         self._open.append(plant)
         self.roles = self._fill(machine, fmus)
         instances = {PLANT: plant} | {name: role.archive for name, role in self.roles.items()}
@@ -228,7 +228,7 @@ class System(BlockResource):
             and tuple(machine.axes) == self.axes
             and machine.plant == own.plant
             and machine.mounts_table == own.mounts_table
-            and (machine.plant is machine.mounts_table is None or machine.modes == own.modes)
+            and (machine.plant is machine.mounts_table is None or machine.modes.content == own.modes.content)
             and all(archive_path(machine, r.axis, r.role, fmus) == r.archive.path for r in self.roles.values())
         )
 
@@ -239,14 +239,14 @@ class System(BlockResource):
         """
         self.machine = machine
         if machine.plant is machine.mounts_table is None:  # packed for its axes, the archive's own modes are others
-            self.plant_modes_file = machine.modes
+            self.takes_modes = True
         self.roles = {name: fill_role(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
         for unit in self.instances.values():
             unit.reset()
         self._parameterise(machine)
 
     def _parameterise(self, machine: Machine) -> None:
-        self.plant.set_parameters(plant_parameters(machine, self.plant_modes_file))
+        self.plant.set_parameters(plant_parameters(machine, self.takes_modes))
         for name, role in self.roles.items():
             self.units[name].set_parameters(role.parameters)
             if RELEASE in role.signals:
@@ -407,11 +407,11 @@ class System(BlockResource):
         self._open.clear()
 
 
-def plant_parameters(machine: Machine, modes_file: Path | None) -> dict[str, float | int | bool | str]:
-    """Parameters of the plant unit by FMU name. `modes_file` None: the modes of the archive count."""
+def plant_parameters(machine: Machine, takes_modes: bool) -> dict[str, float | int | bool | str]:
+    """Parameters of the plant unit by FMU name. `takes_modes`: in place of those of the archive."""
     parameters: dict[str, float | int | bool | str] = {}
-    if modes_file is not None:
-        parameters["modes_file"] = str(modes_file)
+    if takes_modes:
+        parameters["modes_file"] = str(modes_file(machine.modes))
     for name, axis in machine.axes.items():
         parameters[f"{name}.x_0"] = machine.pose[name]
         parameters[f"{name}.M_0"] = axis.M_0

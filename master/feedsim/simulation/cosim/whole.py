@@ -166,11 +166,11 @@ class WholeMachine(System):
 
     def _build(self, machine: Machine, fmus: Path) -> None:
         given = parameters(machine, self._coupling, built_in=False)
-        archive, self.plant_modes_file = open_whole(machine, fmus), None
+        archive, self.takes_modes = open_whole(machine, fmus), False
         self._open.append(archive)
         self.roles = {}
         self.plant = self._instantiate(archive, UNIT)
-        self.plant.set_parameters({**plant_parameters(machine, None), **given})
+        self.plant.set_parameters({**plant_parameters(machine, False), **given})
         self.plant_axes = axes_of(archive)
         for axis in self.axes:
             self.roles[wiring.controller(axis)] = _part(archive, axis, DRIVE)

@@ -231,7 +231,7 @@ def _files(
     for axis in () if whole else axes:
         for role, instance in ((DRIVE, system.controller(axis)), (FRICTION_ROLE, system.friction(axis))):
             units[instance] = fill_role(machine, axis, role, archives[instances[instance]])
-    parameters: dict[str, Mapping[str, Value]] = {} if whole else {system.PLANT: plant_parameters(machine, None)}
+    parameters: dict[str, Mapping[str, Value]] = {} if whole else {system.PLANT: plant_parameters(machine, False)}
     parameters |= {instance: unit.parameters for instance, unit in units.items()}
 
     def end(variable: system.Variable) -> tuple[str, str]:

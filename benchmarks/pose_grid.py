@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from feedsim import scenario
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.structure.checks import load_structure
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.operations import DueCycles, Interpreter, do_step, get_row, set_real, set_slopes

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, solve_triangular
 
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure
 from feedsim.structure.geometry.assemble import Assembler
 
 Floats = NDArray[np.float64]

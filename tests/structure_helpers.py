@@ -10,8 +10,8 @@ import yaml
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from feedsim.scenario.structure.checks import load_structure
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.assembly import Assembly
 
 Floats = NDArray[np.float64]

@@ -50,7 +50,7 @@ SOLE_USERS = {
     },
     "yaml": {"files", "estimation/identify/friction_file.py"},
     "matplotlib": set(),
-    "PIL": {"report/machine/report.py"},
+    "PIL": {"report/machine.py"},
     "resvg_py": {"report/chart/svg.py"},
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},

@@ -13,7 +13,7 @@ from feedsim.analysis import campaign as estimate
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Cycles
-from feedsim.simulation.nc.excitation import multisine
+from feedsim.simulation.cosim.excitation import multisine
 
 Floats = NDArray[np.float64]
 

@@ -20,11 +20,11 @@ from feedsim.motions import circular
 from feedsim.motions.kind import HeldPoints, JoinedPoints
 from feedsim.report import run as report
 from feedsim.simulation import cosim, nc
+from feedsim.simulation import nc as program
+from feedsim.simulation import nc as spline
 from feedsim.simulation.cosim import recording, schedule
 from feedsim.simulation.cosim.unit import Log
 from feedsim.simulation.judge import judge_run
-from feedsim.simulation.nc import program
-from feedsim.simulation.nc import program as spline
 from report_helpers import write_run
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -21,13 +21,13 @@ from feedsim.foundation.errors import Finding, InputError, SimulationError
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim import exchange
+from feedsim.simulation.cosim.excitation import multisine
 from feedsim.simulation.cosim.excite import measure, usual_rms
 from feedsim.simulation.cosim.operations import set_real
 from feedsim.simulation.cosim.schedule import REPORTED_EVERY, Cycle, Loop, Progress
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Port
 from feedsim.simulation.judge import JudgedRun, judge_run
-from feedsim.simulation.nc.excitation import multisine
 from feedsim_packager import toolchain
 from feedsim_packager.native import build as build_library
 from scenario_helpers import default_machine

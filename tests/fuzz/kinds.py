@@ -25,7 +25,7 @@ from feedsim.files.trace.series import read_series
 from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario.load import load_machine, read_friction
 from feedsim.scenario.roles import DRIVE
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.scenario.study import load_study
 from feedsim.simulation import judge, ssp
 from feedsim.simulation.cosim.archive import Archive, folders

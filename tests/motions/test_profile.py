@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from feedsim.foundation.errors import InputError
 from feedsim.motions.profile import rest_to_rest, speed_change
-from feedsim.simulation.nc.program import RestSpline
+from feedsim.simulation.nc import RestSpline
 
 JERK = 150.0
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError
 from feedsim.scenario import Cycles
-from feedsim.simulation.nc.excitation import Excitation, binary_sequence, distinct_lines, multisine
+from feedsim.simulation.cosim.excitation import Excitation, binary_sequence, distinct_lines, multisine
 
 CYCLES = Cycles(control=125e-6, position=1e-3, interpolation=2e-3)
 

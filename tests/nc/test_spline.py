@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_banded
 
-from feedsim.simulation.nc.program import _slopes
+from feedsim.simulation.nc import _slopes
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 58, 1000, 16384])

@@ -21,8 +21,8 @@ from feedsim.foundation.errors import InputError
 from feedsim.linear.loops import speed_gain
 from feedsim.linear.system import LinearSystem
 from feedsim.scenario import load_machine
+from feedsim.simulation.cosim.excitation import binary_sequence, multisine
 from feedsim.simulation.cosim.excite import Measurement, measure, usual_rms
-from feedsim.simulation.nc.excitation import binary_sequence, multisine
 from feedsim.structure import checked_modes
 from scenario_helpers import default_machine
 from structure_helpers import MACHINES

@@ -17,8 +17,8 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.scenario import Machine
-from feedsim.scenario.structure.checks import load_structure
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import judge
 from feedsim.structure.poses import grid_axis, pose_grid
 from fmi_helpers import Archive, Instance

@@ -8,7 +8,7 @@ import pytest
 
 from feedsim.estimation.identify.result import Estimate
 from feedsim.report.changes import control_names
-from feedsim.report.replay.drive import beside_lines, beside_part, beside_section, compare_parameters
+from feedsim.report.identified_drive import beside_lines, beside_part, beside_section, compare_parameters
 from feedsim.scenario import load_machine
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"  # K_v 66.7 1/s, T_n 12 ms

@@ -13,7 +13,7 @@ from feedsim.files.trace import Mark
 from feedsim.report import formatting
 from feedsim.report.chart import Curve
 from feedsim.report.formatting import Array
-from feedsim.report.replay.report import MOST_NAMES, names_of
+from feedsim.report.replay import MOST_NAMES, names_of
 from feedsim.report.show import looks_of
 
 REPORT = Path(formatting.__file__).parent
@@ -40,7 +40,7 @@ WORDS = {
 }
 # Modules whose colours are a list of many alike things: levels of a parameter, bodies, signals, stretches, sources.
 LISTS = {
-    "sweep/figure_plots.py", "sweep/report.py", "machine/record.py", "machine/report.py", "run/axis_plots.py",
+    "sweep/figure_plots.py", "sweep/report.py", "machine.py", "machine_record.py", "run/axis_plots.py",
     "identify/report.py", "identify/stribeck_plots.py", "show.py", "frf/bode.py", "frf/report.py",
     "chart/model.py", "chart/svg.py", "run/contour.py",
 }  # fmt: skip

@@ -16,7 +16,8 @@ from PIL import Image
 
 from feedsim import cli
 from feedsim.foundation.errors import InputError
-from feedsim.report.machine.record import (
+from feedsim.report.machine import FRAMES, telling_view
+from feedsim.report.machine_record import (
     FRONT_VIEW,
     MODE_DEFLECTION,
     OBLIQUE,
@@ -29,9 +30,8 @@ from feedsim.report.machine.record import (
     turn_vectors,
     view,
 )
-from feedsim.report.machine.report import FRAMES, telling_view
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.build import Built, build
 from feedsim.structure.geometry.outline import node_motion
 

@@ -17,7 +17,7 @@ from feedsim.report.page import html
 from feedsim.report.run.files import details
 from feedsim.report.run.report import report_of
 from feedsim.scenario import Machine
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import cosim, judge
 from feedsim.simulation.judge import judge_run
 from feedsim.structure.geometry.assemble import assemble

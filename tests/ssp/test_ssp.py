@@ -11,7 +11,7 @@ import pytest
 import ssp_helpers
 from feedsim import analysis, scenario
 from feedsim.foundation.errors import Finding
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import cosim, nc, ssp
 from feedsim.simulation.judge import JudgedRun, judge_run
 from feedsim.simulation.ssp.opened import OpenedSystem

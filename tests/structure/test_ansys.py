@@ -17,7 +17,7 @@ from scipy import sparse
 
 from feedsim.cli import main
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.build import check
 from feedsim.structure.matrices import ansys
 from feedsim.structure.matrices.build import ImportedModel, import_model

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import dblquad
 from scipy.linalg import eigh
 
-from feedsim.scenario.structure.parts import Box, Material, Properties, Rectangle, Rod, Tube
+from feedsim.scenario.structure import Box, Material, Properties, Rectangle, Rod, Tube
 from feedsim.structure.geometry.mesh import BeamProperties, area_moments, beam_axes, beam_matrices, beam_properties, rod
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ import yaml
 from fe_models import STRUCTURES, dense_modes
 
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.build import check
 from feedsim.structure.matrices.build import ImportedModel, import_model
 

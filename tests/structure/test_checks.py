@@ -11,7 +11,7 @@ from fe_models import assembly, chain, geometry
 from scipy import sparse
 
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.scenario.structure.parts import SI, UnitSystem
+from feedsim.scenario.structure import SI, UnitSystem
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.build import check, frequency_warnings
 

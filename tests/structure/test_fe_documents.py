@@ -10,7 +10,7 @@ import pytest
 import yaml
 from fe_models import ROOT, STRUCTURES, dense_modes
 
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.matrices.build import import_model
 from feedsim.structure.matrices.tables import BY_NODE, FREEDOM_NAMES, NODE_COLUMNS, read_table
 

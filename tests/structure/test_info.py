@@ -11,7 +11,7 @@ import pytest
 
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import load_described
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure import read_modes
 from feedsim.structure.build import Built, build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table

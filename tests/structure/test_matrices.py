@@ -13,7 +13,7 @@ import yaml
 from fe_models import STRUCTURES, chain, dense_modes, write_market
 
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.build import check
 from feedsim.structure.matrices.build import ImportedModel, import_model

@@ -15,7 +15,7 @@ from feedsim import cli, scenario
 from feedsim.files.fields import FileContent
 from feedsim.foundation.errors import InputError, OutputError
 from feedsim.scenario import load_machine
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import cosim
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.plant import axes_of, modes_file, open_plant

@@ -12,7 +12,7 @@ import pytest
 from scipy import sparse
 
 from feedsim.foundation.errors import InputError, OutputError
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.geometry.assemble import Assembler
 from feedsim.structure.modes import read_modes
 from feedsim.structure.poses import GridAxis, check_common, grid_axis, pose_grid, read_grid, write_poses

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from structure_helpers import one_axis_text
 
 

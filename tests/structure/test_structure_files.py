@@ -12,7 +12,7 @@ import yaml
 
 from feedsim.foundation.errors import InputError
 from feedsim.scenario.schema import json_schema
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.structure.geometry.assemble import Assembler
 from structure_helpers import MACHINES, default_structure, geometry, one_axis_data, one_axis_text
 

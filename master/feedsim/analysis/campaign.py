@@ -15,8 +15,8 @@ from feedsim.files.trace import Trace
 from feedsim.files.trace.response import FrequencyResponse, quotient_unit
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.scenario import Coupling, Machine
+from feedsim.simulation.cosim.excitation import Excitation, binary_sequence, multisine
 from feedsim.simulation.cosim.excite import Measurement, measure, usual_rms
-from feedsim.simulation.nc.excitation import Excitation, binary_sequence, multisine
 
 # --- Frequency responses and coherence from time series ---------------------------------------------------------------
 # With output y, input u and, in a closed loop, the excitation r that is independent of all disturbances, cross

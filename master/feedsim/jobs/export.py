@@ -37,7 +37,7 @@ from feedsim.report.live_page.html import MARK, page
 from feedsim.report.provenance import input_paths
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.load import load, load_described
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import cosim, judge, nc, ssp
 from feedsim.simulation.cosim.whole import UNIT, pack_whole
 from feedsim.simulation.judge import judge_run

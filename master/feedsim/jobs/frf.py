@@ -41,7 +41,7 @@ from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_fo
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.scenario import Coupling, Machine, Subject, load_subject
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation.cosim.plant import plant_modes
 from feedsim.simulation.judge import warn_control_loops as control_findings
 from feedsim.structure.pose_change import table_mismatch

@@ -33,8 +33,8 @@ from feedsim.jobs.parameters import (
 )
 from feedsim.jobs.replay import ReplayRequest
 from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
-from feedsim.report.replay import drive as page
-from feedsim.report.replay.drive import DriveReport
+from feedsim.report import identified_drive as page
+from feedsim.report.identified_drive import DriveReport
 
 KIND = Kind("identify-drive", keeps=("*",))
 

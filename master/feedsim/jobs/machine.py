@@ -31,12 +31,11 @@ from feedsim.jobs.parameters import (
     output_option,
 )
 from feedsim.jobs.result import Kind, Result, claim_result_folder
+from feedsim.report import machine_record as shown
 from feedsim.report.content import PICTURE_FORMATS, Report
-from feedsim.report.machine import record as shown
 from feedsim.report.provenance import to_json
 from feedsim.scenario.load import MachineDescription, load_described
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure, Structure
 from feedsim.structure.build import build
 from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
 from feedsim.structure.modes import Modes, checked_modes, damped_twice, read_modes, write_modes
@@ -44,7 +43,7 @@ from feedsim.structure.mounts import MOUNTS_FILE, MountTable, table_of, write_mo
 from feedsim.structure.pose_change import describe_stale_table
 
 if TYPE_CHECKING:
-    from feedsim.report.machine.report import Drawings
+    from feedsim.report.machine import Drawings
 
 # Exchange step where no machine file says what the control cycle is [s].
 USUAL_STEP = 125e-6
@@ -128,17 +127,17 @@ def result_of(
 
     @cache
     def drawn() -> Drawings:
-        from feedsim.report.machine.report import draw_machine
+        from feedsim.report.machine import draw_machine
 
         return draw_machine(machine.structure, info, modes=modes, scale=scale, animate=animate)
 
     def report() -> Report:
-        from feedsim.report.machine.report import report_of
+        from feedsim.report.machine import report_of
 
         return report_of(info, described.files, drawn().parts)
 
     def answers() -> list[str]:
-        from feedsim.report.machine.report import answers
+        from feedsim.report.machine import answers
 
         return answers(info)
 

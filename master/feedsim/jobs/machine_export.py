@@ -31,7 +31,7 @@ from feedsim.jobs.parameters import (
     output_option,
 )
 from feedsim.jobs.result import Kind, Result, claim_result_folder
-from feedsim.report.control_files import exported as page
+from feedsim.report import control_export as page
 from feedsim.scenario import load_machine
 from feedsim.scenario.machine import Machine
 

@@ -32,7 +32,7 @@ from feedsim.jobs.parameters import (
     output_option,
 )
 from feedsim.jobs.result import Kind, Result, claim_result_folder
-from feedsim.report.control_files import imported as page
+from feedsim.report import control_import as page
 from feedsim.scenario.imported import ImportedMachine, import_reading
 from feedsim.scenario.machine import Machine
 

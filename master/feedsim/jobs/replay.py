@@ -37,8 +37,8 @@ from feedsim.jobs.parameters import (
     output_option,
 )
 from feedsim.jobs.result import Kind, Result, announce_programs, claim_result_folder
-from feedsim.report.replay import report as page
-from feedsim.report.replay.report import ReplayReport
+from feedsim.report import replay as page
+from feedsim.report.replay import ReplayReport
 from feedsim.scenario import Drive, Machine, Subject, load_subject
 from feedsim.structure import checked_modes
 

@@ -45,7 +45,7 @@ from feedsim.report.changes import change_lines
 from feedsim.report.provenance import input_paths
 from feedsim.report.tune import drive as page
 from feedsim.scenario import Machine, load
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation import cosim
 from feedsim.simulation.judge import judge_run
 from feedsim.structure import Modes

@@ -33,9 +33,8 @@ from feedsim.scenario.axis_units import Friction, FrictionParameters, GmsFrictio
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.model import Scenario, contradictions
 from feedsim.scenario.roles import GMS
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.checks import STRUCTURE_FILE, load_structure
-from feedsim.scenario.structure.parts import FiniteElements, GeometryStructure
+from feedsim.scenario.structure import FiniteElements, GeometryStructure, Structure
+from feedsim.scenario.structure_checks import STRUCTURE_FILE, load_structure
 
 # --- Keys and values of a control in scenario and machine files: MD32200: 4 in place of K_v: 4 (m/min)/mm -------------
 

@@ -63,7 +63,7 @@ def _structure_schema() -> dict[str, Any]:
     """One of the kinds; which is for `kind` to say."""
     from pydantic.json_schema import models_json_schema
 
-    from feedsim.scenario.structure.checks import STRUCTURE_KINDS
+    from feedsim.scenario.structure_checks import STRUCTURE_KINDS
 
     references, schema = models_json_schema([(model, "validation") for model in STRUCTURE_KINDS.values()])
     options = [references[model, "validation"] for model in STRUCTURE_KINDS.values()]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feedsim.foundation import errors
 from feedsim.foundation.outputs import file_digest
-from feedsim.scenario.structure.parts import SI, UnitSystem
+from feedsim.scenario.structure import SI, UnitSystem
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -14,8 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.parts import FiniteElements, GeometryStructure
+from feedsim.scenario.structure import FiniteElements, GeometryStructure, Structure
 from feedsim.structure.assembly import (
     DEGREES,
     MAX_SHOWN_LABELS,

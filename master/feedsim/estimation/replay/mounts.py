@@ -40,7 +40,7 @@ from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
 from feedsim.foundation.errors import FeedsimError, Finding, InputError
 from feedsim.scenario import Machine, Subject
-from feedsim.scenario.structure.checks import load_structure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation.cosim import Follower
 from feedsim.simulation.nc import Program, plan
 from feedsim.structure.build import build

@@ -25,15 +25,14 @@ from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.model import SCHEMES
 from feedsim.simulation.cosim import worker
 from feedsim.simulation.cosim.exchange import any_foreign, choose_native_loop
+from feedsim.simulation.cosim.excitation import Excitation
 from feedsim.simulation.cosim.loads import LOAD_TAKEN_UP
 from feedsim.simulation.cosim.operations import DueCycles, Operation, copy, get_row, set_real, set_slopes
 from feedsim.simulation.cosim.schedule import Cycle, Loop, Progress, Setpoints
 from feedsim.simulation.cosim.system import TOOL_FORCES, System, controller
 from feedsim.simulation.cosim.unit import Floats, Log, Port
 from feedsim.simulation.cosim.worker import deliver
-from feedsim.simulation.nc import Program
-from feedsim.simulation.nc.excitation import Excitation
-from feedsim.simulation.nc.program import violations
+from feedsim.simulation.nc import Program, violations
 from feedsim.structure.modes import checked_modes
 
 Input = Literal["M_add", "n_add", "tool.F_X", "tool.F_Y", "tool.F_Z"]

@@ -21,8 +21,7 @@ from feedsim.motions.setpoints import RecordedGeometry
 from feedsim.scenario import Scenario, load
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.unpacked import readable
-from feedsim.simulation.nc import Program, Segment, plan
-from feedsim.simulation.nc.program import MAX_POSITION_CYCLES
+from feedsim.simulation.nc import MAX_POSITION_CYCLES, Program, Segment, plan
 from feedsim.simulation.ssp import archive, rebuilt, setpoints, system_structure
 from feedsim.simulation.ssp.export import coupling_of_one, roles_of_one, split_one
 from feedsim.simulation.ssp.rebuilt import STRUCTURE, Parts, values

@@ -21,8 +21,8 @@ from feedsim.foundation.errors import InputError
 from feedsim.scenario import Drive, Scenario
 from feedsim.scenario.axis_units import EFFECTS, FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
-from feedsim.scenario.structure.checks import load_structure
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure
+from feedsim.scenario.structure_checks import load_structure
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.whole import UNIT
 from feedsim.simulation.ssp import parameter_set

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.checks import (
+from feedsim.scenario.structure import Drive, GeometryStructure, Hold, Mount, Structure
+from feedsim.scenario.structure_checks import (
     contradictions,
     load_structure,
     node,
@@ -23,7 +23,6 @@ from feedsim.scenario.structure.checks import (
     rail,
     resolve_attachment,
 )
-from feedsim.scenario.structure.parts import Drive, GeometryStructure, Hold, Mount
 from feedsim.structure.assembly import Assembly, Floats, Geometry, MountPort, State
 from feedsim.structure.geometry.mesh import FRAME, Mesh, Row, rigid_grip, sum_weighted_rows, symmetric
 

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.scenario.structure.checks import Attachment, Line, Node, nodes
-from feedsim.scenario.structure.parts import GeometryStructure, NodeGroup
+from feedsim.scenario.structure import GeometryStructure, NodeGroup
+from feedsim.scenario.structure_checks import Attachment, Line, Node, nodes
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-    from feedsim.scenario.structure.parts import Material, Section
+    from feedsim.scenario.structure import Material, Section
 
 
 # --- Points that nodes hold: rigidly, as the mean of several, or riding on a line of nodes ----------------------------

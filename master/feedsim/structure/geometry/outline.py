@@ -13,8 +13,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.scenario.structure.checks import nodes, rail, resolve_attachment
-from feedsim.scenario.structure.parts import GeometryStructure, Section
+from feedsim.scenario.structure import GeometryStructure, Section
+from feedsim.scenario.structure_checks import nodes, rail, resolve_attachment
 from feedsim.structure.assembly import Assembly, Floats, Geometry, Integers
 from feedsim.structure.geometry.mesh import Grip, Mesh, area_moments, beam_axes, rigid_grip
 

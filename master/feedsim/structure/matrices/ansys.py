@@ -14,7 +14,7 @@ import numpy as np
 
 from feedsim.files import source
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.scenario.structure.parts import AnsysStructure
+from feedsim.scenario.structure import AnsysStructure
 from feedsim.structure.assembly import DEGREES, count_text
 from feedsim.structure.matrices.tables import FREEDOM_NAMES, RawModel, from_triangle, read_points
 

@@ -17,7 +17,7 @@ from scipy import sparse
 from feedsim.files import source
 from feedsim.foundation import units
 from feedsim.foundation.errors import Finding, InputError
-from feedsim.scenario.structure.parts import (
+from feedsim.scenario.structure import (
     AnsysStructure,
     CalculixStructure,
     FiniteElements,

@@ -16,7 +16,7 @@ from scipy import sparse
 from feedsim.files import source
 from feedsim.files.source import resolve_reference
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure.parts import CalculixStructure
+from feedsim.scenario.structure import CalculixStructure
 from feedsim.structure.assembly import Integers
 from feedsim.structure.matrices.tables import FREEDOM_NAMES, Points, RawModel, from_triangle, read_points
 

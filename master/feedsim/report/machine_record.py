@@ -17,8 +17,7 @@ from feedsim.report.formatting import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLI
 from feedsim.report.provenance import hash_files, inputs_part, quantity, software
 from feedsim.scenario import Coupling
 from feedsim.scenario.model import SCHEMES
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.parts import GeometryStructure
+from feedsim.scenario.structure import GeometryStructure, Structure
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.build import Built
 from feedsim.structure.geometry.outline import Outline, deflection, node_motion, outline

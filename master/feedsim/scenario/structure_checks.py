@@ -13,14 +13,14 @@ from feedsim.files.checked import check_tree, describe, read_group
 from feedsim.files.fields import brief, did_you_mean, no_axis
 from feedsim.files.source import Place
 from feedsim.foundation.errors import InputError
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.parts import (
+from feedsim.scenario.structure import (
     FRAME,
     AnsysStructure,
     Body,
     CalculixStructure,
     GeometryStructure,
     MatrixMarketStructure,
+    Structure,
 )
 
 # --- What the names of nodes in a machine written as geometry stand for -----------------------------------------------

@@ -1,4 +1,6 @@
-"""What the frequency responses of a machine say: resonances, bandwidths, margins, as results and as figures."""
+"""What the frequency responses of a machine say: resonances, bandwidths, margins, as results and as figures. Names of
+the room `linear` stand here, too, for who evaluates it.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +12,45 @@ import numpy as np
 
 from feedsim.analysis.figures import Figure
 from feedsim.linear import loops
-from feedsim.linear.loops import unstable_poles
+from feedsim.linear.loops import (
+    compliance,
+    names,
+    position_gain,
+    position_reference,
+    response,
+    scale_response,
+    speed_controlled_system,
+    speed_gain,
+    speed_reference,
+    structure,
+    unstable_poles,
+)
 from feedsim.linear.margins import (
     Bandwidth,
     Extreme,
+    GainCrossing,
     Margins,
     Pair,
+    PhaseCrossing,
     bandwidth,
+    crossings,
     delay,
+    extremes,
     grid,
     margins,
     pairs,
     peak,
 )
-from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
-from feedsim.linear.system import LinearSystem
+from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, OperatingPoint
+from feedsim.linear.system import ClosedLoop, LinearSystem
+
+__all__ = [
+    "AxisResult", "Bandwidth", "ClosedLoop", "Extreme", "GainCrossing", "LinearResult", "LinearSystem", "Margins",
+    "OperatingPoint", "Pair", "PhaseCrossing", "PositionLoop", "SpeedLoop", "bandwidth", "compliance", "crossings",
+    "delay", "evaluate", "extremes", "figures", "grid", "margins", "names", "pairs", "peak", "position_gain",
+    "position_reference", "response", "scale_response", "speed_controlled_system", "speed_gain", "speed_reference",
+    "structure", "unstable_poles",
+]  # fmt: skip
 
 LOWEST_FREQUENCY = 1.0  # [Hz]
 LOW_BAND = 5.0  # [Hz] up to here the axis is its inertia
@@ -208,9 +234,9 @@ def figures(result: LinearResult | LinearSystem) -> dict[str, Figure]:
     }
     for axis, of_axis in result.axes.items():
         results |= {f"{axis}.{name}": figure for name, figure in _axis_figures(of_axis).items()}
-    for drives, compliance in (("as they are", result.compliance), ("without torque", result.structure_compliance)):
-        prefix = "tool" if compliance is result.compliance else "tool.free"
-        for direction, top in compliance.items():
+    for drives, responses in (("as they are", result.compliance), ("without torque", result.structure_compliance)):
+        prefix = "tool" if responses is result.compliance else "tool.free"
+        for direction, top in responses.items():
             name = f"{prefix}.compliance_{direction}"
             what = f"highest maximum of |x_{direction}/F_{direction}| at the tool, drives {drives}"
             results[name] = Figure(top.value * 1e6 if top else math.nan, "um/N", what)

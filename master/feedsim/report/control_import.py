@@ -14,7 +14,7 @@ from feedsim.files.control.archive import Archive
 from feedsim.files.control.reading import Reading, RefusedValue, TakenValue
 from feedsim.foundation.errors import Finding
 from feedsim.report.content import FOLDER, Bullets, Report, Section, Step, Table, Text, Tile, code, provenance_section
-from feedsim.report.control_files.exported import sources_section
+from feedsim.report.control_export import sources_section
 from feedsim.report.formatting import Scale, count_things, minus, plain_unit, scale
 from feedsim.report.provenance import hash_files, inputs_part
 from feedsim.scenario.imported import ImportedMachine, machine_file_value, place_of

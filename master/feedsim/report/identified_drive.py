@@ -42,7 +42,7 @@ from feedsim.report.content import (
 )
 from feedsim.report.formatting import display_unit, minus, powers, remark_charts, three_digits, typeset
 from feedsim.report.provenance import finite, hash_files, inputs_part, quantity
-from feedsim.report.replay.report import pictures_of
+from feedsim.report.replay import pictures_of
 from feedsim.scenario import Drive, Friction, Machine, Subject
 from feedsim.scenario.axis_units import ParameterGroup
 

@@ -1,5 +1,6 @@
-"""What a machine written as geometry is made of: materials and cross-sections of beams; ball-screw drive, linear scale
-and tool.
+"""Structure files: what every kind gives, and what a machine written as geometry is made of.
+
+Read by structure_checks.py (load_structure), which sees the parts together.
 """
 
 from __future__ import annotations
@@ -9,10 +10,48 @@ from functools import partial
 from math import hypot, isfinite, pi
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PlainValidator, StrictInt, ValidationInfo, WithJsonSchema, field_validator, model_validator
+from pydantic import (
+    Field,
+    PlainValidator,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
 
 from feedsim.files.fields import AxisName, File, Model, Quantity, brief, fault
-from feedsim.scenario.structure import Structure
+
+
+class DampingStep(Model):
+    """A damping ratio that counts for low frequencies."""
+
+    below: Annotated[float, Quantity("rad/s", above=0, example="30 Hz")] = Field(
+        description="Modes of lower frequency have this ratio"
+    )
+    ratio: Annotated[float, Quantity("1", minimum=0, maximum=1, example="6 %")] = Field(description="Damping ratio")
+
+
+class Damping(Model):
+    """Modal damping: one ratio, others for low frequencies."""
+
+    ratio: Annotated[float, Quantity("1", minimum=0, maximum=1, example="2 %")] = Field(description="Damping ratio")
+    steps: tuple[DampingStep, ...] = Field(
+        default=(), description="Ratios of low modes; the step of the lowest frequency above a mode's counts"
+    )
+
+
+class Structure(Model):
+    """What every kind of structure file gives. Frequencies are angular [rad/s]."""
+
+    name: StrictStr = Field(default="", description="Name in reports")
+    note: StrictStr = Field(default="", description="Remark shown wherever the structure's numbers are shown")
+    damping: Damping = Field(description="Modal damping")
+    cutoff: Annotated[float, Quantity("rad/s", above=0, example="1000 Hz")] = Field(
+        default=6283.185307179586, description="Modes above this frequency are dropped"
+    )
+
 
 # --- Field types of a machine written as geometry: points, directions, names of nodes ---------------------------------
 

@@ -27,7 +27,7 @@ from feedsim.report.content import (
     provenance_section,
 )
 from feedsim.report.formatting import INK, MUTED, PAPER, VERMILLION, Array, display_unit, minus, number, typeset
-from feedsim.report.machine.record import (
+from feedsim.report.machine_record import (
     FRONT_VIEW,
     MEANINGS,
     OBLIQUE,

@@ -43,7 +43,7 @@ from feedsim.foundation.errors import FeedsimError
 from feedsim.scenario import Machine, load, load_machine
 from feedsim.simulation.cosim import run
 from feedsim.structure import checked_modes
-from feedsim.structure.modes import write_modes
+from feedsim.structure.modes import table_of_modes, write_modes
 
 MACHINE = Path(__file__).resolve().parents[1] / "scenarios" / "machines" / "sinumerik_840d"
 FACTOR = 1.5  # about the measured value, to either side
@@ -237,8 +237,11 @@ def identified(
             first = len(table.frequency) - len(kind.modes)
             ports = {port: np.array(column) for port, column in table.ports.items()}
             ports["x_Y"][first] = ports["tcp_Y"][first] = shape
-            write_modes(elastic.modes, replace(table, ports=ports))
-        changes = [f"machine.modes={elastic.modes}", *changes[1:]]
+            elastic = elastic.model_copy(
+                update={"modes": table_of_modes(replace(table, ports=ports), elastic.modes.file)}
+            )
+        (folder / "elastic.csv").write_bytes(elastic.modes.content or b"")
+        changes = [f"machine.modes={folder / 'elastic.csv'}", *changes[1:]]
     log = run(load(folder / "moves.yaml", changes)).log
     assert log is not None
     M, x = f"{kind.axis}.M_a", f"{kind.axis}.x_a"

@@ -16,6 +16,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from feedsim.files.fields import FileContent
 from feedsim.simulation.cosim import fmus_directory
 from feedsim.structure.modes import Modes, write_modes
 from feedsim.structure.pack import pack
@@ -96,7 +97,7 @@ def write(folder: Path, axes: int, count: int) -> Path:
 def pack_machine(folder: Path, axes: int) -> None:
     """Pack the machine of a folder, as ``feedsim export --plant`` does."""
     pose = dict.fromkeys(NAMES[:axes], POSE)
-    pack(fmus_directory() / "plant.fmu", folder / PLANT, modes=folder / "modes.csv", pose=pose)
+    pack(fmus_directory() / "plant.fmu", folder / PLANT, modes=FileContent.read(folder / "modes.csv"), pose=pose)
 
 
 class _Plain(yaml.SafeDumper):

@@ -157,7 +157,7 @@ def test_the_report_has_the_sheet(tmp_path: Path, fmus: Path) -> None:
     """Every target has its row, the picture every reading, within what is shown at first."""
     found = judge_run(run(scenario(tmp_path), fmus=fmus))
     figures = evaluate(found)
-    report = report_of(found, figures, draw(found, figures))
+    report = report_of(found, figures, draw(found, figures), {}, [])
     (sheet_of_scale, sheet_of_tool) = (
         part for part in report.main if getattr(part, "anchor", "").startswith("accuracy-Z")
     )

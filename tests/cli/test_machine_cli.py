@@ -117,7 +117,7 @@ def test_build_before_there_is_a_table_of_modes(machine: Path, tmp_path: Path, c
     (machine / "modes.csv").unlink()
     assert run("build", machine, "--out", machine) == 0, capsys.readouterr().err
     assert (machine / "modes.csv").is_file()
-    assert scenario.load_machine(machine).modes == machine / "modes.csv"
+    assert scenario.load_machine(machine).modes.file == machine / "modes.csv"
     # Nor need the rest of the machine be there.
     (machine / "machine.yaml").write_text("name: Begun\nstructure: structure.yaml\npose: {X: 100 mm}\n")
     (machine / "modes.csv").unlink()

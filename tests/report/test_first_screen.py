@@ -122,7 +122,7 @@ def test_what_is_wrong_stands_ahead_of_the_answer() -> None:
     wrong = Finding("loop-unstable", "wrong", "speed loop of X: UNSTABLE, it swings at 204 Hz")
     doubt = Finding("not-settled", "doubt", "something doubtful")
     run = replace(circle_run(), warnings=(doubt, wrong))
-    text = html(report.report.report_of(run, {}, []))
+    text = html(report.report.report_of(run, {}, [], {}, []))
     first = html(Report("t", "", [], "", answer=["the answer"], warnings=[doubt, wrong]))
     assert first.index("UNSTABLE") < first.index("the answer") < first.index("something doubtful")
     assert text.index("UNSTABLE") < text.index("<main>")

@@ -124,7 +124,7 @@ def test_poses_that_are_not_known_are_said_to_be_so(structure: Path | None, reas
     assert change.axes[0].distance == pytest.approx(0.585)
     assert not change.axes[0].modes
     assert not warnings(change)
-    text = html(report_of(replace(positioning_run(), pose=judge.PoseUse(change)), {}, []))
+    text = html(report_of(replace(positioning_run(), pose=judge.PoseUse(change)), {}, [], {}, []))
     assert "How much the modes change is not known" in text
     assert "key structure of the machine file" in text
 
@@ -133,7 +133,7 @@ def test_poses_that_are_not_known_are_said_to_be_so(structure: Path | None, reas
 
 
 def part_of(run: judge.JudgedRun) -> Mapping[str, object]:
-    part = json.loads(json.dumps(details(run, {})))["pose"]
+    part = json.loads(json.dumps(details(run, {}, {}, [])))["pose"]
     assert isinstance(part, dict)
     return part
 
@@ -173,7 +173,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     assert crossings.jump_x_a < 1e-9
     assert crossings.held > crossings.jump_x_a
     assert not run.pose.warnings
-    text = html(report_of(run, {}, []))
+    text = html(report_of(run, {}, [], {}, []))
     assert "The plant follows the pose (Z: 3 cells, centres 90 to 210 mm)" in text
     assert "No axis that the plant does not follow moves more than 1 mm" in text
     part = part_of(run)

@@ -51,7 +51,7 @@ def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     described = load(tmp_path / "test.yaml", ["machine.axes.Z.friction.gamma=0.5"])
-    content = details(FakeRun(described, positioning_run().program, positioning_run().trace), {})
+    content = details(FakeRun(described, positioning_run().program, positioning_run().trace), {}, {}, [])
     paths = {
         "scenario": tmp_path / "test.yaml",
         "machine": MACHINE / "machine.yaml",
@@ -66,14 +66,14 @@ def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
     assert str(tmp_path) not in json.dumps(content)
     (tmp_path / "positions.csv").unlink()
     assert [f.sha256 for f in input_files(described) if f.name == "positions.csv"] == [None]
-    page = html(report_of(FakeRun(described, positioning_run().program, positioning_run().trace), {}, []))
+    page = html(report_of(FakeRun(described, positioning_run().program, positioning_run().trace), {}, [], {}, []))
     assert "machine.axes.Z.friction.W=0.1 rad" in page
     assert str(tmp_path) not in page
 
 
 def test_parameters_of_every_axis_are_in_si_under_the_names_of_the_units() -> None:
     run = small_run()
-    axes = details(run, {})["machine"]["axes"]
+    axes = details(run, {}, {}, [])["machine"]["axes"]
     assert list(axes) == ["X", "Y", "Z"]
     for name, axis in run.scenario.machine.axes.items():
         assert axes[name]["pitch"] == {"value": axis.pitch, "unit": "m"}

@@ -196,7 +196,7 @@ def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.C
 def test_real_time_factor_is_simulated_over_elapsed_time() -> None:
     run = replace(positioning_run(), wall_time=0.25)
     assert real_time_factor(run) == pytest.approx(4 * run.program.duration, rel=1e-15)
-    assert details(run, {})["performance"]["real_time_factor"]["value"] == real_time_factor(run)
+    assert details(run, {}, {}, [])["performance"]["real_time_factor"]["value"] == real_time_factor(run)
     assert f"({4 * run.program.duration:.2g} times real time)" in report.summary_line(run, {})
     fast = replace(run, wall_time=run.program.duration / 104.2)
     assert "(100 times real time)" in report.summary_line(fast, {})

@@ -76,7 +76,7 @@ def test_default_machine_as_a_whole() -> None:
     assert machine.pose == {"X": 0.8, "Y": 0.327, "Z": 0.1}
     assert (machine.cycles.T_c, machine.cycles.T_pos, machine.cycles.T_ipo) == (125e-6, 1e-3, 2e-3)
     assert (machine.path.jerk, machine.path.acceleration) == (150.0, 14.4)
-    assert machine.modes == MACHINE.parent / "modes.csv"
+    assert machine.modes.file == MACHINE.parent / "modes.csv"
     assert machine.directory == MACHINE.parent
     assert "ynthetic" in machine.note
 

@@ -76,7 +76,7 @@ def test_a_table_of_modes_gives_what_it_can() -> None:
 @pytest.mark.parametrize("name", ["test_centre", "one_axis"])
 def test_shipped_tables_are_what_the_structures_give(name: str) -> None:
     machine = load_machine(MACHINES / name)
-    shipped, found = read_modes(machine.modes, list(machine.axes)), built(name).solution.modes
+    shipped, found = read_modes(machine.modes.file, list(machine.axes)), built(name).solution.modes
     assert found.frequency == pytest.approx(shipped.frequency, rel=1e-6)
     assert np.array_equal(found.damping, shipped.damping)
     assert describe_stale_table(shipped, found) == ""

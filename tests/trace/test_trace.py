@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from feedsim.files.trace import Trace, convert, read_csv, read_signals, write_csv, written_whole
-from feedsim.files.trace.files import shortest_numbers
+from feedsim.files.trace.cells import shortest_numbers
 from feedsim.foundation.errors import InputError, OutputError
 
 

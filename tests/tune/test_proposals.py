@@ -17,15 +17,17 @@ from feedsim.analysis.proposals import (
     COMPENSATION,
     GAIN_MARGIN,
     PHASE_MARGIN,
+    Proposal,
     axis_lag,
     change_drive,
     least_margins,
     loop_lag,
     model_gain,
+    of_circle,
+    of_run,
     torque_response,
 )
 from feedsim.cli import main
-from feedsim.design.tune import Proposal, of_circle, of_run
 from feedsim.files.fields import FileContent
 from feedsim.linear.judgement import judge
 from feedsim.linear.system import LinearSystem

@@ -81,7 +81,7 @@ def test_modes_are_changed_behind_a_transmission(monkeypatch: pytest.MonkeyPatch
     """A table of changed modes has those of the structure, to which the machine joins its motor, once."""
     contact = ("stiffness=200 N/um", "damping=3e4 N.s/m", "inertia=0.004 kg.m^2")
     scenario = load(Z, [f"machine.axes.Z.transmission.{each}" for each in contact])
-    structure = read_modes(scenario.machine.modes, list(scenario.machine.axes))
+    structure = read_modes(scenario.machine.modes.file, list(scenario.machine.axes))
     monkeypatch.setattr(_Search, "errors", lambda *args, **named: ())
     poses = {"another": structure}
     with _Search.begin_search(scenario, "Z", Limits(8.0, 40.0, 1e-5), poses, None, lambda *_: None, 10) as search:

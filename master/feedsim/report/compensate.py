@@ -26,6 +26,7 @@ from feedsim.report.content import (
     figures_footer,
     figures_section,
     files_table,
+    with_remark,
 )
 from feedsim.report.formatting import (
     AFTER_COLOUR,
@@ -36,7 +37,6 @@ from feedsim.report.formatting import (
     display_unit,
     minus,
     powers,
-    remark_charts,
     typeset,
 )
 from feedsim.report.provenance import InputFile, Parameter, axis_parameters, hash_files, inputs_part, quantity
@@ -201,8 +201,7 @@ Row = tuple[str, float, str, Quality]
 def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
     """Content of the report. files: axis -> file of its compensation's friction."""
     scenario = compensation.scenario
-    with remark_charts(f"{scenario.machine.name}. {scenario.machine.note}"):
-        pictures = pictures_of(compensation)
+    pictures = with_remark(pictures_of(compensation), f"{scenario.machine.name}. {scenario.machine.note}")
     return Report(
         f"Friction compensation: {scenario.name}",
         f"{scenario.machine.name} · torque feedforward on {', '.join(compensation.frictions)}",

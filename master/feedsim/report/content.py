@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import shlex
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,7 +21,7 @@ from feedsim.foundation.arguments import call
 from feedsim.foundation.errors import Finding, InputError, OutputError, rank_findings
 from feedsim.report.chart import Chart, Panel
 from feedsim.report.chart.svg import png, standalone, svg
-from feedsim.report.formatting import REMARK, display_unit, figure_text, minus, typeset
+from feedsim.report.formatting import display_unit, figure_text, minus, typeset
 from feedsim.report.provenance import InputFile, archives, axis_parameters, software
 from feedsim.scenario import Machine
 
@@ -43,7 +44,7 @@ class Picture:
     """A figure: file stem, title, caption (plain text), and what it shows: a chart, or what draws it.
 
     A chart is drawn by the page, and once as SVG; of what is no chart the page holds the drawing. worded: title and
-    caption stand above a chart in a file of its own.
+    caption stand above a chart in a file of its own. remark: small print there (:func:`with_remark`).
     """
 
     stem: str
@@ -51,7 +52,7 @@ class Picture:
     caption: str
     shows: Chart | Callable[[], str]
     worded: bool = False
-    remark: str = field(default_factory=lambda: REMARK.get())
+    remark: str = ""
 
     @property
     def chart(self) -> Chart | None:
@@ -149,6 +150,15 @@ TILES, ANSWER_WORDS, FINDING_WORDS, LEAD_ROWS = 3, 45, 24, 2
 
 
 FOLDER = "THIS_FOLDER"  # in commands of the next step: the folder that the report is written to
+
+
+def with_remark(pictures: Iterable[Picture], text: str, width: int = 150, lines: int = 2) -> list[Picture]:
+    """The pictures with `text` in their upper right corner as files: a picture travels without its page.
+
+    width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
+    """
+    remark = "\n".join(textwrap.wrap(text, width)[:lines])
+    return [replace(picture, remark=remark) for picture in pictures]
 
 
 @dataclass(frozen=True)

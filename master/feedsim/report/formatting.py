@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import textwrap
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING
@@ -65,22 +61,7 @@ _NAMES = {on_light: name for name, on_light, _ in PALETTE}
 # Colours by their variables, as on white paper.
 PAGE_COLOURS = {name: colour for name, colour, _ in PALETTE} | {"ground": "#ffffff"}
 
-# What stands in small print in every picture that is made inside remark_charts().
-REMARK: ContextVar[str] = ContextVar("remark", default="")
-NARROW = 95, 2  # characters of a line and lines of it that fit the narrowest figure
-
-
-@contextmanager
-def remark_charts(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
-    """Charts made inside have `text` in their upper right corner as files: a picture travels without its page.
-
-    width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
-    """
-    token = REMARK.set("\n".join(textwrap.wrap(text, width)[:lines]))
-    try:
-        yield
-    finally:
-        REMARK.reset(token)
+NARROW = 95, 2  # characters of a line and lines of a remark that fit the narrowest figure
 
 
 # --- Numbers, units and durations as a person reads them; SI values in the units that read best: µm, ms, mm/min -------

@@ -39,8 +39,9 @@ from feedsim.report.content import (
     figures_section,
     provenance_section,
     tile_value,
+    with_remark,
 )
-from feedsim.report.formatting import display_unit, minus, powers, remark_charts, three_digits, typeset
+from feedsim.report.formatting import display_unit, minus, powers, three_digits, typeset
 from feedsim.report.provenance import finite, hash_files, inputs_part, quantity
 from feedsim.report.replay import pictures_of
 from feedsim.scenario import Drive, Friction, Machine, Subject
@@ -290,10 +291,8 @@ def _machine_of_replay(report: DriveReport) -> dict[str, Any]:
 
 def report_of(report: DriveReport) -> Report:
     """Content of the report."""
-    pictures = []
-    with remark_charts(f"{report.name}, identified from {report.sources[0].file.name}"):
-        for comparison in report.comparisons:
-            pictures += pictures_of(comparison, report.marks)
+    drawn = [picture for comparison in report.comparisons for picture in pictures_of(comparison, report.marks)]
+    pictures = with_remark(drawn, f"{report.name}, identified from {report.sources[0].file.name}")
     drives = report.found.drives
     rows = [
         ("Record", report.sources[0].file.name),

@@ -31,6 +31,7 @@ from feedsim.report.content import (
     figures_section,
     provenance_section,
     tile_value,
+    with_remark,
 )
 from feedsim.report.formatting import (
     ALTERNATIVE_COLOUR,
@@ -38,7 +39,6 @@ from feedsim.report.formatting import (
     SIMULATED_COLOUR,
     Array,
     minus,
-    remark_charts,
     typeset,
 )
 from feedsim.report.provenance import finite, hash_files, inputs_part
@@ -132,8 +132,8 @@ def files_of(report: ModesReport) -> dict[str, Content]:
 def report_of(report: ModesReport) -> Report:
     """Content of the report."""
     axis_modes = report.found
-    with remark_charts(f"{report.file.name}, axis {axis_modes.axis} of {report.subject.machine.name}"):
-        pictures = [_bode(axis_modes)]
+    remark = f"{report.file.name}, axis {axis_modes.axis} of {report.subject.machine.name}"
+    pictures = with_remark([_bode(axis_modes)], remark)
     rows: list[tuple[Text, ...]] = [
         (f"{mode.frequency:.4g}", f"{NORMAL_95 * mode.frequency_sigma:.2g}", f"{100 * mode.damping:.3g}",
          f"{100 * NORMAL_95 * mode.damping_sigma:.2g}",

@@ -31,13 +31,13 @@ from feedsim.report.content import (
     figures_section,
     provenance_section,
     tile_value,
+    with_remark,
 )
 from feedsim.report.formatting import (
     ALTERNATIVE_COLOUR,
     RECORDED_COLOUR,
     SIMULATED_COLOUR,
     minus,
-    remark_charts,
     scale,
     typeset,
 )
@@ -211,8 +211,9 @@ def group_text(report: MountsReport) -> str:
 def report_of(report: MountsReport) -> Report:
     """Content of the report."""
     mounts = report.mounts
-    with remark_charts(f"{', '.join(file.name for file in report.files)}; {report.subject.machine.name}"):
-        pictures = [picture for picture in (_over_amplitude(mounts), _over_time(mounts)) if picture is not None]
+    drawn = [picture for picture in (_over_amplitude(mounts), _over_time(mounts)) if picture is not None]
+    files = ", ".join(file.name for file in report.files)
+    pictures = with_remark(drawn, f"{files}; {report.subject.machine.name}")
     rows: list[tuple[Text, ...]] = [(code(name), *map(minus, rest)) for name, *rest in _rows(report)]
     heads = ("Parameter", "Mounts", "Machine file", "Identified", "95 % interval", "Unit")
     why = [

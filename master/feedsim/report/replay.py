@@ -31,8 +31,9 @@ from feedsim.report.content import (
     parameters_section,
     provenance_section,
     tile_value,
+    with_remark,
 )
-from feedsim.report.formatting import RECORDED_COLOUR, RESIDUAL_COLOUR, SIMULATED_COLOUR, Array, remark_charts, typeset
+from feedsim.report.formatting import RECORDED_COLOUR, RESIDUAL_COLOUR, SIMULATED_COLOUR, Array, typeset
 from feedsim.report.provenance import hash_files, inputs_part, machine_part, quantity
 from feedsim.scenario import Subject
 
@@ -209,10 +210,8 @@ def trace_of(comparisons: Sequence[Comparison]) -> Trace:
 def report_of(replayed: ReplayReport) -> Report:
     """Content of the report."""
     machine = replayed.subject.machine
-    pictures = []
-    with remark_charts(f"{machine.name}. {machine.note}"):
-        for comparison in replayed.comparisons:
-            pictures += pictures_of(comparison, replayed.marks)
+    drawn = [picture for entry in replayed.comparisons for picture in pictures_of(entry, replayed.marks)]
+    pictures = with_remark(drawn, f"{machine.name}. {machine.note}")
     record = replayed.sources[0].file.name
     rows = [("Record", record), ("Machine", machine.name)]
     return Report(

@@ -20,7 +20,7 @@ from feedsim.foundation.errors import InputError
 from feedsim.report import content
 from feedsim.report.changes import control_section
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
-from feedsim.report.content import Bullets, Picture, Report, Section, Step, Table, Text, Tile, code
+from feedsim.report.content import Bullets, Picture, Report, Section, Step, Table, Text, Tile, code, with_remark
 from feedsim.report.formatting import (
     BEFORE_COLOUR,
     GREEN,
@@ -37,7 +37,6 @@ from feedsim.report.formatting import (
     figure_text,
     minus,
     plain_unit,
-    remark_charts,
     scale,
     three_digits,
 )
@@ -429,8 +428,7 @@ def report_of(sources: Sequence[Source]) -> Report:
     names = [source.name for source in sources]
     rows = [(f"Source {k}", f"{source.name}: {len(source.time)} rows") for k, source in enumerate(sources, 1)]
     notes = tuple(dict.fromkeys(note for source in sources for note in source.notes))
-    with remark_charts(" ".join(filter(None, notes)), *NARROW):
-        pictures = pictures_of(sources)
+    pictures = with_remark(pictures_of(sources), " ".join(filter(None, notes)), *NARROW)
     return Report(
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
         count_things(len(sources), "source"),

@@ -20,7 +20,19 @@ from feedsim.linear.judgement import GAIN_MARGIN
 from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
-from feedsim.report.content import FOLDER, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value
+from feedsim.report.content import (
+    FOLDER,
+    Picture,
+    Report,
+    Section,
+    Step,
+    Table,
+    Text,
+    Tile,
+    code,
+    tile_value,
+    with_remark,
+)
 from feedsim.report.formatting import (
     BLUE,
     GREEN,
@@ -32,7 +44,6 @@ from feedsim.report.formatting import (
     display_unit,
     minus,
     number,
-    remark_charts,
     typeset,
 )
 from feedsim.report.frf.bode import Ordinate, answers
@@ -170,11 +181,10 @@ def draw(responses: Responses) -> list[Picture]:
     """The pictures; each says machine, pose and what its numbers are worth."""
     machine = responses.machine
     pose = ", ".join(f"{axis} {position * 1e3:.6g} mm" for axis, position in machine.pose.items())
-    with remark_charts(f"{machine.name} at {pose}. {machine.note}"):
-        pictures = pictures_of(responses)
-        if responses.truncation is not None:
-            pictures += _truncation_pictures(responses, responses.truncation)
-    return pictures
+    pictures = pictures_of(responses)
+    if responses.truncation is not None:
+        pictures += _truncation_pictures(responses, responses.truncation)
+    return with_remark(pictures, f"{machine.name} at {pose}. {machine.note}")
 
 
 def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture]) -> Report:

@@ -27,6 +27,7 @@ from feedsim.report.content import (
     Tile,
     code,
     provenance_section,
+    with_remark,
 )
 from feedsim.report.formatting import (
     ALTERNATIVE_COLOUR,
@@ -43,7 +44,6 @@ from feedsim.report.formatting import (
     display_unit,
     minus,
     powers,
-    remark_charts,
     typeset,
 )
 from feedsim.report.identify import stribeck_plots as quantities
@@ -274,8 +274,7 @@ def files_of(identified: IdentifiedFriction) -> dict[str, Content]:
 
 def draw(identified: IdentifiedFriction) -> list[Picture]:
     """The pictures; each says what its numbers are worth."""
-    with remark_charts(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
-        return list(pictures_of(identified))
+    return with_remark(pictures_of(identified), quantities.remark(identified), REMARK_WIDTH, REMARK_LINES)
 
 
 def report_of(identified: IdentifiedFriction, pictures: Sequence[Picture]) -> Report:

@@ -30,9 +30,21 @@ from feedsim.foundation.units import show
 from feedsim.report import content
 from feedsim.report.changes import action, change_words, changes_section, control_section
 from feedsim.report.chart import Chart, Panel
-from feedsim.report.content import FOLDER, Paragraph, Picture, Report, Section, Span, Step, Table, Tile, tile_value
+from feedsim.report.content import (
+    FOLDER,
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Span,
+    Step,
+    Table,
+    Tile,
+    tile_value,
+    with_remark,
+)
 from feedsim.report.content import TILES as TILES_SHOWN
-from feedsim.report.formatting import NARROW, count_things, duration, number, remark_charts, two_digits, typeset
+from feedsim.report.formatting import NARROW, count_things, duration, number, two_digits, typeset
 from feedsim.report.provenance import (
     friction_origins,
     input_files,
@@ -383,8 +395,7 @@ def tile(name: str, figure: Figure, limit: float | None = None) -> Tile:
 def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:
     """The figures of a report: those of every evaluation, and an overview of all axes. causes: as of report_of()."""
     machine = run.scenario.machine
-    with remark_charts(f"{machine.name}. {machine.note}", *NARROW):
-        return _draw_tasks(run, figures, causes or {})
+    return with_remark(_draw_tasks(run, figures, causes or {}), f"{machine.name}. {machine.note}", *NARROW)
 
 
 def _draw_tasks(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[Picture]:

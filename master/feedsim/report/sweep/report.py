@@ -28,6 +28,7 @@ from feedsim.report.content import (
     code,
     parameters_section,
     provenance_section,
+    with_remark,
 )
 from feedsim.report.formatting import (
     NARROW,
@@ -35,7 +36,6 @@ from feedsim.report.formatting import (
     count_things,
     minus,
     number,
-    remark_charts,
     round_to_doubt,
     three_digits,
     with_interval,
@@ -185,8 +185,8 @@ def drawn_report(account: Account) -> Report:
     """Content of the report, with its pictures."""
     study = account.study
     machine = study.base.scenario.machine
-    with remark_charts(f"{study.name}. {machine.name}. {machine.note}".strip(), *NARROW):
-        whole, single = pictures_of(account)
+    remark = f"{study.name}. {machine.name}. {machine.note}".strip()
+    whole, single = (with_remark(pictures, remark, *NARROW) for pictures in pictures_of(account))
     return report_of(account, whole, single)
 
 

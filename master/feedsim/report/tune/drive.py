@@ -45,6 +45,7 @@ from feedsim.report.content import (
     Tile,
     code,
     tile_value,
+    with_remark,
 )
 from feedsim.report.formatting import (
     AFTER_COLOUR,
@@ -54,7 +55,6 @@ from feedsim.report.formatting import (
     NARROW,
     RESIDUAL_COLOUR,
     minus,
-    remark_charts,
     typeset,
 )
 from feedsim.report.provenance import input_files, inputs_part, machine_part
@@ -443,8 +443,6 @@ def report_of(tuned: TunedDrive, control: str = "", folder: str = "") -> Report:
         ("Encoder noise", f"{1e6 * limits.encoder_noise:g} µrad, standard deviation per control cycle"),
         ("Judged in closed form, run", f"{tuned.evaluations[0]}, {tuned.evaluations[1]}"),
     ]  # fmt: skip
-    with remark_charts(f"{machine.name}. {machine.note}", *NARROW):
-        response = picture(tuned)
     return Report(
         f"Drive of {axis}, tuned within margins" if not tuned.kept else f"Drive of {axis}, kept as it is",
         machine.name,
@@ -453,7 +451,7 @@ def report_of(tuned: TunedDrive, control: str = "", folder: str = "") -> Report:
         notes=notes,
         tiles=tiles,
         main=[
-            response,
+            *with_remark([picture(tuned)], f"{machine.name}. {machine.note}", *NARROW),
             *values(tuned, control),
             Section("Why these values", [Bullets(list(explain_values(tuned)))]),
             _margins(tuned),

@@ -19,8 +19,20 @@ from feedsim.foundation.errors import Finding
 from feedsim.foundation.units import convert, parameters
 from feedsim.report import content
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
-from feedsim.report.content import Paragraph, Picture, Report, Section, Step, Table, Text, Tile, code, tile_value
-from feedsim.report.formatting import AFTER_COLOUR, BEFORE_COLOUR, NARROW, minus, remark_charts, typeset
+from feedsim.report.content import (
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Step,
+    Table,
+    Text,
+    Tile,
+    code,
+    tile_value,
+    with_remark,
+)
+from feedsim.report.formatting import AFTER_COLOUR, BEFORE_COLOUR, NARROW, minus, typeset
 from feedsim.report.provenance import input_files, inputs_part, machine_part
 from feedsim.report.tune.drive import new_values
 from feedsim.report.uncertainty import drawn_values
@@ -222,8 +234,7 @@ def report_of(judged: JudgedCompensation) -> Report:
         ("Minimised", OBJECTIVES[judged.objective]),
         ("Runs to find it", str(judged.found.runs)),
     ]
-    with remark_charts(f"{machine.name}. {machine.note}", *NARROW):
-        pictures = pictures_of(judged)
+    pictures = with_remark(pictures_of(judged), f"{machine.name}. {machine.note}", *NARROW)
     return Report(
         f"Friction compensation of {', '.join(judged.axes)}",
         f"{machine.name} · {WORDS[judged.found.kind]}",

@@ -71,41 +71,35 @@ RARE static bool not_finite(Unit *unit, const Variable *variable) {
                      table_name(unit, variable, name), number_text(text, result(unit, variable->offset)));
 }
 
-/* The first of the results that is not. */
-RARE static bool results_not_finite(Unit *unit) {
-    const Stretch *at = unit->results;
-    size_t offset = at->offset;
-    while (isfinite(result(unit, offset))) {
-        offset += sizeof(double);
-        if (offset == at->offset + at->count * sizeof(double)) {
-            offset = (++at)->offset;
+/* One by one: the first of the results that is not. The sum of finite ones is none either where they are huge. */
+RARE static bool results_finite_each(Unit *unit) {
+    for (size_t i = 0; i < unit->result_count; i++) {
+        if (!isfinite(result(unit, unit->results[i]))) {
+            const Variable *variable = unit->variables;
+            while (variable->offset != unit->results[i]) {
+                variable++;
+            }
+            return not_finite(unit, variable);
         }
     }
-    const Variable *variable = unit->variables;
-    while (variable->offset != offset) {
-        variable++;
-    }
-    return not_finite(unit, variable);
+    return true;
 }
 
-/* One at a time: a processor has to wait where it reads two numbers at once that were only just written one by one. In
- * sums of their own, which do not wait for one another. */
+/* By their sum, which is finite only where all of them are. In parts that do not wait for one another; one number at a
+ * time, since a processor has to wait where it reads two at once that were only just written one by one. */
 static inline bool results_finite(Unit *unit) {
-    double probe = 0, second = 0, third = 0;
-    const Stretch *const end = unit->results + unit->result_count;
-    for (const Stretch *at = unit->results; at < end; at++) {
-        const double *y = (const double *)(const void *)(unit->block + at->offset);
-        size_t remaining = at->count;
-        for (; remaining >= 3; remaining -= 3, y += 3) {
-            probe += number_probe(y[0]);
-            second += number_probe(y[1]);
-            third += number_probe(y[2]);
-        }
-        for (; remaining > 0; remaining--, y++) {
-            probe += number_probe(*y);
-        }
+    double sum = 0, second = 0, third = 0;
+    const uint32_t *at = unit->results;
+    size_t remaining = unit->result_count;
+    for (; remaining >= 3; remaining -= 3, at += 3) {
+        sum += result(unit, at[0]);
+        second += result(unit, at[1]);
+        third += result(unit, at[2]);
     }
-    return !isnan((probe + second) + third) || results_not_finite(unit);
+    for (; remaining > 0; remaining--, at++) {
+        sum += result(unit, *at);
+    }
+    return isfinite((sum + second) + third) || results_finite_each(unit);
 }
 
 static bool late_finite(Unit *unit) {

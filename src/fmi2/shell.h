@@ -47,11 +47,6 @@ typedef struct Variable {
     size_t offset; /* in the block */
 } Variable;
 
-/* Doubles that lie one behind the other in the block. */
-typedef struct Stretch {
-    size_t offset, count;
-} Stretch;
-
 struct Unit {
     /* Ahead, since close together: what the calls of every step need. */
     unsigned char *block;
@@ -66,8 +61,8 @@ struct Unit {
     bool late;               /* the late outputs are those of an earlier step */
     bool tame;               /* no input, and no slope of one, is beyond TAME in size */
     double step_time, step_size;
-    unsigned *inputs; /* value references of the Real inputs */
-    Stretch *results; /* the Real outputs and locals that a step writes */
+    unsigned *inputs;  /* value references of the Real inputs */
+    uint32_t *results; /* where in the block the Real outputs and locals lie that a step writes */
     size_t input_count, result_count;
 
     Variable *variables; /* by value reference */

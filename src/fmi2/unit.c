@@ -69,15 +69,6 @@ static unsigned what_is(const VariableInfo *info, bool late) {
            (info->causality == CAUSALITY_output ? REAL_OUTPUT : 0u);
 }
 
-static void lay_result(Unit *unit, size_t offset) {
-    Stretch *last = unit->result_count > 0 ? &unit->results[unit->result_count - 1] : NULL;
-    if (last != NULL && last->offset + last->count * sizeof(double) == offset) {
-        last->count++;
-    } else {
-        unit->results[unit->result_count++] = (Stretch){offset, 1};
-    }
-}
-
 static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
     const unsigned reference = (unsigned)unit->variable_count++;
     const size_t offset = base + info->offset;
@@ -89,7 +80,7 @@ static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
     }
     if (info->kind == KIND_REAL && (info->causality == CAUSALITY_output || info->causality == CAUSALITY_local) &&
         !is_late(reference)) {
-        lay_result(unit, offset);
+        unit->results[unit->result_count++] = (uint32_t)offset;
     }
 }
 

@@ -271,6 +271,18 @@ static void steps_fail(void) {
     fmi2FreeInstance(c);
 }
 
+/* Each is finite, and their sum is not. */
+static void results_may_be_huge(void) {
+    Log log = {.count = 0};
+    fmi2Component c = toy_in(PHASE_STEPPING, &log);
+    CHECK(set_real(c, VR_u, 1) == fmi2OK);
+    CHECK(set_real(c, VR_gain, 0.8e308) == fmi2OK);
+    step(c, 0, 1);
+    CHECK_EQUAL(get_real(c, VR_x), 0.8e308);
+    CHECK_EQUAL(get_real(c, VR_twice), 1.6e308);
+    fmi2FreeInstance(c);
+}
+
 static void a_model_may_warn(void) {
     Log log = {.count = 0};
     fmi2Component c = toy_in(PHASE_STEPPING, &log);
@@ -396,6 +408,7 @@ int main(void) {
     time_as_masters_count_it();
     experiments();
     steps_fail();
+    results_may_be_huge();
     a_model_may_warn();
     output_derivatives();
     directional_derivatives();

@@ -444,10 +444,16 @@ def check_tree(
 def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
     """Replace names of YAML files, where a group of keys is expected, by what the files hold; make other file names
     relative to the file that names them."""
+    expected = child(expected_annotation(model, source.data, place[:-1]), place[-1]) if place else model
+    _fetch_as(expected, source, place, faults)
+
+
+def _fetch_as(expected: Any, source: Source, place: Place, faults: list[str]) -> None:
+    """:func:`fetch` what is read as the annotation `expected`, None where no key of that name belongs."""
     data: Any = source.data
     for key in place:
         data = data[key]
-    annotation = expected_annotation(model, source.data, place)
+    annotation = resolve(expected, data)
     if annotation is None:
         return
     if isinstance(data, str):
@@ -475,13 +481,13 @@ def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
                 faults += error.problems if inside else [describe(source, place, str(error))]
                 source.put(place, Source(UNREAD, {(): source.mark(place)}))
                 return
-            fetch(source, model, place, faults)
+            _fetch_as(expected, source, place, faults)
     elif isinstance(data, dict):
         for key in data:
-            fetch(source, model, (*place, key), faults)
+            _fetch_as(child(annotation, key), source, (*place, key), faults)
     elif isinstance(data, list):
         for i in range(len(data)):
-            fetch(source, model, (*place, i), faults)
+            _fetch_as(child(annotation, i), source, (*place, i), faults)
 
 
 MAX_EXPLAINED = 200  # problems of a file that are listed

@@ -76,15 +76,15 @@ class ModalPlant:
             tool=shapes([f"tcp_{direction}" for direction in TOOL_DIRECTIONS]),
         )
 
-    def ports(self, s: Complexes, T: float, hold: InputHold) -> Complexes:
-        """Port matrix at s (F,) [rad/s]: (F, 2 A + 3, A + 3).
+    def ports(self, s: Complexes, T: float, hold: InputHold, *, tool: bool = True) -> Complexes:
+        """Port matrix at s (F,) [rad/s]: (F, 2 A + 3, A + 3), or without the tool (F, 2 A, A).
 
         Rows: speeds n of the axes [rad/s], positions x of the axes [m], displacements of the tool [m]. Columns: torques
         of the axes [N.m], forces on the tool [N]. All inputs run by `hold` over cycles of T [s].
         """
         axes = self.rotor.shape[1]
-        columns = axes + len(TOOL_DIRECTIONS)
-        speeds, places = self._products
+        columns = axes + (len(TOOL_DIRECTIONS) if tool else 0)
+        speeds, places = self._products[tool]
         result = np.empty((len(s), axes + columns, columns), dtype=np.complex128)
         for start in range(0, len(s), CHUNK):
             part = slice(start, start + CHUNK)
@@ -94,13 +94,17 @@ class ModalPlant:
         return result
 
     @cached_property
-    def _products(self) -> tuple[Floats, Floats]:
-        """(N, outputs * inputs) of speeds and of displacements: products of shapes, so that the modal sums are two
-        matrix products."""
-        into = np.hstack([self.rotor, self.tool])
-        speeds = (self.rotor[:, :, None] * into[:, None, :]).reshape(len(into), -1)
-        places = (np.hstack([self.scale, self.tool])[:, :, None] * into[:, None, :]).reshape(len(into), -1)
-        return speeds, places
+    def _products(self) -> dict[bool, tuple[Floats, Floats]]:
+        """With the tool or without, (N, outputs * inputs) of speeds and of displacements: products of shapes, so that
+        the modal sums are two matrix products."""
+        products = {}
+        for tool in (True, False):
+            into, out = (np.hstack([own, self.tool]) if tool else own for own in (self.rotor, self.scale))
+            products[tool] = (
+                (self.rotor[:, :, None] * into[:, None, :]).reshape(len(into), -1),
+                (out[:, :, None] * into[:, None, :]).reshape(len(into), -1),
+            )
+        return products
 
     def modal(self, s: Complexes, T: float, hold: InputHold) -> tuple[Complexes, Complexes]:
         """Responses q and q' of every mode to its own force: (F, N) each."""
@@ -364,6 +368,10 @@ class LinearDrive:
             return self.filters(s), np.zeros_like(s)
         per_setpoint, per_speed = self._motor.loop(s)
         return self.filters(s) * per_setpoint, -per_speed
+
+    def blocks(self, s: Complexes) -> Complexes:
+        """(4, F): E, G_n, C and S."""
+        return np.stack([*self.torque(s), self.from_speed(s), self.from_setpoint(s)])
 
     @cached_property
     def _motor(self) -> _CurrentLoop:

@@ -101,7 +101,7 @@ class LinearSystem:
         if key not in self._closings:
             other = replace(self, closed=loops)
             # what does not depend on the loops is worked out once
-            shared = ("plant", "drives", "_closings", "_responses", "_structure", "_levels")
+            shared = ("plant", "drives", "_closings", "_responses", "_structure", "_levels", "_blocks")
             other.__dict__.update({name: getattr(self, name) for name in shared})
             self._closings[key] = other
         return self._closings[key]
@@ -123,6 +123,10 @@ class LinearSystem:
     @cached_property
     def _levels(self) -> ResultCache:
         return ResultCache(12, self.kept_from)
+
+    @cached_property
+    def _blocks(self) -> ResultCache:
+        return ResultCache(16, self.kept_from * self.drives[0].ticks)  # of the components of such a grid
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -246,35 +250,37 @@ class LinearSystem:
         result[:, mechanical + axes + values, values] = 1.0
         return result
 
-    def _torques(self, s: Complexes, ports: Complexes) -> Complexes:
-        """(F, A, 3 A + 3): motor torques with every position loop open, to what speed_level() answers to."""
+    def _torques(self, s: Complexes, ports: Complexes, *, setpoints_alone: bool = False) -> Complexes:
+        """(F, A, 3 A + 3): motor torques with every position loop open, to what speed_level() answers to; or (F, A, A),
+        to n_add alone."""
         axes, values = len(self.axes), np.arange(len(self.axes))
-        E, loop = self._loop(s, ports)
-        S = np.stack([drive.from_setpoint(s) for drive in self.drives], axis=1)
-        given = np.zeros((len(s), axes, 3 * axes + len(TOOL_DIRECTIONS)), dtype=np.complex128)
+        E, S, loop = self._loop(s, ports)
+        inputs = axes if setpoints_alone else 3 * axes + len(TOOL_DIRECTIONS)
+        given = np.zeros((len(s), axes, inputs), dtype=np.complex128)
         given[:, values, values] = E * S
-        given[:, values, axes + values] = E
-        given[:, values, 2 * axes + values] = ~self._controlled_axes
-        given[:, :, 3 * axes :] = -loop[:, :, axes:]
+        if not setpoints_alone:
+            given[:, values, axes + values] = E
+            given[:, values, 2 * axes + values] = ~self._controlled_axes
+            given[:, :, 3 * axes :] = -loop[:, :, axes:]
         return np.asarray(np.linalg.solve(np.eye(axes) + loop[:, :, :axes], given))
 
     def torque_loop(self, s: Complexes, ports: Complexes) -> Complexes:
         """(F, A, A + 3): what the speed loops take off the motor torques per motor torque [1] and per tool force [m],
         with the structure's `ports`: E C n + G_n n_a; 0 for axes without control."""
-        return self._loop(s, ports)[1]
+        return self._loop(s, ports)[2]
 
-    def _loop(self, s: Complexes, ports: Complexes) -> tuple[Complexes, Complexes]:
-        """E of the drives (F, A), 0 for axes without control, and the torque loop."""
+    def _loop(self, s: Complexes, ports: Complexes) -> tuple[Complexes, Complexes, Complexes]:
+        """E and S of the drives (F, A), 0 for axes without control, and the torque loop."""
         axes = len(self.axes)
-        E = np.zeros((len(s), axes), dtype=np.complex128)
+        E, S = (np.zeros((len(s), axes), dtype=np.complex128) for _ in range(2))
         loop = np.zeros((len(s), axes, ports.shape[2]), dtype=np.complex128)
         for i in np.flatnonzero(self._controlled_axes):
             drive = self.drives[i]
-            E[:, i], G_n = drive.torque(s)
+            E[:, i], G_n, C, S[:, i] = self._blocks(("drive", int(i)), s, drive.blocks)
             V, n_a = drive.speed_of_position(s), ports[:, i]
             n = n_a if V is None else V[:, None] * drive.measured_position(s, n_a, ports[:, axes + i])
-            loop[:, i] = (E[:, i] * drive.from_speed(s))[:, None] * n + G_n[:, None] * n_a
-        return E, loop
+            loop[:, i] = (E[:, i] * C)[:, None] * n + G_n[:, None] * n_a
+        return E, S, loop
 
     def position_level(self, s: Complexes) -> Complexes:
         """(F, A, A): what the position controllers sample of x_m per setpoint that they give, position loops open.
@@ -286,8 +292,9 @@ class LinearSystem:
     def _position_level(self, s: Complexes) -> Complexes:
         axes, ticks = len(self.axes), self.drives[0].ticks
         components = (s[:, None] + 2j * np.pi * np.arange(ticks) / self.machine.cycles.T_pos).ravel()
-        ports = self._structure("components", s, lambda _: self._ports(components, "linear"))
-        x_m = (self._measured(components, ports)[:, :, :axes] @ self._torques(components, ports))[:, :, :axes]
+        ports = self._structure("components", s, lambda _: self._ports(components, "linear", tool=False))
+        torques = self._torques(components, ports, setpoints_alone=True)
+        x_m = self._measured(components, ports) @ torques
         return np.asarray((x_m * self._ramps(components)[:, None, :]).reshape(len(s), ticks, axes, axes).sum(axis=1))
 
     def _measured(self, s: Complexes, rows: Complexes) -> Complexes:
@@ -299,7 +306,11 @@ class LinearSystem:
         return np.stack(entry, axis=1)
 
     def _ramps(self, s: Complexes) -> Complexes:
-        """(F, A): the ramps of the axes' setpoints, of which there are two kinds."""
+        """(F, A): the ramps of the axes' setpoints."""
+        return self._blocks("ramps", s, self._ramps_at)
+
+    def _ramps_at(self, s: Complexes) -> Complexes:
+        """Of which there are two kinds."""
         kinds = {drive.drive.ramp_speed_setpoint: drive for drive in self.drives}
         ramps = {kind: drive.ramp(s) for kind, drive in kinds.items()}
         return np.stack([ramps[drive.drive.ramp_speed_setpoint] for drive in self.drives], axis=1)
@@ -308,11 +319,11 @@ class LinearSystem:
         """(F, 2 A + 3, A + 3): port matrix of the structure with every input running as it does."""
         return self._structure(tool_force, s, partial(self._ports, tool_force=tool_force))
 
-    def _ports(self, s: Complexes, tool_force: InputHold) -> Complexes:
+    def _ports(self, s: Complexes, tool_force: InputHold, *, tool: bool = True) -> Complexes:
         axes, T_c = len(self.axes), self.machine.cycles.T_c
-        ports = self.plant.ports(s, T_c, "linear")
+        ports = self.plant.ports(s, T_c, "linear", tool=tool)
         if self._ideal.any():
-            fixed = self.plant.ports(s, T_c, "held")
+            fixed = self.plant.ports(s, T_c, "held", tool=tool)
             ports[:, :, :axes][:, :, self._ideal] = fixed[:, :, :axes][:, :, self._ideal]
         if tool_force != "linear":
             ports[:, :, axes:] = self.plant.ports(s, T_c, tool_force)[:, :, axes:]

@@ -15,7 +15,7 @@ from typing import IO
 import numpy as np
 from pydantic_core import to_json
 
-from feedsim.files.trace.cells import TIME_NAMES, read_table, round_unit
+from feedsim.files.trace.cells import TIME_NAMES, read_finite_table, round_unit
 from feedsim.files.trace.trace import Array, Trace, first_not_finite, stretches
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, OutputError
@@ -158,7 +158,7 @@ def read_csv(
     ('Z.x_s', 'Z.x_a', 'Z.n_a', 'Z.i_q')
     """
     path = Path(path)
-    table = read_table(path)
+    table = read_finite_table(path)
     at = table.axis(time, TIME_NAMES, "s")
     others = [i for i in range(len(table.names)) if i != at]
     wanted = others if columns is None else [table.index(name) for name in columns]

@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Annotated
 
 from feedsim.analysis import Figure, FigureTable
-from feedsim.estimation.identify import STAGES, AxisRequest, IdentifiedFriction, named_apart, read_traces
+from feedsim.estimation.identify import STAGES, AxisRequest, IdentifiedFriction, excerpt, named_apart, read_traces
 from feedsim.estimation.identify.friction_file import FRICTION_FILE, read_fleet
 from feedsim.estimation.identify.parameters import PARAMETER_KINDS
 from feedsim.estimation.identify.stages import identify as identified_from
@@ -186,7 +186,7 @@ def identify_friction(
     reading = {"reading": perf_counter() - begin}
     sources = tuple(entry.provenance for entry in recorded)
     known = asked.with_traces(sources, described)
-    records = named_apart(recorded)
+    records, excerpt_notes = excerpt(named_apart(recorded))
     inputs = [*files, *(Path(file) for file in (columns, prior) if file is not None)]
     inputs += [file for _, file in subject.files] if subject is not None else []
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
@@ -198,7 +198,11 @@ def identify_friction(
             watch.announce(sentence)
         with FrictionLaw(archives, unit) as friction:
             identification = identified_from(records, friction, known, watch.progress)
-        identification = replace(identification, seconds=reading | dict(identification.seconds))
+        identification = replace(
+            identification,
+            seconds=reading | dict(identification.seconds),
+            warnings=(*excerpt_notes, *identification.warnings),
+        )
         identified = IdentifiedFriction(identification, records, sources, subject, settings, date.today().isoformat())
         result = result_of(identified, inputs, folder)
         if folder is not None:

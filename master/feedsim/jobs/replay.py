@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated
 
 from feedsim.analysis import FigureTable
 from feedsim.analysis.proposals import Proposal, of_drives
-from feedsim.estimation.identify import RecordedAxis
+from feedsim.estimation.identify import RecordedAxis, best_window, total_time
 from feedsim.estimation.replay.closed_loop import AxisRecord, cut_window, read_axes
 from feedsim.estimation.replay.closed_loop import window as window_of
 from feedsim.estimation.replay.compare import drive_axes, replay_records
@@ -46,6 +46,7 @@ from feedsim.structure import checked_modes
 
 
 MOST_NAMED = 20  # columns that a note names
+MAX_DRIVE_TIME = 30.0  # [s] of a record that a drive is identified from
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,8 @@ class ReplayRequest:
         return {axis: cut_window(axis, recorded, self.window) for axis, recorded in self.read.items()}
 
     def each_axis(self) -> tuple[dict[str, RecordedAxis], dict[str, AxisRecord], dict[str, str]]:
-        """`read` and `records` of the axes that have them, and why another one has none.
+        """`read` and `records` of the axes that have them, and why another one has none; of long records the part that
+        a drive is identified from.
 
         Raises InputError: none of them has.
         """
@@ -129,12 +131,30 @@ class ReplayRequest:
         for axis in self.axes:
             try:
                 recorded = read_axes(self.recording, [axis], self.machine, self.mapping)[axis]
-                records[axis], read[axis] = cut_window(axis, recorded, self.window), recorded
+                records[axis], read[axis] = self._part_for_drive(axis, recorded)
             except InputError as error:
                 refused[axis] = str(error)
         if not read:
             raise InputError.of(f"{self.recording.path}", dict.fromkeys(refused.values()))
         return read, records, refused
+
+    def _part_for_drive(self, axis: str, recorded: RecordedAxis) -> tuple[AxisRecord, RecordedAxis]:
+        """The stretch that the drive of an axis is identified from, and what the regression of its position loop
+        takes: all of the record unless it is long."""
+        if total_time(recorded.records) <= MAX_DRIVE_TIME:
+            return cut_window(axis, recorded, self.window), recorded
+        part, longest = self.window, max(recorded.records, key=len)
+        said = recorded.provenance.warnings
+        if part is None and total_time([longest]) > MAX_DRIVE_TIME:
+            part = best_window(longest, MAX_DRIVE_TIME)
+            option = spell_argument("window")
+            text = (
+                f"axis {axis}: of {total_time([longest]):.6g} s the drive is identified from {part[0]:.6g} to "
+                f"{part[1]:.6g} s, the part that determines it best; {option} takes another one"
+            )
+            said = (*said, Finding("record-excerpt", "note", text, axis, f"Give {option} for another part"))
+        cut = cut_window(axis, recorded, part)
+        return cut, replace(recorded, records=(cut.record,), provenance=replace(recorded.provenance, warnings=said))
 
     def unread(self, read: Mapping[str, RecordedAxis]) -> list[Finding]:
         """A note on the columns of the file that none of the axes is read from; those of the axes come first."""

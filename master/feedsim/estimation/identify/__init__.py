@@ -5,6 +5,7 @@ Start with stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (out
 """
 
 from feedsim.estimation.identify.axis_limits import AxisLimits, identify_axis_limits
+from feedsim.estimation.identify.excerpt import best_window, excerpt, total_time
 from feedsim.estimation.identify.friction_file import IdentifiedFriction
 from feedsim.estimation.identify.read import Provenance, RecordedAxis, named_apart, read_records, read_traces
 from feedsim.estimation.identify.record import Record
@@ -23,9 +24,12 @@ __all__ = [
     "Provenance",
     "Record",
     "RecordedAxis",
+    "best_window",
+    "excerpt",
     "identify",
     "identify_axis_limits",
     "named_apart",
     "read_records",
     "read_traces",
+    "total_time",
 ]  # fmt: skip

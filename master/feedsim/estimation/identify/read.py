@@ -29,8 +29,6 @@ from feedsim.scenario import Drive, Machine
 
 # Controls and drives log every 10 us to 0.1 s.
 MIN_INTERVAL, MAX_INTERVAL = 10e-6, 0.1
-# Steps of at most 0.5 ms that friction is calculated over: beyond them, memory and time are no longer those of a trace.
-MAX_ROWS, MAX_FRICTION_STEPS, FRICTION_STEP = 2_000_000, 8_000_000, 0.5e-3
 MAX_SLIDE_SPEED, MAX_SLIDE_ACCELERATION = 20.0, 200.0  # of the slide [m/s], [m/s2]
 WRONG_ROWS_SHARE = 0.01  # share of the rows that single wrong rows may be
 # [s] over which an acceleration is taken
@@ -47,7 +45,7 @@ INERTIA = 10.0  # factor between an inertia that is given and that of accelerati
 
 
 def check_time(path: Path, records: Sequence[Record]) -> None:
-    """Raises InputError: rows too far apart or too close, or too many of them."""
+    """Raises InputError: rows too far apart or too close."""
     for record in records:
         if not MIN_INTERVAL * (1 - 1e-6) <= record.interval <= MAX_INTERVAL * (1 + 1e-6):
             wrong = "ms or us for s" if record.interval > MAX_INTERVAL else "s for ms or us"
@@ -56,7 +54,6 @@ def check_time(path: Path, records: Sequence[Record]) -> None:
                 f"{MAX_INTERVAL:g} s, "
                 f"as controls log. The unit of the time is likely wrong ({wrong}), or it counts cycles (factor: 2 ms)"
             )
-    check_size(records, str(path))
 
 
 def check_slide(path: Path, records: Sequence[Record], pitch: float | None) -> None:
@@ -74,19 +71,6 @@ def check_slide(path: Path, records: Sequence[Record], pitch: float | None) -> N
                 f"{path}: the slide {what} {value:.4g} {unit}; allowed: up to {limit:g} {unit}. The unit of the "
                 "position, the speed or the time, or the pitch is likely wrong (mm taken for m, s for ms)"
             )
-
-
-def check_size(records: Sequence[Record], where: str = "the traces") -> None:
-    """Raises InputError: more rows, or a longer time, than an identification can work on."""
-    rows = sum(len(record) for record in records)
-    steps = sum(len(record) * max(record.interval / FRICTION_STEP, 1.0) for record in records)
-    if rows > MAX_ROWS or steps > MAX_FRICTION_STEPS:
-        lasting = sum(len(record) * record.interval for record in records)
-        raise InputError(
-            f"{where}: {rows} rows, {lasting / 60:.4g} min; allowed: up to {MAX_ROWS} rows and "
-            f"{MAX_FRICTION_STEPS * FRICTION_STEP / 60:.3g} min "
-            "in all. Take the moves that docs/identification.md asks for, which are some minutes, or log less often"
-        )
 
 
 def check_estimates(estimates: Mapping[str, Estimate], I_P: float) -> None:

@@ -32,7 +32,7 @@ from feedsim.estimation.identify.parameters import (
     estimate,
 )
 from feedsim.estimation.identify.plateaus import plateaus
-from feedsim.estimation.identify.read import Provenance, check_estimates, check_inertia, check_size
+from feedsim.estimation.identify.read import Provenance, check_estimates, check_inertia
 from feedsim.estimation.identify.record import Array, Record
 from feedsim.estimation.identify.result import Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
 from feedsim.estimation.identify.stribeck import FEW_SPEEDS, Points, stationary
@@ -285,7 +285,6 @@ def identify(
     """
     if not records:
         raise InputError("no records to identify from")
-    check_size(records)
     records, said = without_clipped(records, options.J.value if options.J is not None else None)
     if options.modes is not None:
         records = [with_structure(record, options.modes, options.axis) for record in records]

@@ -32,6 +32,7 @@ from feedsim.files.columns import Columns
 from feedsim.files.trace import Mark, Recording, read_recording
 from feedsim.files.trace.trace import Array
 from feedsim.foundation import units
+from feedsim.foundation.arguments import spell_argument
 from feedsim.foundation.errors import Finding, InputError
 from feedsim.foundation.outputs import BlockResource
 from feedsim.motions.profile import speed_change
@@ -87,6 +88,7 @@ SETTLING_TIME = 0.6  # [s] at rest ahead of the record
 LEAD_IN_TIME = 2.0  # [s] of the record ahead of a window that are run, too
 # The state of drive and friction is not known where a record begins in motion; it has died away after that.
 START_TRANSIENT = 0.1  # [s]
+MAX_REPLAY_ROWS = 2_000_000  # of a record that are run
 CYCLES_BEHIND = 4  # position cycles that the program goes on behind the last row
 # [s] of rest that are run ahead of the first motion and behind the last one, where only motion is asked for. Behind it
 # that is more than a torque may be late.
@@ -185,7 +187,7 @@ def cut_window(axis: str, read: RecordedAxis, window: tuple[float, float] | None
 
     Of a stretch that begins in motion the first START_TRANSIENT do not count.
 
-    Raises InputError: no stretch without a gap holds the window, or less than ten rows of it.
+    Raises InputError: no stretch without a gap holds the window, or less than ten rows of it, or too many.
     """
     pitch = read.provenance.pitch
     if pitch is None:
@@ -218,6 +220,11 @@ def cut_window(axis: str, read: RecordedAxis, window: tuple[float, float] | None
         rows &= np.asarray(record.time >= record.time[0] + START_TRANSIENT)
     if np.count_nonzero(rows) < 10:
         raise InputError(f"{read.provenance.file}: {np.count_nonzero(rows)} rows in the window; at least 10 are needed")
+    if len(record) > MAX_REPLAY_ROWS:
+        raise InputError(
+            f"{read.provenance.file}: {len(record):,} rows, {len(record) * record.interval / 60:.4g} min; allowed: up "
+            f"to {MAX_REPLAY_ROWS:,}. Give a part of it ({spell_argument('window')})"
+        )
     return AxisRecord(axis, record, pitch / (2 * np.pi), rows)
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TextIO
 
 import numpy as np
 from pydantic_core import to_json
@@ -237,6 +237,7 @@ _NO_NUMBERS = ("nan", "inf", "infinity")  # which stand in place of one
 # A signal of a SINUMERIK by its path: "+/Nck/!SD/nckServoDataActPos1stEnc64 [u1, 2]", of unit 1, axis 2.
 _SIGNAL = re.compile(r"(?P<path>.*?)\s*\[u\d+\s*[,;]\s*(?P<axis>\d+)\](?P<rest>.*)")
 LONGEST_UNIT = 60  # characters of a name or a unit in two rows of header
+HEADER_TEXT = 1 << 24  # characters within which a header ends
 MOST_REMARKS = 65536  # characters within which a header is looked for
 UNITS_OF_TIME = ("time", "t")  # names of the time that are units as well
 
@@ -482,6 +483,8 @@ class Table:
 
     def _values(self, index: int, mark: Decimal) -> Array:
         read = self.dates.get(index)
+        if read is None and self.numbers is not None:
+            return self.numbers[:, index].copy()
         if read is None:
             return numbers(self.columns[index], mark, self.lines, self.where, self.names[index])
         if isinstance(read, InputError):
@@ -514,19 +517,21 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
     split: takes the heads of the columns apart into names and units; default: name [unit], each name once.
     as_numbers: numbers alone where nothing else stands in the file, many times faster than cells.
     """
-    lines = io.StringIO(_text(path), newline="")
+    text = _text(path)
+    lines = io.StringIO(text[:HEADER_TEXT], newline="")
     try:
         layout = layout_of(lines, str(path))
     except csv.Error as error:
         raise InputError(f"{path}: the header: {error}") from None
-    begin = lines.tell()
-    read = _numbers(lines, layout) if as_numbers else None
+    below = text[lines.tell() :]
+    del text, lines
+    read = _numbers(below, layout) if as_numbers else None
     if read is not None:
         body_lines: Sequence[int] = range(layout.lines + 1, layout.lines + 1 + len(read))
         body: Sequence[Sequence[str]] = ()
     else:
-        lines.seek(begin)
-        body, body_lines = _rows(lines, layout, path)
+        body, body_lines = _rows(_lines_of(below), layout, path)
+    del below
     if not len(body_lines):
         raise InputError(f"{path}:{layout.header_line}: no rows below the header")
     header = _complete(layout, body)
@@ -560,7 +565,20 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
     return _convert_dates(table)
 
 
-def _rows(lines: io.StringIO, layout: Layout, path: Path) -> tuple[list[list[str]], list[int]]:
+def read_finite_table(path: Path) -> Table:
+    """As read_table, with numbers where the file holds nothing but finite ones: cells take 20 times their memory."""
+    table = read_table(path, as_numbers=True)
+    if table.numbers is None or not recordable_values(table.numbers)[1].any():
+        return table
+    return read_table(path)
+
+
+def _lines_of(text: str) -> TextIO:
+    """A text as a file, in a quarter of the memory that StringIO takes."""
+    return io.TextIOWrapper(io.BytesIO(text.encode()), "utf-8", newline="")
+
+
+def _rows(lines: TextIO, layout: Layout, path: Path) -> tuple[list[list[str]], list[int]]:
     """Rows below the header, and their lines. InputError: quotes that do not fit."""
     reader = csv.reader(lines, delimiter=layout.separator, strict=True)
     rows: list[list[str]] = []
@@ -646,17 +664,17 @@ def _millisecond_values(table: Table, index: int) -> Array | None:
     return np.array(column, dtype=np.float64) if all(cell.isdecimal() for cell in column) else None
 
 
-def _numbers(lines: io.StringIO, layout: Layout) -> Array | None:
+def _numbers(text: str, layout: Layout) -> Array | None:
     """Rows of nothing but numbers with decimal points, one line a row; None of any other."""
-    body = lines.read().rstrip("\r\n")
-    if not body:
+    rows = text.rstrip("\r\n").count("\n") + 1
+    if not text.strip("\r\n"):
         return None
     try:
-        values = np.loadtxt(io.StringIO(body), delimiter=layout.separator, comments=None, ndmin=2)
+        values = np.loadtxt(_lines_of(text), delimiter=layout.separator, comments=None, ndmin=2)
     except ValueError:
         return None
     # Empty lines, or a header that is not that of the rows.
-    return values if values.shape == (body.count("\n") + 1, len(layout.header)) else None
+    return values if values.shape == (rows, len(layout.header)) else None
 
 
 def _text(path: Path) -> str:

@@ -14,7 +14,7 @@ from typing import IO
 
 import numpy as np
 
-from feedsim.files.trace.cells import TIME_NAMES, header_line, lines_of, read_table
+from feedsim.files.trace.cells import TIME_NAMES, header_line, lines_of, read_finite_table
 from feedsim.files.trace.trace import Trace, first_not_finite, stretches
 from feedsim.foundation import units
 from feedsim.foundation.errors import InputError, OutputError
@@ -157,7 +157,7 @@ def read_csv(
     ('Z.x_s', 'Z.x_a', 'Z.n_a', 'Z.i_q')
     """
     path = Path(path)
-    table = read_table(path)
+    table = read_finite_table(path)
     at = table.axis(time, TIME_NAMES, "s")
     others = [i for i in range(len(table.names)) if i != at]
     wanted = others if columns is None else [table.index(name) for name in columns]

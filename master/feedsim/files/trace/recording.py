@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feedsim.files.trace import capture, sinumerik_xml
 from feedsim.files.trace.capture import CaptureAxis
-from feedsim.files.trace.cells import TIME_NAMES, Table, read_table, titles, usual_column
+from feedsim.files.trace.cells import TIME_NAMES, Table, read_finite_table, titles, usual_column
 from feedsim.files.trace.files import write_csv
 from feedsim.files.trace.mat import MAT, read_columns
 from feedsim.files.trace.mat import find_column as named_so
@@ -192,7 +192,7 @@ def read_recording(path: str | Path) -> Recording:
         return Recording(path, tuple(columns), unit_texts, notes=notes, _columns=columns)
     if (recording := of_control(path)) is not None:
         return recording
-    table = read_table(path)
+    table = read_finite_table(path)
     # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
     units = ["" if unit.isdecimal() else unit for unit in table.units]
     return Recording(

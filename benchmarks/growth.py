@@ -1,9 +1,13 @@
-"""How cost grows with modes and axes: the control cycle in the native loop, the plant's doStep, start-up and memory.
+"""How cost grows: with modes and axes, that of the control cycle, the plant's doStep, start-up and memory; with the
+size of what a command reads, its time and memory.
 
 The machines are synthetic (machines.py), each with a plant packed for it. A cycle is the mean of a run of some 50,000,
 in which all axes go to and fro. Start-up is a process's own, once the packages are imported: reading the scenario and
 the modes, planning, loading and initialising every unit. Memory is the peak of such a process that then runs the
 scenario. Packing is done once for a machine and told apart.
+
+Commands run once for each size, in processes of their own. Their logs repeat a short one, so that they tell nothing
+more by being longer. The exponent p of time ~ size^p is that of the last two sizes, start-up included.
 """
 
 from __future__ import annotations
@@ -18,15 +22,17 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from harness import RESULTS, Contestant, Costs, arguments, digits, measure, table
+from harness import RESULTS, ROOT, Contestant, Costs, arguments, digits, measure, table
 
 import cycle
 import fmpy
 import machines
-from fits import Line
-from watched import memory
+import numpy as np
+from fits import Line, exponent
+from watched import Watched, memory, watched
 
 from feedsim import scenario
+from feedsim.files.trace import Trace, write_csv
 from feedsim.scenario import Scenario
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim.archive import Archive
@@ -34,6 +40,7 @@ from feedsim.simulation.cosim.system import System
 from feedsim.structure import checked_modes
 
 SERIES = {"modes": (10, 30, 93, 300, 1000, 5000), "axes": (1, 2, 3, 6, 12)}
+COMMANDS = "commands"
 USUAL_MODES, USUAL_AXES = 93, 3
 PARTS = ("read", "plan", "system", "initialise")
 NAMES = {"cycle": "control cycle, native loop", "plant": "plant's doStep"}
@@ -183,24 +190,156 @@ class Series:
         print(f"{write_svg(f'growth-{self.over}', panels, images)} written", file=sys.stderr)
 
 
+# --- Commands over the size of what they read -------------------------------------------------------------------------
+
+
+MACHINES = ROOT / "scenarios" / "machines"
+SIGNALS = ("DES_POS", "ENC_POS", "CONT_DEV", "CMD_SPEED", "VEL_FFW", "TORQUE_FFW", "TORQUE", "CURRENT", "POWER", "LOAD")
+CAPTURE_AXES = 6  # with ten signals each, and the counter
+STROKES = ", ".join(
+    f"{{kind: move, by: {{X: {way} mm}}, feed: {feed} mm/min}}"
+    for way, feed in ((20, 10000), (-3, 1000), (-7, 6000), (-8, 3000), (5, 8000), (-7, 500))
+)
+DRIVE_LOG = (
+    "{{name: log, machine: {machine}, motions: [{{kind: dwell, duration: 0.2 s}}, {strokes}], recording: {{interval: "
+    "2 ms}}, logging: {{interval: 2 ms, axes: [X], signals: [x_s, x_a, x_e, n_s, n_ffw, M_a], noise: {{M_a: 2 %, x_a: "
+    "0.1 um}}}}}}"
+)
+
+
+def write_repeated(file: Path, log: Trace, seconds: float) -> None:
+    """A log that ends where it begins, as often as it takes."""
+    interval = float(log.time[1] - log.time[0])
+    rows = np.arange(round(seconds / interval)) % len(log.time)
+    columns = {name: log[name][rows] for name in log.names}
+    write_csv(file, Trace(np.asarray(interval * np.arange(len(rows)), dtype=np.float64), columns, log.units))
+
+
+def logged(file: Path) -> Trace:
+    log = cosim.run(scenario.load(file)).log
+    assert log is not None
+    return log
+
+
+def capture(folder: Path, minutes: int) -> list[str]:
+    """Reading alone: a capture of 61 signals every 2 ms, of which two become a CSV file."""
+    names = ["CYCLE", *(f"{name}|{axis + 1}" for axis in range(CAPTURE_AXES) for name in SIGNALS)]
+    listed = [{"Name": name, "Address": name, "Axis": f"A{name.rpartition('|')[2]}"} for name in names]
+    rng = np.random.default_rng(1)
+    rows = [json.dumps(np.round(row, 6).tolist())[1:] for row in rng.standard_normal((500, len(names) - 1))]
+    file = folder / "capture.json"
+    with file.open("w", encoding="utf-8") as out:
+        out.write(f'{{"Header": {json.dumps({"CycleTimeMs": 2, "SignalListHFData": listed})}, "Payload": [')
+        for second in range(60 * minutes):
+            numbered = (f"[{500 * second + k}, {row}" for k, row in enumerate(rows))
+            out.write(f'{"," if second else ""}{{"HFData": [{",".join(numbered)}]}}')
+        out.write("]}")
+    columns = ("time=time:s", "DES_POS|1=x:mm")
+    return ["tools", "convert", str(file), *(word for each in columns for word in ("--column", each))]
+
+
+def friction(folder: Path, minutes: int) -> list[str]:
+    write_repeated(folder / "log.csv", logged(ROOT / "scenarios" / "identify_z_sine.yaml"), 60.0 * minutes)
+    return ["identify", "friction", str(folder / "log.csv"), "--axes", "Z", "--machine", str(MACHINES / "test_centre")]
+
+
+def drive_log(folder: Path, seconds: int) -> Path:
+    file = folder / "log.yaml"
+    file.write_text(DRIVE_LOG.format(machine=MACHINES / "one_axis", strokes=STROKES), encoding="utf-8")
+    write_repeated(folder / "log.csv", logged(file), seconds)
+    return folder / "log.csv"
+
+
+def drive(folder: Path, seconds: int) -> list[str]:
+    record = str(drive_log(folder, seconds))
+    return ["identify", "drive", record, "--axes", "X", "--machine", str(MACHINES / "one_axis")]
+
+
+def replay(folder: Path, seconds: int) -> list[str]:
+    return ["replay", str(drive_log(folder, seconds)), "--axes", "X", "--machine", str(MACHINES / "one_axis")]
+
+
+def program(folder: Path, blocks: int) -> list[str]:
+    """Chords of 0.1 mm of a circle."""
+    angles = 0.02 * np.arange(blocks)
+    points = zip(500 + 5 * np.cos(angles), 200 + 5 * np.sin(angles), strict=True)
+    lines = ["G17 G90 G94 G71", "G0 X505 Y200", "G1 F3000", *(f"G1 X{x:.4f} Y{y:.4f}" for x, y in points), "M30"]
+    (folder / "part.mpf").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return ["run", str(folder / "part.mpf"), "--machine", str(MACHINES / "test_centre")]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command, and the sizes of what it reads. write: makes that in a folder, and gives the words of the command."""
+
+    name: str
+    unit: str
+    sizes: tuple[int, ...]
+    write: Callable[[Path, int], list[str]]
+
+    def measured(self, size: int) -> Watched:
+        with TemporaryDirectory(prefix="feedsim-bench-") as folder:
+            words = self.write(Path(folder), size)
+            quiet = [] if words[0] == "tools" else ["--quiet"]
+            return watched([*words, *quiet, "--out", str(Path(folder) / "out")])
+
+
+READING = (
+    Command("read a capture of 61 signals", "min", (1, 6, 18), capture),
+    Command("identify friction, 500 Hz", "min", (1, 10, 60), friction),
+    Command("identify drive, 2 ms", "s", (10, 30, 300), drive),
+    Command("replay, 2 ms", "s", (10, 100, 1000), replay),
+    Command("run, NC blocks", "blocks", (100, 1000, 10_000), program),
+)
+
+
+def commands(short: bool) -> tuple[str, dict[str, object]]:
+    """Table of all commands over their sizes, and the figures."""
+    rows = []
+    results: dict[str, object] = {}
+    for command in READING:
+        if short and command.write not in (replay, program):
+            continue
+        sizes = (1, 2) if short else command.sizes
+        runs = [command.measured(size) for size in sizes]
+        power = exponent(sizes[-2:], [run.whole for run in runs[-2:]])
+        for size, run in zip(sizes, runs, strict=True):
+            taken = "" if run.peak is None else f"{run.peak:.0f} MB"
+            last = f"{power:.2f}" if size == sizes[-1] else ""
+            rows.append([command.name, f"{size} {command.unit}", f"{digits(run.whole)} s", taken, last])
+        results[command.name] = {
+            "sizes": list(sizes), "seconds": [run.whole for run in runs], "peak MB": [run.peak for run in runs],
+            "exponent": power,
+        }  # fmt: skip
+    return table(["command", "size", "time", "peak memory", "exponent"], rows), results
+
+
 def sizes(over: str) -> list[Size]:
     return [Size(USUAL_AXES, n) if over == "modes" else Size(n, USUAL_MODES) for n in SERIES[over]]
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    bench = arguments("growth", __doc__, words, rounds=5, only=tuple(SERIES), images=True)
+    bench = arguments("growth", __doc__, words, rounds=5, only=(*SERIES, COMMANDS), images=True)
     if bench.short:
         SERIES.update(modes=(10, 20), axes=(1, 2))
-    wanted = list(dict.fromkeys(size for over in bench.only for size in sizes(over)))
-    with TemporaryDirectory(prefix="feedsim-bench-") as folder:
-        found, costs = measured(wanted, Path(folder), bench.rounds)
-    series = [Series(over, found, costs) for over in bench.only]
-    results = {
-        "costs": costs.as_json(),
-        "start-up": {str(size): each.starts for size, each in found.items()},
-        "lines": {each.over: {what: asdict(line) for what, line in each.lines().items()} for each in series},
-    }
-    bench.tell("\n\n".join(f"{each.text()}\n\n{each.told()}" for each in series), results)
+    over_sizes = [over for over in bench.only if over in SERIES]
+    wanted = list(dict.fromkeys(size for over in over_sizes for size in sizes(over)))
+    results: dict[str, object] = {}
+    series: list[Series] = []
+    if wanted:
+        with TemporaryDirectory(prefix="feedsim-bench-") as folder:
+            found, costs = measured(wanted, Path(folder), bench.rounds)
+        series = [Series(over, found, costs) for over in over_sizes]
+        results = {
+            "costs": costs.as_json(),
+            "start-up": {str(size): each.starts for size, each in found.items()},
+            "lines": {each.over: {what: asdict(line) for what, line in each.lines().items()} for each in series},
+        }
+    texts = [f"{each.text()}\n\n{each.told()}" for each in series]
+    if COMMANDS in bench.only:
+        text, results[COMMANDS] = commands(bench.short)
+        texts.append(text)
+    bench.tell("\n\n".join(texts), results)
     for each in series:
         each.plot(bench.images)
     return 0

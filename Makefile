@@ -196,7 +196,7 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 test-python: fmus $(VENV)/.importers
 	@set -e; if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; \
 	else echo "no compiler for WebAssembly here: tests of pages are left out"; fi
-	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
+	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=80 --durations-min=5
 
 # Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").
 fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into every reader (ARGS="--seconds N --seed S")

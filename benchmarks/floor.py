@@ -5,28 +5,38 @@ steps from outside, against the same algorithm without FMI: the units' models li
 Times are of the processor, not of the wall: what other programs take in between does not count. They take turns in
 one process; a ratio is the median of those of neighbouring runs, with its quartiles. The floor
 must leave the same bits, or it is no floor for this work.
+
+``--instructions`` counts with valgrind what both execute in place of that, and by which part of the program.
 """
 
 from __future__ import annotations
 
+import bisect
 import ctypes
+import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+import zipfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
-from harness import CIRCLE, ROOT, Contestant, arguments, digits, measure, table
+from harness import CIRCLE, ONE_WAY, ROOT, Benchmark, Contestant, arguments, digits, measure, table
 
 import numpy as np
 
 from feedsim import scenario
 from feedsim.simulation import cosim, nc
 from feedsim.simulation.cosim.archive import Archive
+from feedsim.simulation.cosim.exchange import Exchange
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Unit
 from feedsim.simulation.cosim.whole import pack_whole
@@ -135,8 +145,143 @@ def stepped(
     return seconds, table
 
 
+# --- which part of the program executes how many instructions ---------------------------------------------------------
+
+COUNTING = ROOT / "build" / "bench" / "counting"
+SWITCH = """#include <valgrind/callgrind.h>
+void begin(void) { CALLGRIND_START_INSTRUMENTATION; }
+void end(void) { CALLGRIND_STOP_INSTRUMENTATION; }
+"""
+SHELL = re.compile(r"fmi2|values_|run_|ready|late_finite|get_|set_")  # functions of src/fmi2, a unit's prefix aside
+INTERVALS = "1 ms", "8 ms"  # of recording, which the difference is due to
+
+
+def run_counted(which: str, interval: str) -> None:
+    """The loop of the floor or of the master in this process, counted where valgrind executes it."""
+    circle = scenario.load(CIRCLE, (ONE_WAY, f"recording.interval={interval}"))
+    program, switch = nc.plan(circle), ctypes.CDLL(str(COUNTING / "switch.so"))
+
+    def counted(work: Callable[..., None], *given: object) -> None:
+        switch.begin()
+        work(*given)
+        switch.end()
+
+    if which == "floor":
+        library = ctypes.CDLL(str(COUNTING / "floor" / "floor.so"))
+        library.floor_run.restype = None
+        with patch.object(library, "floor_run", partial(counted, library.floor_run)):
+            floor(library, circle, program)
+    else:
+        work = Exchange.run
+        with patch.object(Exchange, "run", lambda *given: counted(work, *given)):
+            cosim.run(circle, program=program, native=True)
+
+
+def build_counted() -> None:
+    """The floor, the units and the native loop as they are, with the names of their functions and files."""
+    shutil.rmtree(COUNTING, ignore_errors=True)
+    build(COUNTING / "floor", ("-g",))
+    (COUNTING / "switch.c").write_text(SWITCH, encoding="utf-8")
+    compiler = [*toolchain.find_compiler(), "-shared", "-fPIC"]
+    subprocess.run([*compiler, "switch.c", "-o", "switch.so"], cwd=COUNTING, check=True)
+    whole = toolchain.whole_program(toolchain.find_compiler(), compile.host_target().suffix)
+    environment = os.environ | {"FEEDSIM_CFLAGS": " ".join([*whole, "-g"])}
+    shutil.copytree(cosim.fmus_directory(), COUNTING / "fmus")
+    fmus = COUNTING / "fmus"
+    commands = [["build", unit, "--out", f"{fmus}/{unit}.fmu", "--build-dir", str(COUNTING / unit)] for unit in UNITS]
+    for words in (*commands, ["exchange", "--out", str(fmus)]):
+        command = [sys.executable, "-m", "feedsim_packager", *words]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
+def functions_of(unit: str) -> tuple[list[int], list[str]]:
+    """Where the functions of a unit's library begin, and their names."""
+    suffix = compile.host_target().suffix
+    library = COUNTING / f"{unit}{suffix}"
+    with zipfile.ZipFile(COUNTING / "fmus" / f"{unit}.fmu") as archive:
+        name = next(name for name in archive.namelist() if name.endswith(library.name))
+        library.write_bytes(archive.read(name))
+    listed = subprocess.run(["nm", str(library)], check=True, capture_output=True, text=True).stdout
+    places = sorted((int(at, 16), name) for at, name in re.findall(r"^(\w+) [tT] (\S+)$", listed, re.MULTILINE))
+    return [at for at, _ in places], [name.removeprefix(f"{unit}_") for _, name in places]
+
+
+def count_instructions(which: str, interval: str) -> Counter[str]:
+    """Instructions per control cycle by the part of the program that executes them."""
+    output = COUNTING / f"{which}.{interval[0]}"
+    code = f"import floor; floor.run_counted({which!r}, {interval!r})"
+    command = [
+        "valgrind",
+        "--tool=callgrind",
+        "--instr-atstart=no",
+        "--dump-instr=yes",
+        f"--callgrind-out-file={output}",
+    ]
+    environment = os.environ | {"FEEDSIM_FMUS": str(COUNTING / "fmus")}
+    subprocess.run([*command, sys.executable, "-c", code], cwd=Path(__file__).parent, env=environment, check=True,
+                   capture_output=True)  # fmt: skip
+    functions = {unit: functions_of(unit) for unit in UNITS}
+    names: dict[str, str] = {}  # of objects and files, which are spelled once
+    at, called, instruction, counts = {"ob": "", "fl": ""}, False, 0, Counter[str]()
+    for line in output.read_text(encoding="utf-8").splitlines():
+        if named := re.match(r"c?(ob|fl|fi|fe)=\((\d+)\)(?: (.*))?", line):
+            kind = "ob" if named[1] == "ob" else "fl"
+            names.setdefault(kind + named[2], named[3] or "")
+            if not line.startswith("c"):
+                at[kind] = names[kind + named[2]]
+        elif line.startswith("calls="):
+            called = True  # what the call takes is no instruction of its caller
+        elif cost := re.match(r"(0x\w+|[+-]\d+|\*) \S+(?: (\d+))?$", line):
+            place = cost[1]
+            instruction = int(place, 0) if place[0] == "0" else instruction + int(place.replace("*", "0"))
+            if not called:
+                counts[part_of(Path(at["ob"]), Path(at["fl"]), instruction, functions)] += int(cost[2] or 0)
+            called = False
+    return counts
+
+
+def part_of(library: Path, file: Path, instruction: int, functions: dict[str, tuple[list[int], list[str]]]) -> str:
+    """The part of the program that an instruction belongs to; empty for the interpreter."""
+    if file.name in ("exchange.c", "vectors.h", "floor.c"):
+        return "exchange"
+    if library.stem in functions:
+        places, names = functions[library.stem]
+        inside = names[bisect.bisect(places, instruction) - 1]
+        return "calls and checks of the FMI" if SHELL.match(inside) else library.stem
+    if library.stem.startswith("libm."):
+        return "friction"  # exponentials and logarithms
+    return file.parent.name if file.parent.name in UNITS else file.stem if file.stem in UNITS else ""
+
+
+def tell_instructions(bench: Benchmark) -> None:
+    """A table of all parts; recording is what more rows take."""
+    build_counted()
+    circle = scenario.load(CIRCLE, (ONE_WAY,))
+    cycles = float(nc.plan(circle).time[-1]) / circle.machine.cycles.T_c
+    counts: dict[str, dict[str, float]] = {}
+    for which in ("floor", "native loop"):
+        often, rarely = (count_instructions(which, interval) for interval in INTERVALS)
+        more = {part: 8 / 7 * (often[part] - rarely[part]) for part in often}
+        counts[which] = {part: (often[part] - more[part]) / cycles for part in often if part}
+        counts[which]["recording"] = sum(number for part, number in more.items() if part) / cycles
+    parts = [*UNITS, "exchange", "calls and checks of the FMI", "recording"]
+    rows = [[part, *(counts[which].get(part, 0.0) for which in counts)] for part in parts]
+    rows.append(["all", *(sum(counts[which].values()) for which in counts)])
+    shown = [[part, *(f"{number:.0f}" for number in (low, high, high - low))] for part, low, high in rows]
+    header = ["instructions of a control cycle", *counts, "beyond the floor"]
+    replace(bench, name="instructions").tell(table(header, shown), {"instructions per cycle": counts})
+
+
 def main(given: Sequence[str] | None = None) -> int:
-    bench = arguments("floor", __doc__, given, rounds=ROUNDS, only=("native loop", "Python loop", *OUTER))
+    bench = arguments(
+        "floor", __doc__, given, rounds=ROUNDS, only=("native loop", "Python loop", *OUTER),
+        more=lambda parser: parser.add_argument(
+            "--instructions", action="store_true", help="of each part of the program, with valgrind; of no time"
+        ),
+    )  # fmt: skip
+    if bench.given.instructions:
+        tell_instructions(bench)
+        return 0
     library = build(ROOT / "build" / "bench" / "floor")
     circle = scenario.load(CIRCLE, bench.circle)
     program = nc.plan(circle)

@@ -25,6 +25,8 @@ from provenance import ROOT, SETTINGS, Load, command, described, machine, versio
 # Small matrices: threads for linear algebra only wait for one another. The Makefile does the same. Before numpy is
 # loaded, hence this module ahead of all others (pyproject.toml has ruff sort imports so).
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# As users' Python does, processes keep byte code: without, each compiles all modules of the package.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 __all__ = [
     "CIRCLE",

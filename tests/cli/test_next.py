@@ -75,6 +75,11 @@ MADE = {
         f"replay log.csv --machine {CENTRE} --axes Z --columns log.yaml --window '0.05 s..1 s' --out r",
         ("identify drive log.csv", "--axes Z", "--columns log.yaml", "--window '0.05 s..1 s'", f"--machine {CENTRE}"),
     ),
+    "a replay of an identified drive": (
+        f"replay log.csv --machine {CENTRE} --axes Z --columns log.yaml --window '0.05 s..1 s' "
+        "--set 'machine.axes.Z.friction.identified={parameters: {drive.K_v: {status: estimated}}}' --out r",
+        (f"frf {CENTRE}", "--axes Z", "drive.K_v"),
+    ),
     "a drive": (
         f"identify drive log.csv --machine {CENTRE} --axes Z --columns log.yaml --window '0.05 s..0.3 s' "
         f"--set {Z}.K_v='3 (m/min)/mm' --out r",
@@ -116,7 +121,7 @@ MADE = {
     "a machine": (f"machine view {ONE_AXIS} --at X=100mm --out r", ("--at X=100mm", "--animate")),
 }
 # Taking a minute each, these are parsed alone; they are executed by tests of their own.
-LONG = ("a compensation", "a replay")
+LONG = ("a compensation", "a replay", "a replay of an identified drive")
 
 
 @pytest.fixture(scope="module")

@@ -221,7 +221,7 @@ def report_of(replayed: ReplayReport) -> Report:
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
         answer=answers(replayed),
         tiles=list(_tiles(replayed.figures)),
-        next_step=Step("Identify the drives from the record", "identify drive"),
+        next_step=_next_step(replayed),
         main=[
             *pictures,
             figures_section(replayed.figures),
@@ -233,6 +233,17 @@ def report_of(replayed: ReplayReport) -> Report:
         provenance=provenance_section(rows, hash_files(_files(replayed))),
         footer=figures_footer("Values in full precision: summary.json; time series: replay.csv.", "docs/replay.md"),
     )
+
+
+def _next_step(replayed: ReplayReport) -> Step:
+    """Drives that were identified already are looked at; others are identified from the record."""
+    frictions = replayed.subject.machine.shipped_frictions
+    for comparison in replayed.comparisons:
+        friction = frictions.get(comparison.axis)
+        values = friction.identified.get("parameters", {}) if friction is not None else {}
+        if not any(name.startswith("drive.") for name in values):
+            return Step("Identify the drives from the record", "identify drive")
+    return Step("See how each axis answers", "frf", {"subject": replayed.subject.file})
 
 
 def _tiles(figures: Mapping[str, Figure]) -> list[Tile]:

@@ -32,7 +32,7 @@ from feedsim.design.tune.knobs import Knobs, match_lag, with_drives
 from feedsim.linear.judgement import Candidates, judge
 from feedsim.scenario import Drive, Machine, load, load_machine
 from feedsim.structure import Modes, checked_modes
-from feedsim.structure.modes import read_modes
+from feedsim.structure.modes import parse_modes
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 Z = SCENARIOS / "z_positioning.yaml"
@@ -81,19 +81,19 @@ def test_modes_are_changed_behind_a_transmission(monkeypatch: pytest.MonkeyPatch
     """A table of changed modes has those of the structure, to which the machine joins its motor, once."""
     contact = ("stiffness=200 N/um", "damping=3e4 N.s/m", "inertia=0.004 kg.m^2")
     scenario = load(Z, [f"machine.axes.Z.transmission.{each}" for each in contact])
-    structure = read_modes(scenario.machine.modes.file, list(scenario.machine.axes))
+    structure = parse_modes(scenario.machine.modes, tuple(scenario.machine.axes))
     monkeypatch.setattr(_Search, "errors", lambda *args, **named: ())
     poses = {"another": structure}
-    with _Search.begin_search(scenario, "Z", Limits(8.0, 40.0, 1e-5), poses, None, lambda *_: None, 10) as search:
-        changed = search.with_modes(scenario.machine, 1.1)
-        table = read_modes(changed.modes, list(changed.axes))
-        assert table.frequency == pytest.approx(1.1 * structure.frequency, rel=1e-15)
-        joined = checked_modes(changed)
-        assert len(joined.frequency) == len(structure.frequency) + 1
-        for name in ("pose of the machine file", "another"):
-            own = search.judges[f"{name}, modes 10 % higher"].candidates.modes
-            assert own.frequency == pytest.approx(joined.frequency, rel=1e-12)
-            assert search.judges[name].candidates.modes.J_inf("Z") == pytest.approx(0.004, rel=1e-9)
+    search = _Search.begin(scenario, "Z", Limits(8.0, 40.0, 1e-5), poses, None, lambda *_: None, 10)
+    changed = search.with_modes(scenario.machine, 1.1)
+    table = parse_modes(changed.modes, tuple(changed.axes))
+    assert table.frequency == pytest.approx(1.1 * structure.frequency, rel=1e-15)
+    joined = checked_modes(changed)
+    assert len(joined.frequency) == len(structure.frequency) + 1
+    for name in ("pose of the machine file", "another"):
+        own = search.judges[f"{name}, modes 10 % higher"].candidates.modes
+        assert own.frequency == pytest.approx(joined.frequency, rel=1e-12)
+        assert search.judges[name].candidates.modes.J_inf("Z") == pytest.approx(0.004, rel=1e-9)
 
 
 @pytest.mark.parametrize(("K_p", "T_n", "K_v"), [(0.25, 0.02, 60.0), (1.2, 0.004, 120.0)])

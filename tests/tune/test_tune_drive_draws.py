@@ -117,15 +117,15 @@ def test_margins_hold_on_draws_that_values_are_found_on(fmus: Path, tmp_path: Pa
     scenario = load(ONE, [machine_file])
     cloud = cloud_of(scenario.machine)
     limits = Limits(8.0, 40.0, 1e-5)
-    with drive._Search.begin_search(scenario, "X", limits, {}, fmus, lambda *_: None, 10, cloud) as search:
-        present = search.knobs.drive
-        nominal = margins_of(search.judges, present)
-        assert search.margins(present).gain < nominal.gain - 0.05
-        assert "draw" in search.margins(present).gain_of
-        assert len(search.parts) == 4 + 2 * drive.RUN_DRAWS
-        hopeless = replace(limits, gain_margin=100.0)
-        search.limits = hopeless
-        assert search.margins(present).gain_of == nominal.gain_of  # no draws where the machine itself does not run
+    search = drive._Search.begin(scenario, "X", limits, {}, fmus, lambda *_: None, 10, cloud)
+    present = search.knobs.drive
+    nominal = margins_of(search.judges, present)
+    assert search.margins(present).gain < nominal.gain - 0.05
+    assert "draw" in search.margins(present).gain_of
+    assert len(search.parts) == 4 + 2 * drive.RUN_DRAWS
+    hopeless = replace(limits, gain_margin=100.0)
+    search.limits = hopeless
+    assert search.margins(present).gain_of == nominal.gain_of  # no draws where the machine itself does not run
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def test_a_copy_can_be_read_by_itself(name: str, tmp_path: Path) -> None:
         read = [study.scenario, *study.files]
     else:
         loaded = scenario.load(file)
-        read = [path for _, path in loaded.files] + [loaded.machine.modes]
+        read = [path for _, path in loaded.files] + [loaded.machine.modes.file]
     assert all(path.resolve().is_relative_to(tmp_path.resolve()) for path in read)
 
 

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from feedsim.files.trace import Trace
 from feedsim.files.trace.trace import find_rows, require_column
 from feedsim.foundation.errors import InputError
 from feedsim.motions.positioning_cycle import Visits
-from feedsim.structure.modes import checked_modes, with_mounts, write_modes
+from feedsim.structure.modes import checked_modes, table_of_modes, with_mounts
 from feedsim.structure.mounts import read_mounts
 
 if TYPE_CHECKING:
@@ -111,13 +110,11 @@ def with_clamped(run: Run, fmus: Path | None = None, progress: Progress | None =
     stiff = with_mounts(bare, table, np.column_stack([K_lin, CLAMPING_FACTOR * K_lin, none, x_2, none, none]))
     columns = tuple(f"{axis}.x_a" for axis in machine.axes)
     recording = scenario.recording.model_copy(update={"variables": columns})
-    with TemporaryDirectory() as folder:
-        write_modes(Path(folder) / "modes.csv", stiff)
-        changes = {"mounts": None, "structure": None, "modes": Path(folder) / "modes.csv"}
-        second = scenario.model_copy(
-            update={"machine": machine.model_copy(update=changes), "recording": recording, "logging": None}
-        )
-        return replace(run, clamped=cosim.run(second, program=run.program, fmus=fmus, progress=progress).trace)
+    changes = {"mounts": None, "structure": None, "modes": table_of_modes(stiff, machine.modes.file)}
+    second = scenario.model_copy(
+        update={"machine": machine.model_copy(update=changes), "recording": recording, "logging": None}
+    )
+    return replace(run, clamped=cosim.run(second, program=run.program, fmus=fmus, progress=progress).trace)
 
 
 def mounts_share(clamped: Trace, approach: Approach, settling: Figure, band: float) -> Figure:

@@ -482,12 +482,10 @@ def _fetch_as(expected: Any, source: Source, place: Place, faults: list[str]) ->
                 source.put(place, Source(UNREAD, {(): source.mark(place)}))
                 return
             _fetch_as(expected, source, place, faults)
-    elif isinstance(data, dict):
-        for key in data:
-            _fetch_as(child(annotation, key), source, (*place, key), faults)
-    elif isinstance(data, list):
-        for i in range(len(data)):
-            _fetch_as(child(annotation, i), source, (*place, i), faults)
+    elif isinstance(data, (dict, list)):
+        for key, value in list(data.items() if isinstance(data, dict) else enumerate(data)):
+            if isinstance(value, (str, dict, list)):  # numbers name no files
+                _fetch_as(child(annotation, key), source, (*place, key), faults)
 
 
 MAX_EXPLAINED = 200  # problems of a file that are listed

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
+import gc
 import hashlib
 import os
 import random
@@ -71,6 +72,7 @@ def outcome(read: Callable[[Path], object], path: Path, computing: int = 0) -> s
 
 def _try(read: Callable[[Path], object], path: Path, pipe: int, computing: int) -> None:
     said = "read"
+    gc.freeze()  # what the parent holds is not looked through again and again in the reader's time
     try:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (computing, computing + 1))

@@ -124,8 +124,9 @@ def count_text(count: int, one: str, several: str) -> str:
 
 # What separates a file from a later one of the same name.
 State = tuple[int, int, int]
-# What solutions of a structure follow from besides its file: the rooms of structures, solved and described.
-CODE = (Path(__file__).parent, Path(__file__).parents[1] / "scenario" / "structure")
+# What solutions of a structure follow from besides its file: the code that solves structures, and that describes them.
+_SCENARIO = Path(__file__).parents[1] / "scenario"
+CODE = (Path(__file__).parent, _SCENARIO / "structure.py", _SCENARIO / "structure_checks.py")
 
 
 def state_of(file: Path) -> State:

@@ -141,7 +141,7 @@ def pose_change(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> 
         pose = _Pose(machine.structure, state_of(machine.structure), tuple(machine.pose.items()))
         return PoseChange(tuple(_with_modes(pose, axis) for axis in axes), "")
     except OSError as error:
-        return PoseChange(axes, f"{machine.structure}: cannot be read: {error.strerror}")
+        return PoseChange(axes, f"{error.filename or machine.structure}: cannot be read: {error.strerror}")
     except FeedsimError as error:  # the run itself needs no structure: it goes on without
         return PoseChange(axes, str(error).partition("\n")[0])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from statistics import median
@@ -47,6 +48,21 @@ def test_docs_together_can_be_read() -> None:
 
 def test_readme_fits_on_two_screens() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
+def test_files_of_the_house_are_where_a_page_says(page: str) -> None:
+    """By their path from the root, or its end; files of other repositories are none of the house."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    named = re.findall(r"`([\w./*-]+/[\w./*-]+|[\w*-]+\.(?:py|c|h|js|def))`", text)
+    places = [path for path in ("master/feedsim", "src", "tests", "docs", ".ci", "ci") if (ROOT / path).is_dir()]
+    assert len(named) > 10
+    missing = [
+        name
+        for name in dict.fromkeys(named)
+        if not any(ROOT.glob(name)) and not any(any((ROOT / place).rglob(name)) for place in places)
+    ]
+    assert sorted(set(missing) - {"demo/freq_trace.XML"}) == []
 
 
 LONG = "So it is " + "an ox or a cow " * 6 + "we see."  # 35 words, which fit a line

@@ -15,7 +15,7 @@ import numpy as np
 from feedsim import scenario
 from feedsim.analysis import Diagnosis
 from feedsim.analysis.circle import term_name
-from feedsim.analysis.circle.words import worth_telling
+from feedsim.analysis.circle.words import actionable_causes
 from feedsim.analysis.circularity import contour
 from feedsim.analysis.evaluate import FIGURE_UNITS, CircleTask, diagnose_turns, tasks
 from feedsim.report.formatting import SIMULATED_COLOUR
@@ -125,7 +125,7 @@ def words(found: Diagnosis, cause: Cause) -> str:
     amplitudes what the response of the axes makes of them."""
     named = []
     names = {cause.term} & {"radius", "cogging X"}
-    told = worth_telling(found)
+    told = actionable_causes(found)
     asked = [
         term for term in found.terms
         if f"{term.key} {term.axis}".strip() in names and term.shows and term not in told

@@ -8,7 +8,7 @@ import pytest
 
 from feedsim.estimation.identify.result import Estimate
 from feedsim.report.changes import control_names
-from feedsim.report.identified_drive import beside_lines, beside_part, beside_section, compare_parameters
+from feedsim.report.identified_drive import compare_parameters, comparison_lines, comparison_part, comparison_section
 from feedsim.scenario import load_machine
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"  # K_v 66.7 1/s, T_n 12 ms
@@ -39,13 +39,13 @@ def test_in_the_words_of_the_control() -> None:
     rows = compare_parameters(machine, {"Z": own})
     assert [each.parameter for each in rows] == ["drive.K_v", "friction.F_C", "constant_load"]
     with control_names("sinumerik"):
-        first, load = beside_lines(machine, rows)
+        first, load = comparison_lines(machine, rows)
         assert "MD32200 4 -> MD32200 POSCTRL_GAIN 3.5 1000/min" in first
-        section = beside_section(machine, rows)
+        section = comparison_section(machine, rows)
     assert "Z.constant_load is 0 N.m in the machine file" in load
     assert section is not None
     assert "MD32200 POSCTRL_GAIN: 4 | 3.5 1000/min" in str(section.parts[0].rows[0])  # type: ignore[union-attr]
-    assert "MD32200" not in beside_lines(machine, rows)[0]  # no control was asked for
-    assert beside_lines(machine.model_copy(update={"control": "sinumerik"}), rows)[0] == first  # the file names one
-    assert [each["differs"] for each in beside_part(rows)] == [True, False, True]
-    assert beside_section(machine, []) is None
+    assert "MD32200" not in comparison_lines(machine, rows)[0]  # no control was asked for
+    assert comparison_lines(machine.model_copy(update={"control": "sinumerik"}), rows)[0] == first  # the file names one
+    assert [each["differs"] for each in comparison_part(rows)] == [True, False, True]
+    assert comparison_section(machine, []) is None

@@ -494,12 +494,12 @@ def diagnoses(result: Result, asked: Sequence[Task] | None = None) -> dict[str, 
     return {prefix: diagnosis for prefix, diagnosis in diagnoses.items() if diagnosis is not None}
 
 
-def contours_asked(scenario: Scenario, program: Program) -> bool:
+def evaluates_contours(scenario: Scenario, program: Program) -> bool:
     """Whether the contour of an NC program is evaluated."""
     return any(isinstance(task, ContourTask) for task in tasks(scenario, program))
 
 
-def stops_asked(scenario: Scenario, program: Program) -> bool:
+def evaluates_stops(scenario: Scenario, program: Program) -> bool:
     """Whether a stop is evaluated."""
     return any(isinstance(task, PositioningTask) for task in tasks(scenario, program))
 

@@ -15,7 +15,7 @@ import numpy as np
 from feedsim.analysis import Diagnosis, Figure, PositioningTask, tasks
 from feedsim.analysis.circle import Term
 from feedsim.analysis.circle import term_name as name_of_term
-from feedsim.analysis.circle.words import worth_telling
+from feedsim.analysis.circle.words import actionable_causes
 from feedsim.foundation.errors import FeedsimError, InputError
 from feedsim.foundation.units import convert, parameters
 from feedsim.linear.judgement import Loop, judge
@@ -169,7 +169,7 @@ def of_circle(
     that take a search within margins are found, which takes seconds.
     """
     result: dict[str, Proposal] = {}
-    terms = list(worth_telling(diagnosis))
+    terms = list(actionable_causes(diagnosis))
     if terms and machine is not None and modes is not None:
         for axis in diagnosis.circle.axes:  # a model that is off makes more than one cause, and is named for the first
             for proposal in _propose_reference_model(machine, modes, axis, name_of_term(terms[0])):

@@ -26,8 +26,8 @@ from feedsim.cli.commands import (
     add_commands,
     arguments,
     choose_colour,
+    files_of_arguments,
     finish,
-    given_files,
     paint_text,
     prepare_streams,
     refuse_missing_files,
@@ -103,7 +103,7 @@ def _main(given: Sequence[str]) -> int:
         return code
     except FeedsimError as error:
         wrong_kind = error.exit_code == 2 and not command.missing_file(options)
-        _print_error(_kind_meant(command, options) if wrong_kind else "", error)
+        _print_error(_explain_other_kind(command, options) if wrong_kind else "", error)
         return _code(command, error.exit_code)
     except ModuleNotFoundError as error:
         if (missing_package := missing_package_error(error, options.called)) is None:
@@ -162,12 +162,13 @@ def _run_command(command: Command, options: argparse.Namespace) -> int:
         return finish(result, named.get("out"), options)
 
 
-def _kind_meant(command: Command, options: argparse.Namespace) -> str:
+def _explain_other_kind(command: Command, options: argparse.Namespace) -> str:
     """What is to be said in place of a refusal, where the file is of a kind that another command takes."""
     from feedsim.cli.kinds import explain_kind
 
     sentences = (
-        explain_kind(f"{command.name} {option}".strip(), [value]) for option, value in given_files(command, options)
+        explain_kind(f"{command.name} {option}".strip(), [value])
+        for option, value in files_of_arguments(command, options)
     )
     return next(filter(None, sentences), "")
 

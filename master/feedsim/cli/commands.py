@@ -326,7 +326,7 @@ def arguments(command: Command, options: Namespace) -> dict[str, Any]:
     return result
 
 
-def given_files(command: Command, options: Namespace) -> Iterator[tuple[str, Any]]:
+def files_of_arguments(command: Command, options: Namespace) -> Iterator[tuple[str, Any]]:
     """Arguments of a command that name files: ("", value), and the value of --machine: ("--machine", value)."""
     for parameter in command.options:
         if isinstance(parameter.option, Argument):
@@ -361,7 +361,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2. An option that does not exist is named before what else is missing."""
-        if message.startswith("the following arguments are required: ") and (wrong := self._misspelt()):
+        if message.startswith("the following arguments are required: ") and (wrong := self._unknown_options()):
             message = self._unknown(wrong)
         end = "" if message.endswith("?") else ";"
         self.exit(2, f"{self.prog}: error: {message}{end} {self.prog} --help lists what there is\n")
@@ -370,7 +370,7 @@ class Parser(argparse.ArgumentParser):
         self._typed = arg_strings
         return super()._parse_known_args(arg_strings, *more, **named)
 
-    def _misspelt(self) -> list[str]:
+    def _unknown_options(self) -> list[str]:
         typed = getattr(self, "_typed", [])
         typed = typed[: typed.index("--")] if "--" in typed else typed
         return [word for word in typed if word.startswith("--") and word.partition("=")[0] not in self.known()]

@@ -122,13 +122,13 @@ def thin_series(dense: Series | Trace, every: int) -> tuple[Series, Series]:
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
     for name, values in dense.columns.items():
-        below, above = _beside_the_line(dense.time, values, rows)
+        below, above = _distances_from_line(dense.time, values, rows)
         columns |= {name + BELOW: below, name + ABOVE: above}
         units |= dict.fromkeys((name + BELOW, name + ABOVE), dense.units[name])
     return kept, Series(kept.time, columns, units)
 
 
-def _beside_the_line(time: Array, values: Array, rows: Rows) -> tuple[Array, Array]:
+def _distances_from_line(time: Array, values: Array, rows: Rows) -> tuple[Array, Array]:
     """Per kept row the least and largest distance from the line since the kept row before; 0 of the first."""
     if len(rows) < 2:
         return np.zeros(len(rows)), np.zeros(len(rows))

@@ -97,10 +97,10 @@ def with_units(series: Series, given: Mapping[str, str]) -> Series:
     """With the units that are given for columns whose header gives none. given: pattern -> unit."""
     if not given:
         return series
-    return replace(series, units={name: unit or _given_unit(name, given) for name, unit in series.units.items()})
+    return replace(series, units={name: unit or _unit_of_column(name, given) for name, unit in series.units.items()})
 
 
-def _given_unit(name: str, given: Mapping[str, str]) -> str:
+def _unit_of_column(name: str, given: Mapping[str, str]) -> str:
     """Unit that is given for a column; "" without."""
     return next((unit for pattern, unit in reversed(list(given.items())) if matches(name, pattern)), "")
 
@@ -112,7 +112,7 @@ def repeated_units(headers: Mapping[str, str], names: Iterable[str], given: Mapp
     """
     twice: dict[str, list[str]] = {}
     for name in names:
-        header, unit = headers.get(name, ""), _given_unit(name, given)
+        header, unit = headers.get(name, ""), _unit_of_column(name, given)
         if not header or not unit:
             continue
         try:

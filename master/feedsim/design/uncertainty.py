@@ -268,7 +268,7 @@ def _draw_possible_axis(axis: Any, known: KnownValues, random: np.random.Generat
         friction, drive = _friction(axis.friction, drawn, factor), _drive(axis.drive, drawn, factor)
         if friction is not None and drive is not None:
             load = factor * drawn.get(LOAD, axis.constant_load)
-            parts = {} if factor == 1 else _behind_motor(axis, factor)
+            parts = {} if factor == 1 else _scale_further_friction(axis, factor)
             return axis.model_copy(update={"friction": friction, "drive": drive, "constant_load": load, **parts})
     raise _impossible_draws_error(known)
 
@@ -321,7 +321,7 @@ def _group_torques(drive: Drive, factor: float) -> dict[str, ParameterGroup]:
     return parameter_groups
 
 
-def _behind_motor(axis: Any, factor: float) -> dict[str, ParameterGroup]:
+def _scale_further_friction(axis: Any, factor: float) -> dict[str, ParameterGroup]:
     """Contact of the motor, and a guide with a law of its own, with their forces times `factor`."""
     parameter_groups: dict[str, ParameterGroup] = {}
     if axis.transmission is not None:

@@ -102,17 +102,17 @@ def in_threads(of: Callable[[S], T], values: Sequence[S]) -> list[T]:
     """
     count = 1 if _state["forked"] else min(cores(), len(values))
     if count < 2:
-        done = [_tried(of, value) for value in values]
+        done = [_result_or_error(of, value) for value in values]
     else:
         with ThreadPoolExecutor(count) as threads:
-            done = list(threads.map(lambda value: _tried(of, value), values))
+            done = list(threads.map(lambda value: _result_or_error(of, value), values))
     for _, error in done:
         if error is not None:
             raise error
     return [result for results, _ in done for result in results]
 
 
-def _tried(of: Callable[[S], T], value: S) -> tuple[list[T], Exception | None]:
+def _result_or_error(of: Callable[[S], T], value: S) -> tuple[list[T], Exception | None]:
     """The result, or the error."""
     try:
         return [of(value)], None

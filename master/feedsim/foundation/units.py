@@ -202,7 +202,7 @@ def unit(text: str) -> Unit:
     plain = re.sub(r" ?([.*/^()]) ?", r"\1", plain)
     plain = re.sub(r"(?<=[\w)])[ .](?=[\w(])", "*", plain)
     plain = re.sub(r"(?<=[\w)])\((?!$)|(?<=[0-9])(?=[a-zA-Z])", r"*\g<0>", plain)
-    if _product_behind_division(plain):
+    if _has_product_after_division(plain):
         raise InputError(f"unit {text!r} is ambiguous; put what stands under the line in brackets, as in N.m/(rad.s)")
     # Beside the units: powers of one digit, 1 as in 1/s, and each bracket closed.
     if not _EXPRESSION.fullmatch(plain) or _has_unbalanced_brackets(plain):
@@ -259,7 +259,7 @@ def _has_unbalanced_brackets(plain: str) -> bool:
     return depth != 0
 
 
-def _product_behind_division(plain: str) -> bool:
+def _has_product_after_division(plain: str) -> bool:
     """Whether a * follows a / on the same level of brackets: people differ on what N.m/rad.s means."""
     divided = [False]
     for c in plain:

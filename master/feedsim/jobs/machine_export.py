@@ -125,7 +125,7 @@ def machine_export(
     inputs = inputs_of(archives, base)
     result = result_of(ExportedFiles(archives, written, own, chosen), inputs)
     # All inputs have been read: what a folder held before is said to be replaced only where it will be.
-    kind = replace(KIND, may_write=(*KIND.may_write, *page.kept_apart(names)))
+    kind = replace(KIND, may_write=(*KIND.may_write, *page.names_of_written_files(names)))
     with claim_result_folder(out, kind, watch, inputs, force=force):
         if out is not None:
             result.save(out, force=force)

@@ -252,7 +252,7 @@ def run(
             if out is None or recorded is None:
                 done = _run(subject, None, page, friction_share, watch)
                 return result_of(_with_draws(done, subject, cloud, uncertain, watch))
-            with _rows_kept(recorded, watch):
+            with _announce_partial_rows(recorded, watch):
                 done = _run(subject, recorded, page, friction_share, watch)
                 result = result_of(_with_draws(done, subject, cloud, uncertain, watch), recorded)
                 result.save(out, figures=figures, force=force, control=control)
@@ -268,9 +268,9 @@ def _run(subject: OpenedRun, recorded: Partial | None, page: bool, friction_shar
         scratch=recorded.scratch if recorded is not None else None,
         sink=recorded,
     )
-    if friction_share and analysis.contours_asked(subject.plan, subject.program):
+    if friction_share and analysis.evaluates_contours(subject.plan, subject.program):
         raw = analysis.with_frictionless(raw, subject.fmus, watch.of(f"{subject.plan.name} nearly without friction"))
-    if analysis.stops_asked(subject.plan, subject.program):
+    if analysis.evaluates_stops(subject.plan, subject.program):
         raw = analysis.with_clamped(raw, subject.fmus, watch.of(f"{subject.plan.name} on mounts that hold still"))
     done = judge_run(raw)
     done = replace(done, warnings=subject.warnings(done.warnings))
@@ -295,7 +295,7 @@ def _with_draws(
 
 
 @contextmanager
-def _rows_kept(recorded: Partial, watch: Watch) -> Iterator[None]:
+def _announce_partial_rows(recorded: Partial, watch: Watch) -> Iterator[None]:
     """Say where the rows are of a run that does not come to its end."""
     try:
         with recorded:

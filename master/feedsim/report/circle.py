@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Diagnosis, Figure, explain_circle
-from feedsim.analysis.circle import CircleUnderTest, TurnedPath, term_name, worth_telling
+from feedsim.analysis.circle import CircleUnderTest, TurnedPath, actionable_causes, term_name
 from feedsim.analysis.circle.records import RecordedCircle
 from feedsim.analysis.circle.words import Change, compare_terms, sure_changes
 from feedsim.analysis.circularity import axis_letters
@@ -68,7 +68,7 @@ def answers(diagnosis: Diagnosis) -> list[str]:
 
 def first_action(diagnosis: Diagnosis) -> str:
     """What to type for the main cause; "" where nothing of a control takes it away."""
-    first = next(((term.key, term.axis) for term in worth_telling(diagnosis)), None)
+    first = next(((term.key, term.axis) for term in actionable_causes(diagnosis)), None)
     proposals = of_circle(diagnosis, None, None)
     return action(proposals) if proposals and proposals[0].of == first else ""
 
@@ -116,7 +116,7 @@ def report_of(
     labels = {"G": TILES["G"]} if diagnosis.arc is None else {"arc_range": "range of the deviation on the arc"}
     labels |= TILES if diagnosis.arc is None else {}
     own = {key: figures.get(f"{prefix}.{key}") for key in labels}
-    tiles = [cause_tile(diagnosis, term) for term in worth_telling(diagnosis)[:TILES_SHOWN]]
+    tiles = [cause_tile(diagnosis, term) for term in actionable_causes(diagnosis)[:TILES_SHOWN]]
     tiles += [Tile(tile_value(figure), labels[key], typeset(figure.meaning)) for key, figure in own.items() if figure]
     return Report(
         f"Recorded circle {prefix}",

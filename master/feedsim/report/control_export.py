@@ -52,7 +52,7 @@ MOST_NAMED = 3
 UNTOUCHED_REMARK = "No byte of the files differs but those of the values that are listed as written."
 
 
-def kept_apart(names: Iterable[str]) -> list[str]:
+def names_of_written_files(names: Iterable[str]) -> list[str]:
     """Names of the written files; one that a result has itself gets a word ahead."""
     own = {REPORT, SUMMARY, SHEET, "figures"}
     return [f"control_{name}" if name in own else name for name in names]
@@ -60,7 +60,7 @@ def kept_apart(names: Iterable[str]) -> list[str]:
 
 def name_contents(contents: Mapping[str, bytes]) -> dict[str, bytes]:
     """Name of the written file -> content."""
-    return dict(zip(kept_apart(contents), contents.values(), strict=True))
+    return dict(zip(names_of_written_files(contents), contents.values(), strict=True))
 
 
 def figures_of(written: WrittenFiles) -> dict[str, Figure]:

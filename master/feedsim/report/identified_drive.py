@@ -93,7 +93,7 @@ def compare_parameters(machine: Machine, estimates: Mapping[str, Mapping[str, Es
     return result
 
 
-def beside_section(machine: Machine, result: list[ComparedParameter]) -> Section | None:
+def comparison_section(machine: Machine, result: list[ComparedParameter]) -> Section | None:
     """All of them, in SI and in the control's words."""
     if not result:
         return None
@@ -116,7 +116,7 @@ def beside_section(machine: Machine, result: list[ComparedParameter]) -> Section
     return Section("Beside the machine file", [Table("llrrlrtl", heads, rows, NOTE)], "beside")
 
 
-def beside_part(result: list[ComparedParameter]) -> list[dict[str, Any]]:
+def comparison_part(result: list[ComparedParameter]) -> list[dict[str, Any]]:
     """The same in summary.json, in SI."""
     return [
         {
@@ -132,7 +132,7 @@ def beside_part(result: list[ComparedParameter]) -> list[dict[str, Any]]:
     ]
 
 
-def beside_lines(machine: Machine, result: list[ComparedParameter]) -> list[str]:
+def comparison_lines(machine: Machine, result: list[ComparedParameter]) -> list[str]:
     """Values that differ, a line each for the terminal."""
     control = requested_control(machine)
     names = names_of(control) if control else {}
@@ -328,7 +328,7 @@ def report_of(report: DriveReport) -> Report:
         ],
         main=[
             *(
-                [beside_section(report.subject.machine, _compared_parameters(report))]
+                [comparison_section(report.subject.machine, _compared_parameters(report))]
                 if report.subject is not None
                 else []
             ),
@@ -503,7 +503,9 @@ def details(report: DriveReport) -> dict[str, Any]:
         },
         **({"refused": dict(report.found.refused)} if report.found.refused else {}),
         **(
-            {"beside_the_machine_file": beside_part(_compared_parameters(report))} if report.subject is not None else {}
+            {"beside_the_machine_file": comparison_part(_compared_parameters(report))}
+            if report.subject is not None
+            else {}
         ),
         "inputs": inputs_part(hash_files(_files(report))),
     }
@@ -588,5 +590,5 @@ def summary_lines(report: DriveReport) -> list[str]:
         ]
     return [
         *lines,
-        *(beside_lines(report.subject.machine, _compared_parameters(report)) if report.subject is not None else ()),
+        *(comparison_lines(report.subject.machine, _compared_parameters(report)) if report.subject is not None else ()),
     ]

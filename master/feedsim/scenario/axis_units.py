@@ -340,7 +340,7 @@ class Drive(_Effects):
 
     @field_validator("T_n", "omega_0", "D", "current", "u_max", "R", "L_d", "L_q", "p")
     @classmethod
-    def _given_where_used(cls, value: object, info: ValidationInfo) -> object:
+    def _check_needed_value(cls, value: object, info: ValidationInfo) -> object:
         name = info.field_name or ""
         switch, used = _SWITCHES.get(name, ("ideal_current_loop", False))
         if value is None and info.data.get(switch, not used) is used:

@@ -436,7 +436,7 @@ class Mount(Model):
         return tuple(result)
 
     @model_validator(mode="after")
-    def _elastic_is_left(self) -> Self:
+    def _check_elastic_force(self) -> Self:
         for direction, (K_lin, K_e, F_max, x_2, _, _) in zip("XYZ", self.elements, strict=True):
             if K_e < 0:
                 raise fault(

@@ -172,14 +172,17 @@ def pose_use(
     followed = {axis.axis for axis in grid}
     change = pose_change(machine, {axis: reached for axis, reached in ranges.items() if axis not in followed})
     outside = tuple(
-        finding for axis in grid if axis.axis in ranges for finding in left_grid(axis, ranges[axis.axis], machine)
+        finding
+        for axis in grid
+        if axis.axis in ranges
+        for finding in warn_outside_grid(axis, ranges[axis.axis], machine)
     )
     doubt = None if grid else table_mismatch(machine)  # a plant that follows has modes of its own
     doubts = () if doubt is None else (doubt,)
     return PoseUse(change, grid, crossings, (*doubts, *outside, *warnings(change)))
 
 
-def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[Finding]:
+def warn_outside_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[Finding]:
     """The outermost cells reach on without end, but their modes are those of their centres."""
     travel = machine.axes[axis.axis].travel
     first, last = axis.reach

@@ -228,7 +228,7 @@ class _End:
 
 
 # Most of the time of a short run: the answer of an earlier process counts, for the same file, code and ends.
-def _kept_between(
+def _load_or_solve_changes(
     pose: _Pose, axis: str, low: float | None, high: float | None
 ) -> tuple[tuple[ModeChange, ...], tuple[Compliance, ...]]:
     """As _between; nothing of an axis that the structure does not know."""
@@ -255,7 +255,7 @@ def _with_modes(pose: _Pose, axis: AxisChange) -> AxisChange:
         None if abs(position - axis.pose) <= MIN_POSE_DISTANCE else round(position, DECIMALS)
         for position in (axis.low, axis.high)
     )
-    modes, compliances = _kept_between(pose, axis.axis, low, high)
+    modes, compliances = _load_or_solve_changes(pose, axis.axis, low, high)
     return replace(axis, modes=modes, compliances=compliances)
 
 

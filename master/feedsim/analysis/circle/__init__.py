@@ -9,12 +9,12 @@ from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, Vibration, 
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import separating_radius
 from feedsim.analysis.circle.words import (
+    actionable_causes,
     cause_sentence,
     describe_vibrations,
     explain_circle,
     suggest_circles,
     term_name,
-    worth_telling,
 )
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Term",
     "TurnedPath",
     "Vibration",
+    "actionable_causes",
     "cause_sentence",
     "describe_vibrations",
     "diagnose",
@@ -31,5 +32,4 @@ __all__ = [
     "separating_radius",
     "suggest_circles",
     "term_name",
-    "worth_telling",
 ]

@@ -259,7 +259,7 @@ class Tails:
     spread: Array
 
 
-def what_is_left(
+def remaining_after_windows(
     residual: Array, which: NDArray[np.int64], since: Array, window: float, usual: float
 ) -> list[tuple[float, float]]:
     """What the peak at each half axis leaves at the end of its window [m], and the angle in which that falls to 1/e

@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.doubts import MEANS_ANGLE, Tails, fading_tails, known_tails, what_is_left
+from feedsim.analysis.circle.doubts import MEANS_ANGLE, Tails, fading_tails, known_tails, remaining_after_windows
 from feedsim.analysis.circle.geometry import (
     ANGLE_TERMS,
     FEWEST_PITCHES,
@@ -258,10 +258,10 @@ def _fit_lost_motion(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape
     if max(windowed["lost_0"], windowed["lost_1"]) < PLAY:
         return windowed
     other = _fit_windows(circle, paths, shape._replace(play=True))
-    return other if _squares_behind_reversals(other) < _squares_behind_reversals(windowed) else windowed
+    return other if _squares_after_reversals(other) < _squares_after_reversals(windowed) else windowed
 
 
-def _squares_behind_reversals(result: Fit) -> float:
+def _squares_after_reversals(result: Fit) -> float:
     """What is left behind the reversals, in squares [m2]."""
     return sum(float((off[which >= 0] ** 2).sum()) for off, which in zip(result.residual, result.reversal, strict=True))
 
@@ -327,7 +327,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: ExcludedAngl
             tails = (
                 known_tails(circle, undone, paths, residual, which)
                 if all(axis in circle.drag for axis in circle.axes)
-                else fading_tails(undone, paths, what_is_left(residual, which, since, window, usual), window)
+                else fading_tails(undone, paths, remaining_after_windows(residual, which, since, window, usual), window)
             )
             if circle.recorded and whole:
                 waves = form_waves(angles, [path.sense for path in paths], np.split(residual, ends), clear)

@@ -218,7 +218,7 @@ def read_circle(
         days += filter(None, [recording.day])
         headers.add(file, recording.remarks)
         radius = headers.radius
-        both = _beside_each_other(recording)
+        both = _columns_of_both_directions(recording)
         polar = None if both else _polar(recording, axes)
         if both:
             recorded_turns, mean = _of_both(recording, *both, radius)
@@ -428,7 +428,7 @@ def _of_angles(
     return _record_circle(recording, phi, deviation, _time(recording), mean if radius is None else radius), mean
 
 
-def _beside_each_other(recording: Recording) -> tuple[str, Mapping[int, str]] | None:
+def _columns_of_both_directions(recording: Recording) -> tuple[str, Mapping[int, str]] | None:
     """The column of the angle, and those of the two directions by their sense; None where the file is another."""
     result = {sense: _column(recording, names, "m") for sense, names in WAYS.items()}
     angle = _column(recording, ANGLES, "rad") or _only(recording, "rad")

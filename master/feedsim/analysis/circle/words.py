@@ -33,7 +33,7 @@ def explain_circle(diagnosis: Diagnosis, remedy: str = "") -> str:
 
     remedy: of the main cause, where more is known of the machine than the circle shows.
     """
-    terms = worth_telling(diagnosis)
+    terms = actionable_causes(diagnosis)
     G = f"G = {_um(diagnosis.G)}"
     if diagnosis.arc is not None:
         G = f"on {_arc(diagnosis)} the radial deviation ranges over {_um(diagnosis.G)}"
@@ -60,7 +60,7 @@ def describe_causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
     return [(term, cause_sentence(diagnosis, term)) for term in diagnosis.terms]
 
 
-def worth_telling(diagnosis: Diagnosis) -> list[Term]:
+def actionable_causes(diagnosis: Diagnosis) -> list[Term]:
     """Causes that somebody can act on, the largest first."""
     able = [
         term for term in diagnosis.terms

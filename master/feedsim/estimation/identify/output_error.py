@@ -304,7 +304,7 @@ def dynamic(
         results = search.search_around(results, base)
         honest = uncertainty(search, results, known.open.values(), known.drift)
     if prior is None and has_sines(fine):
-        fixed |= _left_with(known, base)
+        fixed |= _mark_open_curve(known, base)
     result = _result(fine, search, honest, base, fixed, I_P, prior)
     tell("done", 1.0)
     return result
@@ -522,7 +522,7 @@ def _add_group(
     return solution, base
 
 
-def _left_with(known: _KnownValues, base: list[str]) -> dict[str, tuple[Status, str]]:
+def _mark_open_curve(known: _KnownValues, base: list[str]) -> dict[str, tuple[Status, str]]:
     """Friction over speed where sines alone leave a part of it open: that part is in all others, which are taken out of
     what is determined. Their values stay, as together they are what the sines show."""
     missing = [name for name in CURVE if any(name in names for names in known.open)]

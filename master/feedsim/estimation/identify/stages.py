@@ -146,7 +146,7 @@ class AxisRequest:
             )
         I_P = next(iter(pitches)) / (2 * pi)
         own = machine.axes.get(axis) if machine is not None else None
-        J, modes = self._given_inertia(I_P, sources), None
+        J, modes = self._inertia_from_user(I_P, sources), None
         if J is None and "inertia" not in self.estimated and machine is not None and own is not None:
             modes = checked_modes(machine)
             reason = f"J_tot of the modes of {machine.name}, whose flexibility is taken off the torque"
@@ -182,7 +182,7 @@ class AxisRequest:
             raise InputError("the traces do not say which axis they are of; give --axes, for example --axes Z")
         return next(iter(named))
 
-    def _given_inertia(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:
+    def _inertia_from_user(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:
         """What is said, else what the mapping says; None: neither, or it is to be estimated."""
         if self.mass is not None:
             return estimate("J", self.mass * I_P**2, status="given", reason=self.mass_reason)
@@ -417,7 +417,7 @@ class _Run:
             )
             return None
         self.progress("stage 1: Stribeck curve", 0, 1)
-        hold, free = self._held_values(CONSTANT_SPEED)
+        hold, free = self._constant_values(CONSTANT_SPEED)
         try:
             stage = stationary(result, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
             return stage if self.options.fleet is None else with_fleet(stage, self.options.fleet)
@@ -446,7 +446,7 @@ class _Run:
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
             self.prior = len(Points.of(first.plateaus).speeds) >= FEW_SPEEDS
-        hold, free = self._held_values((*self.law.names, "M_0"))
+        hold, free = self._constant_values((*self.law.names, "M_0"))
         rigid = self._rigid(others) if others and self.options.J is None else None
         try:
             return dynamic(
@@ -502,7 +502,7 @@ class _Run:
                 "J", remedy,
             ))  # fmt: skip
 
-    def _held_values(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
+    def _constant_values(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
         """What of `names` is held at which value, besides the usual ones, and what is freed."""
         constant = {
             name: self.options.fallback.get(name, NO_EFFECT[name])

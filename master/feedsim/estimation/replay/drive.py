@@ -39,14 +39,14 @@ from feedsim.estimation.identify.record import Record
 from feedsim.estimation.identify.result import Correlation, Estimate
 from feedsim.estimation.replay.closed_loop import AxisRecord, FitStart, Replay
 from feedsim.estimation.replay.estimates import (
-    beside_line,
-    beside_modes,
     contradicts_line,
     correlation_of,
     elastic_modes,
     estimates_of,
     one_way,
     refuse_poor,
+    widen_for_modes,
+    widen_for_rigid_line,
     with_undecided,
 )
 from feedsim.estimation.replay.machine_files import MOST_MODES, ElasticMode, begin_mode, resonance
@@ -384,9 +384,9 @@ def identify_drive(
         predicted = predicted[0], nan
     estimates = estimates_of(problem, found, unseen, delay, gain, structure_known)
     if may_be:
-        estimates = beside_modes(with_undecided(estimates, without, may_be), elastic_rivals)
+        estimates = widen_for_modes(with_undecided(estimates, without, may_be), elastic_rivals)
     if not structure_known:
-        estimates = beside_line(each, problem.machine, estimates)
+        estimates = widen_for_rigid_line(each, problem.machine, estimates)
     if begin is not None and begin.one_way:
         estimates = one_way(each, estimates, begin.one_way)
 

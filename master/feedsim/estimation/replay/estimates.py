@@ -242,7 +242,7 @@ def with_undecided(
     return wider
 
 
-def beside_modes(estimates: Mapping[str, Estimate], modes: Sequence[TriedRival]) -> dict[str, Estimate]:
+def widen_for_modes(estimates: Mapping[str, Estimate], modes: Sequence[TriedRival]) -> dict[str, Estimate]:
     """Estimates of a rigid axis whose record speaks for an elastic mode: the speed controller that makes up for it is
     another one."""
     shown = [one for one in modes if one.gain > one.least]
@@ -279,7 +279,9 @@ def contradicts_line(axis_record: AxisRecord, machine: Machine, J: float) -> boo
     return line is not None and not line.interval[0] <= J <= line.interval[1]
 
 
-def beside_line(axis_record: AxisRecord, machine: Machine, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+def widen_for_rigid_line(
+    axis_record: AxisRecord, machine: Machine, estimates: Mapping[str, Estimate]
+) -> dict[str, Estimate]:
     """Estimates held against what needs no structure of the drive: where the torque line of rigid motion says something
     else, an interval includes that. What rests on such an inertia is not determined."""
     result = dict(estimates)

@@ -39,7 +39,7 @@ from feedsim.simulation.cosim.roles import controller_parameters
 from feedsim.simulation.cosim.system import plant_parameters
 from feedsim.simulation.cosim.whole import open_whole, parameters
 from feedsim.simulation.judge import check as judged_ahead
-from feedsim.simulation.judge import exchange_stability, left_grid, warn_control_loops
+from feedsim.simulation.judge import exchange_stability, warn_control_loops, warn_outside_grid
 from feedsim.simulation.nc import Program
 from feedsim.structure import checked_modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
@@ -378,7 +378,9 @@ def pose_findings(machine: Machine, program: Program, resources: Path) -> list[F
     """What a run says of the positions that the program reaches: the page says it in place of it."""
     grid = {axis.axis: axis for axis in _grid(machine, resources)}
     ranges = {axis: program.reached(axis) for axis in program.x_s}
-    outside = [finding for axis in grid if axis in ranges for finding in left_grid(grid[axis], ranges[axis], machine)]
+    outside = [
+        finding for axis in grid if axis in ranges for finding in warn_outside_grid(grid[axis], ranges[axis], machine)
+    ]
     return [*outside, *warnings(pose_change(machine, {a: r for a, r in ranges.items() if a not in grid}))]
 
 

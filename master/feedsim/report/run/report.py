@@ -23,7 +23,7 @@ from feedsim.analysis import (
     program_notes,
     tasks,
 )
-from feedsim.analysis.circle import worth_telling
+from feedsim.analysis.circle import actionable_causes
 from feedsim.analysis.proposals import Proposal, waits_for_ringing
 from feedsim.files.trace import Trace
 from feedsim.foundation.units import show
@@ -128,7 +128,7 @@ def next_step(run: JudgedRun, causes: Mapping[str, Diagnosis], proposals: Sequen
     first = next(iter(proposals), None)
     if first is not None and first.proposed is not None:
         return Step(f"Try {change_words(first)}", "tune proposals", {"out": FOLDER})
-    named = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
+    named = [term.key for diagnosis in causes.values() for term in actionable_causes(diagnosis)[:1]]
     if named[:1] == ["peaks"]:
         return Step("See what friction compensation gains", "tune feedforward")
     for error in contours(run).values():
@@ -300,7 +300,7 @@ def accuracy_sections(run: JudgedRun) -> list[Section]:
 
 def first_proposals(proposals: Sequence[Proposal], causes: Mapping[str, Diagnosis]) -> Sequence[Proposal]:
     """The proposals where the first one is for the main cause of the first circle, or for a stop; else none."""
-    named = [term.key for diagnosis in list(causes.values())[:1] for term in worth_telling(diagnosis)[:1]]
+    named = [term.key for diagnosis in list(causes.values())[:1] for term in actionable_causes(diagnosis)[:1]]
     return proposals if [entry.of[0] for entry in proposals[:1] if entry.of[0]] == named else []
 
 
@@ -336,7 +336,7 @@ def answers(
 def cause_tiles(causes: Mapping[str, Diagnosis]) -> list[Tile]:
     """The first three causes of the first circle; none without causes."""
     first = next(iter(causes.values()), None)
-    return [] if first is None else [cause_tile(first, term) for term in worth_telling(first)[:TILES_SHOWN]]
+    return [] if first is None else [cause_tile(first, term) for term in actionable_causes(first)[:TILES_SHOWN]]
 
 
 def tiles(

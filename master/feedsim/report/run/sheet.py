@@ -175,7 +175,7 @@ def _fill_positioning_sheet(run: Run, task: AccuracyTask, sheet: Sheet) -> Fille
         ("Targets", f"{len(visits.targets)}, from {1e3 * visits.targets[0]:.6g} to {1e3 * visits.targets[-1]:.6g} mm"),
         ("Approaches", f"{visits.runs} of each side of each target"),
         ("Rest at a target", f"{min(rests):.3g} s; read at its end"),
-        *_given_conditions(sheet),
+        *_stated_conditions(sheet),
     ]
     readings = 1e6 * accuracy.deviations
     heads = ("Target [mm]", "Approach", *(f"{k + 1}" for k in range(visits.runs)), "x\u0305 [µm]", "s [µm]", "B [µm]")
@@ -218,7 +218,7 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> FilledSheet:
         ("Centre", ", ".join(f"{axis} {1e3 * at:.6g} mm" for axis, at in zip(turn.axes, turn.centre, strict=True))),
         ("Direction", " and ".join(SENSE_WORDS[turn.sense] for turn in task.turns)),
         ("Position by", "linear scales"),
-        *_given_conditions(sheet),
+        *_stated_conditions(sheet),
     ]
     names = [SENSE_WORDS[turn.sense] for turn in task.turns]
     grid = np.arange(0.0, 360.0, EVERY)
@@ -256,7 +256,7 @@ def _common(run: Run) -> list[tuple[str, str]]:
     return [("Machine", run.scenario.machine.name), ("Kind of test", SIMULATED_REMARK), ("Scenario", run.scenario.name)]
 
 
-def _given_conditions(sheet: Sheet) -> list[tuple[str, str]]:
+def _stated_conditions(sheet: Sheet) -> list[tuple[str, str]]:
     return [*sheet.conditions.items(), ("Uncertainty U (k = 2)", f"{1e6 * sheet.uncertainty:g} µm")]
 
 

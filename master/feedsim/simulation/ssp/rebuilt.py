@@ -82,7 +82,7 @@ def values(
         for component, names in parameters.items()
     }
     inputs: dict[tuple[str, str], _GivenValue] = {}  # the set that counts
-    for said in _all_said(structure, files, archives, where, problems):
+    for said in _values_in_order(structure, files, archives, where, problems):
         if len(problems) > parameter_set.MOST_PROBLEMS:
             break
         component, name, archive = said.component, said.name, archives[said.component]
@@ -115,7 +115,7 @@ def start_value(archive: Archive, name: str) -> Value:
     return parameter_set.value(declared, kind, "")
 
 
-def _all_said(
+def _values_in_order(
     structure: Structure, files: Mapping[str, bytes], archives: Mapping[str, Archive], where: str, problems: list[str]
 ) -> Iterator[_GivenValue]:
     """Of the components' own sets, then of the system's, in the order in which they count."""

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run axe ends check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all wasm-compiler page-module release lint format schemas reference check-reference bench bench-release worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
+.PHONY: help run axe ends check test test-all test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all wasm-compiler page-module release lint format schemas reference check-reference bench bench-release worst-case docs docs-test pictures pose-study identification-study drive-study friction-laws circle-study compensation-study band-coverage identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -169,9 +169,13 @@ check: fmus $(VENV)/.dev ## the quick set, below two minutes: layers, units of C
 	$(VENV)/bin/feedsim run scenarios/z_positioning.yaml --out $(BUILD)/check --quiet
 	@test -s $(BUILD)/check/report.html && echo "$(BUILD)/check/report.html is there"
 
-test: fmus $(VENV)/.importers ## everything: C tests, sanitisers, leak check, Python tests, other processors' arithmetic
+test: fmus $(VENV)/.importers ## C tests, sanitisers, leak check, Python tests but those marked extensive
 	@$(MAKE) -s -j2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-c test-sanitize test-sanitize-scenario test-valgrind
 	@$(MAKE) -s test-python
+
+# What does not fit beside every change: many draws, pairs of everything with everything, other processors' arithmetic.
+test-all: ## test, the tests marked extensive, other processors' arithmetic: what a release needs (an hour)
+	@$(MAKE) -s test CHOSEN=
 	@$(MAKE) -s test-processors
 
 # One scenario on units built with AddressSanitizer and UndefinedBehaviorSanitizer. Python itself is not built with them, so their
@@ -193,10 +197,11 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 # What tests start by the hundred finds feedsim compiled, even where the shell lets Python write no bytecode.
+CHOSEN := -m 'not extensive'
 test-python: fmus $(VENV)/.importers
 	@set -e; if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; \
 	else echo "no compiler for WebAssembly here: tests of pages are left out"; fi
-	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=80 --durations-min=5
+	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=40 --durations-min=5 $(CHOSEN)
 
 # Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").
 fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into every reader (ARGS="--seconds N --seed S")

@@ -125,6 +125,7 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
     assert [path.name for path in folder.iterdir()] == ["a.csv"], "nothing is half-written"
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if LEAVES[name].needs])
 def test_a_command_does_with_its_extra(name: str, folder: Path) -> None:
     brought = {module for extra in LEAVES[name].needs for module in installation.EXTRAS[extra]}

@@ -55,6 +55,7 @@ def test_a_click_leads_to_its_heading(task: str) -> None:
 # --- done as written ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(
     "page", commands.pages() if EVERY else [page for page in QUICK if commands.steps(page)],
     ids=lambda page: str(page.relative_to(ROOT)),

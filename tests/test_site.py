@@ -13,6 +13,8 @@ from urllib.parse import quote_plus, unquote
 
 import pytest
 
+pytestmark = pytest.mark.extensive
+
 pytest.importorskip("sphinx", reason="Sphinx is not installed (requirements-dev.lock)")
 ROOT = Path(__file__).resolve().parents[1]
 # What newcomers type, and the page that has to come first; of words that many pages have, among the first eight.

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from drawn_circles import Causes, driven
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, diagnose
 from feedsim.analysis.circle.words import compare_terms, sure_changes
+
+pytestmark = pytest.mark.extensive
 
 CIRCLE = CircleUnderTest(("X", "Z"), 0.1, 1 / 60, recorded=True)
 PAIRS, SAMPLES = 40, 720

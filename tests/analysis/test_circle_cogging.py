@@ -51,6 +51,7 @@ def diagnosed(radius: float, speed: float, torques: dict[int, list[tuple[int, fl
     return diagnose(circle, [path(radius, speed, sense, torques) for sense in (1, -1)])
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("radius", "speed"), [(0.03, 1 / 60), (0.06, 3 / 60), (0.06, 10 / 60)])
 def test_order_and_amplitude_come_back(radius: float, speed: float) -> None:
     found = [each for each in diagnosed(radius, speed, {0: [(6, 0.05, 0.3)]}).terms if each.key == "cogging"]
@@ -60,6 +61,7 @@ def test_order_and_amplitude_come_back(radius: float, speed: float) -> None:
     assert term_name(term) == "cogging of X, 6 per turn"
 
 
+@pytest.mark.extensive
 def test_two_axes_have_their_own() -> None:
     diagnosis = diagnosed(0.06, 0.05, {0: [(6, 0.05, 0.3)], 1: [(10, 0.03, -1.0)]})
     found = {(each.axis, each.order): each for each in diagnosis.terms if each.key == "cogging"}

@@ -92,6 +92,7 @@ def test_shares_add_up_to_the_deviation() -> None:
     assert told == sorted(told, reverse=True)
 
 
+@pytest.mark.extensive
 def test_the_first_cause_is_the_one_whose_removal_gains_most() -> None:
     """Drawn causes, eight at a time, each removed from the generator: the first that is named is the one without which
     G is least. FEEDSIM_DRAWS says how many circles are drawn."""
@@ -338,6 +339,7 @@ def drawn() -> tuple[Counter[str], Counter[str], list[tuple[str, float]]]:
     return there, within, absent
 
 
+@pytest.mark.extensive
 def test_each_cause_is_recovered_within_its_interval(
     drawn: tuple[Counter[str], Counter[str], list[tuple[str, float]]],
 ) -> None:

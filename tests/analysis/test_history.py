@@ -47,6 +47,7 @@ def simulated(level: Array, days: Array, random: np.random.Generator, between: f
     return changes([series(days, level, RELATIVE[0], between, random), *others])
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("count", "between", "histories"), [(12, BETWEEN, 100), (12, 0.0, 50), (5, BETWEEN, 50)])
 def test_false_alarms(count: int, between: float, histories: int) -> None:
     """1 % of 100 histories is 1; more than 2 have a probability of 8 % if the rate were as large as is stated."""

@@ -114,6 +114,7 @@ def test_lost_motion_is_that_of_the_reversals_on_the_arc() -> None:
     assert "on an arc of 120 deg the radial deviation ranges over" in explain_circle(found)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("group", ["ellipse", "lost motion", "bent guides", "drift", "all"])
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_no_arc_is_confidently_wrong(sweep: float, group: str) -> None:

@@ -69,6 +69,7 @@ def true(circle: CircleUnderTest, seen: Seen) -> dict[str, tuple[float, float]]:
     return found
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("group", GROUPS)
 def test_terms_are_in_their_intervals_and_none_is_invented(group: str) -> None:
     """In 90 % of all, or another circle is asked for; of each in what chance leaves of it in so many draws: three times
@@ -141,6 +142,7 @@ def test_no_edge_leaves_the_angles_unknown() -> None:
     assert math.degrees(found.deviation) == 2.5
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("timed", [False, True])
 @pytest.mark.parametrize("every", [1, 4])
 @pytest.mark.parametrize("degrees", [-100.0, -10.0, 50.0, 130.0])

@@ -18,6 +18,7 @@ KINDS = (
 )  # fmt: skip
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_called_estimated_holds_the_truth_or_a_warning_names_the_cause(kind: str, tmp_path: Path) -> None:
     flaws = () if kind == "good" else (kind,)

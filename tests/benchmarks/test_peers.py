@@ -11,6 +11,8 @@ import peers
 import pytest
 from peers_contestants import Outcome
 
+pytestmark = pytest.mark.extensive
+
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = "motions=[{kind: circle, plane: [X, Z], radius: 50 um, feed: 3 m/min, turns: 1}, {kind: dwell, duration: 9 ms}]"
 

@@ -18,6 +18,7 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Place:
     return Place(tmp_path_factory.mktemp("place"), fmus, seed=os.getpid())
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_ends_at_any_instant(command: str, place: Place) -> None:
     for _ in range(TRIALS[command]):

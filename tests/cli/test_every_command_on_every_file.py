@@ -172,6 +172,11 @@ SUBJECTS = (
     "empty.csv", "text.csv", "header.csv", "noise.bin", "mill.tea", "nothing",
     "missing.yaml", "missing/folder",
 )  # fmt: skip
+# They take most commands the longest way. A change of one command shows with the others.
+LONG = (
+    "capture.json", "gms.yaml", "short.yaml", "circle.yaml", "machines/gms", "machines/test_centre/machine.yaml",
+    "circle/result.csv",
+)  # fmt: skip
 
 
 def state(folder: Path) -> dict[str, str]:
@@ -183,7 +188,9 @@ def state(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("subject", SUBJECTS)
+@pytest.mark.parametrize(
+    "subject", [pytest.param(name, marks=pytest.mark.extensive) if name in LONG else name for name in SUBJECTS]
+)
 def test_every_command(subject: str, place: Path, fmus: Path, tmp_path: Path) -> None:
     before, faults = state(place), []
     for name in COMMANDS:

@@ -149,6 +149,7 @@ def test_a_faulty_structure_costs_the_comparison_alone(fmus: Path, tmp_path: Pat
     assert not any("truncation" in name for name in summary_of(tmp_path / "out")["figures"])
 
 
+@pytest.mark.extensive
 def test_a_plant_that_follows_the_pose_agrees_with_the_closed_form(fmus: Path, tmp_path: Path) -> None:
     plant = tmp_path / "machine" / "plant.fmu"
     folder = machine_folder(tmp_path, plant="plant.fmu")

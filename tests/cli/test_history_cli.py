@@ -253,6 +253,7 @@ def test_limit_of_a_simulated_figure_and_compensation(history: Command, tmp_path
     assert "compensation" in done.stdout
 
 
+@pytest.mark.extensive
 def test_machines_of_one_kind_become_a_prior(fmus: Path, tmp_path: Path) -> None:
     """Scatter that was put in; with fleet.yaml even sines alone determine F_C and F_S."""
     random = np.random.default_rng(3)

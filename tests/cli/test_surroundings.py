@@ -117,6 +117,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("name", "command"), [(name, each) for name in ROWS for each in ROWS[name].commands.split()])
 def test_surroundings(name: str, command: str, place: Path, fmus: Path, request: pytest.FixtureRequest) -> None:
     row, environment = ROWS[name], {**os.environ, **ROWS[name].environment}

@@ -130,6 +130,7 @@ def told(summary: dict[str, object]) -> list[str]:
     return [word for text in scenario["overrides"] for word in ("--set", text)]
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("command", ["run", "identify"])
 def test_ended_at_any_moment(command: str, place: Path, fmus: Path) -> None:
     """What was there before, or the new result, and rows of a run that was ended. No trace once the next has ended."""
@@ -155,6 +156,7 @@ def test_ended_at_any_moment(command: str, place: Path, fmus: Path) -> None:
     assert list((place / "temporary").iterdir()) == []
 
 
+@pytest.mark.extensive
 def test_a_study_goes_on_whatever_has_ended_it(place: Path, fmus: Path) -> None:
     """Its workers end with it, and what they have unpacked goes with the next."""
     assert main(["sweep", str(place / "study.yaml"), "--out", str(place / "whole"), "--workers", "0", "--quiet",

@@ -311,6 +311,7 @@ print(peak(1), peak(4))
 """
 
 
+@pytest.mark.extensive
 def test_memory_does_not_grow_with_the_duration(fmus: Path, tmp_path: Path) -> None:
     """Four times the rows; held in memory, the 67 columns of the 7500 further ones would be 4 MB."""
     words = [sys.executable, "-c", MEMORY, str(CIRCLE), str(tmp_path / "out"), str(fmus)]

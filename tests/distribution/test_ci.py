@@ -168,6 +168,7 @@ def test_without_feedsim_it_says_what_to_set(job: Path) -> None:
     assert "FEEDSIM names the wheel to install" in done.stderr
 
 
+@pytest.mark.extensive
 def test_what_cannot_be_installed_is_no_success(job: Path) -> None:
     done = script(job, FEEDSIM="./no-such.whl", PIP_NO_INDEX="1", PYTHON=sys.executable)
     assert done.returncode == 2
@@ -192,6 +193,7 @@ def wheel(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         return folder / backend.build_wheel(str(folder), {"platform": "any", "archives": str(fmus)})
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("way", WAYS[1:])
 def test_a_wheel_that_is_named_is_installed(way: Any, wheel: Path, job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no feedsim is on the search path."""
@@ -204,6 +206,7 @@ def test_a_wheel_that_is_named_is_installed(way: Any, wheel: Path, job: Path, mo
     assert told(job) == (1, 0)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("way", WAYS)
 def test_a_wheel_is_held_to_its_sum(way: Any, wheel: Path, job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (BORROWED | {"PYTHON": sys.executable}).items():
@@ -216,6 +219,7 @@ def test_a_wheel_is_held_to_its_sum(way: Any, wheel: Path, job: Path, monkeypatc
         assert way(job, RESULTS="results", REFERENCES="references", **given).returncode == code
 
 
+@pytest.mark.extensive
 def test_the_job_of_the_documents(wheel: Path, job: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its steps in their order: what a runner's own actions bring is there, what is run is run by bash."""
     text = (ROOT / "docs" / "comparing.md").read_text("utf-8")
@@ -247,6 +251,7 @@ def test_the_job_of_the_documents(wheel: Path, job: Path, fmus: Path, monkeypatc
     assert used == ["actions/checkout@v4", "actions/setup-python@v5", "run", "./ci", "actions/upload-artifact@v4"]
 
 
+@pytest.mark.extensive
 def test_a_container_runs_feedsim(wheel: Path, job: Path) -> None:
     """Its instructions in their order, by hand: files copied, the shell's lines run, the entry point with arguments.
 

@@ -15,6 +15,8 @@ import pytest
 from feedsim.foundation.installation import library_name
 from feedsim_distribution import backend
 
+pytestmark = pytest.mark.extensive
+
 LOOP, PLANNER = library_name("exchange"), library_name("planner")
 ROOT = Path(__file__).resolve().parents[2]
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "--no-input")

@@ -46,6 +46,7 @@ def sums_of(text: str) -> dict[str, str]:
     return {line[66:]: line[:64] for line in text.splitlines()}
 
 
+@pytest.mark.extensive
 def test_the_same_again(made: Path) -> None:
     first = {path.name: path.read_bytes() for path in (made / "first").iterdir()}
     assert first == {path.name: path.read_bytes() for path in (made / "second").iterdir()}

@@ -15,6 +15,7 @@ from fmu.unpacked import PLATFORM, UNITS, Archive, initialize, instantiate, unpa
 HEADERS = f"-I{checkout.STANDARD}"  # an importer has them
 
 
+@pytest.mark.extensive
 def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:
     compiler = toolchain.find_compiler()
     for name in ("first", "a longer name"):  # other folders, other paths
@@ -45,6 +46,7 @@ def test_sources_compile_without_a_warning(archive: Archive, tmp_path: Path) -> 
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.extensive
 def test_sources_compile_as_one_file_without_a_warning_and_to_the_same_tables(archive: Archive, tmp_path: Path) -> None:
     """As zig is given them: a macro that one file leaves behind is another file's."""
     sources = archive.folder / "sources"
@@ -65,6 +67,7 @@ def test_sources_compile_as_one_file_without_a_warning_and_to_the_same_tables(ar
     slave.freeInstance()
 
 
+@pytest.mark.extensive
 def test_sources_build_by_themselves(archive: Archive, tmp_path: Path) -> None:
     """As an importer of source-code FMUs does it: the files that the description lists, no definition, no option but
     where its own headers are."""
@@ -90,6 +93,7 @@ def test_the_headers_of_the_standard_are_left_to_the_importer(archive: Archive) 
     assert [path.name for path in (archive.folder / "sources").iterdir() if path.name.startswith("fmi2")] == []
 
 
+@pytest.mark.extensive
 def test_build_description_says_how_to_compile(archive: Archive, tmp_path: Path) -> None:
     path = archive.folder / "sources/buildDescription.xml"
     schema = Path(fmpy.__file__).parent / "schema/fmi3/fmi3BuildDescription.xsd"
@@ -142,6 +146,7 @@ int main(int count, char **guids) {
 """
 
 
+@pytest.mark.extensive
 def test_all_units_link_into_one_program(fmus: Path, tmp_path: Path) -> None:
     """Statically, each with its FMI2_FUNCTION_PREFIX; without resource files, hence with those embedded."""
     objects: list[Path] = []

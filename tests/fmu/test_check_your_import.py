@@ -32,6 +32,7 @@ def script() -> str:
     return match[1]
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("unit", ["friction", "friction_gms", "plant", "controller", "setpoint"])
 def test_all_the_same(unit: str, script: str, fmus: Path, tmp_path: Path) -> None:
     found = check(fmus / f"{unit}.fmu", tmp_path, script)

@@ -14,6 +14,8 @@ from feedsim_packager.resources import File
 from fmu.binary import of
 from fmu.unpacked import ROOT, Archive, unpack
 
+pytestmark = pytest.mark.extensive
+
 UNIT_C = ROOT / "tests/unit_c"
 HEADERS = f"-I{ROOT / 'src/fmi2/standard'}"
 FLAGS = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")

@@ -138,6 +138,7 @@ def test_same_machine_gives_the_built_archive(plant: Archive, tmp_path: Path) ->
         assert [name for name in kept if packed.read(name) != base.read(name)] == ["documentation/index.html"]
 
 
+@pytest.mark.extensive
 def test_building_with_tables_gives_the_repacked_archive(repacked: Archive, tmp_path: Path) -> None:
     """Binaries are left out: they are those of `fmus`, which may have been built elsewhere and for more platforms."""
     given = repacked.path.parents[1]

@@ -14,7 +14,10 @@ from fmu.unpacked import PLATFORM, UNITS, Archive, unpack
 from platforms import hosts
 from platforms.cases import Floats, cases
 
-pytestmark = pytest.mark.skipif(PLATFORM.suffix != ".so", reason="the driving program here is one for Linux")
+pytestmark = [
+    pytest.mark.extensive,
+    pytest.mark.skipif(PLATFORM.suffix != ".so", reason="the driving program here is one for Linux"),
+]
 FUNCTIONS = (
     *("Instantiate", "SetupExperiment", "EnterInitializationMode", "ExitInitializationMode", "SetReal", "GetReal"),
     *("SetRealInputDerivatives", "DoStep", "Terminate", "FreeInstance"),

@@ -173,6 +173,7 @@ def test_a_run_says_who_and_when(fault: str, native: bool, place: Callable[[str]
     nothing_left(folder)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("fault", FAULTS)
 def test_commands_end_with_3(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
     """A scenario, and the same as an SSP file."""
@@ -193,6 +194,7 @@ def undisturbed(compiled: Callable[[str], bytes], tmp_path_factory: pytest.TempP
     return cosim.run(write_plan(folder, "none", compiled), fmus=fmus).trace
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(
     ("fault", "native"), [*((fault, True) for fault in ENDING), ("pending", False), ("not a number", False)]
 )
@@ -208,6 +210,7 @@ def test_a_run_ends_with_the_unit_that_ends_it(
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("fault", HARMLESS)
 def test_a_run_goes_on_and_says_what_it_met(
     fault: str, place: Callable[[str], Path], fmus: Path, undisturbed: Trace, capfd: pytest.CaptureFixture[str]
@@ -223,6 +226,7 @@ def test_a_run_goes_on_and_says_what_it_met(
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("fault", ["lowers limits", "closes all", "forks", "fatal", "terminate crashes"])
 def test_the_next_run_knows_nothing_of_it(
     fault: str, place: Callable[[str], Path], fmus: Path, undisturbed: Trace, compiled: Callable[[str], bytes]
@@ -278,6 +282,7 @@ def test_measured_responses_have_the_limit_of_the_scenario(place: Callable[[str]
     assert FAULTS["sleep"][0] in done.stderr
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_study_goes_on(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
     """The run that fails is a row with its message; the others are made, where the unit can be loaded at all."""

@@ -51,7 +51,13 @@ def test_examples_of_docstrings(module: str, folder: Path, monkeypatch: pytest.M
     assert not found.failed
 
 
-@pytest.mark.parametrize("name", fs.__all__)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(n, marks=pytest.mark.extensive) if n in ("tune_compensation", "tune_drive") else n
+        for n in fs.__all__
+    ],
+)
 def test_every_name_of_the_front_door_has_an_example(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     example = doctest.DocTestParser().get_doctest(getattr(fs, name).__doc__, {}, name, None, None)

@@ -14,6 +14,8 @@ import pytest
 import feedsim as fs
 from feedsim.jobs.examples import examples
 
+pytestmark = pytest.mark.extensive
+
 NOTEBOOKS = {each.name: each.file for each in examples() if each.kind == "notebook"}
 # In place of the cell "parameters".
 REDUCED = {

@@ -44,6 +44,7 @@ def test_readers_withstand_what_a_fuzzer_makes_up(known: dict[str, readers.Kind]
     assert sum(counts.values()) > 20
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("kind", sizes.SIZES)
 def test_time_grows_with_the_size_of_a_file_alone(kind: str, known: dict[str, readers.Kind], tmp_path: Path) -> None:
     """Nested, long, wide or many of one thing: a megabyte is answered in seconds of a processor."""

@@ -10,6 +10,7 @@ from fuzz import units
 SECONDS = 9  # of each of the six units; the rest of the minute compiles them
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif(platform.system() == "Windows", reason="the driver maps files as POSIX has it")
 @pytest.mark.parametrize("unit", units.UNITS)
 def test_units_withstand_what_a_fuzzer_makes_up(unit: str, fmus: Path, tmp_path: Path) -> None:

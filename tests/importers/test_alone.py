@@ -24,6 +24,7 @@ def _agree(result: Result, expected: Result, *, first: int = 0) -> None:
         assert difference(result[key][first:], values[first:]) <= SAME * scale, key
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("case", alone.CASES, ids=lambda case: case.unit)
 def test_a_unit_alone(case: alone.Case, importer: Importer, fmus: Path, tmp_path: Path) -> None:
     if importer.sequential:
@@ -34,6 +35,7 @@ def test_a_unit_alone(case: alone.Case, importer: Importer, fmus: Path, tmp_path
     _agree(result, alone.by_hand(case, fmus))
 
 
+@pytest.mark.extensive
 def test_why_choices_are_no_enumerations(importer: Importer, fmus: Path, tmp_path: Path) -> None:
     """Most importers cannot set one; the page says so. Who learns it fails here, and the page is to be changed."""
     if importer.sequential or importer.master.zeros:
@@ -58,6 +60,7 @@ def test_a_unit_alone_in_simulate_fmu(case: alone.Case, fmus: Path) -> None:
     _agree(result, alone.by_hand(case, fmus))
 
 
+@pytest.mark.extensive
 def test_a_boolean_connection_carries(importer: Importer, fmus: Path, tmp_path: Path) -> None:
     """A drive that is released when the table has ended. In the wired system every drive always is, which one that took
     no notice of the connection would be, too."""
@@ -77,6 +80,7 @@ def test_a_boolean_connection_carries(importer: Importer, fmus: Path, tmp_path: 
     assert np.nanmax(np.abs(told[ended:])) > 0.1
 
 
+@pytest.mark.extensive
 def test_the_setpoint_unit_alone(move: z_move.Move, system: System, importer: Importer, tmp_path: Path) -> None:
     """The planned motion comes out bit by bit, held over the position cycle. One unit needs no second one: except in
     Maestro, which wants a connection."""

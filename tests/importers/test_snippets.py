@@ -16,6 +16,8 @@ from feedsim.files.trace import write_csv
 from feedsim.simulation import cosim, ssp
 from importers import document, with_ecos, z_move
 
+pytestmark = pytest.mark.extensive
+
 _PART = re.compile(r"^### (.+?)\n(.*?)(?=^##)", re.MULTILINE | re.DOTALL)
 _CODE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 NEEDS = {"ecos": "ecospy", "libcosim": "libcosimpy", "FMPy": "fmpy", "fmucontainer": "fmu_manipulation_toolbox"}

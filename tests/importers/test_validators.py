@@ -76,6 +76,7 @@ def _vdmcheck(archive: Path, rules: str, folder: Path) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("rules", RULES)
 def test_vdmcheck(archive: Path, rules: str, tmp_path: Path) -> None:
     said = [line for line in _vdmcheck(archive, rules, tmp_path).splitlines() if line]
@@ -83,6 +84,7 @@ def test_vdmcheck(archive: Path, rules: str, tmp_path: Path) -> None:
     assert {line for line in said if not line.startswith(notes)} == {"No errors found."}
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("rules", RULES)
 def test_vdmcheck_finds_a_fault(faulty: Path, rules: str, tmp_path: Path) -> None:
     assert "Errors found." in _vdmcheck(faulty, rules, tmp_path)

@@ -10,6 +10,8 @@ import pytest
 from importers import whole
 from importers.registry import SINGLE, Importer
 
+pytestmark = pytest.mark.extensive
+
 # At the control cycle, and at steps that meet its instants now and then. All steps, and random ones, in FMPy:
 # tests/cosim/test_one_unit.py.
 CASES = [("z_positioning", 125e-6), ("z_positioning", 7.3e-3), ("xz_circle", 1e-3), ("xz_circle", 7.3e-3)]

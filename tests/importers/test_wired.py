@@ -14,6 +14,8 @@ from importers.loops import Master
 from importers.registry import IMPORTERS, Importer
 from importers.system import RELEASE, Result, System
 
+pytestmark = pytest.mark.extensive
+
 # Our imitation makes the same calls with the same numbers: no bit differs, except in libcosim, whose steps differ from
 # 125 us by some 1e-17 s (time in whole nanoseconds, handed over as differences of such times): 1.4e-7 nm and 4e-8 mN.m
 # over the move. A hundred times that is allowed; another order or lag makes more than 100 nm, as tested below.

@@ -13,6 +13,7 @@ from page_browsers import WAIT, Opened, data_of, number_of
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
 
+@pytest.mark.extensive
 def test_knobs_by_keyboard_undo_keep_and_take_away(browser: Any, files: dict[str, Path]) -> None:
     with Opened(browser, files["z_positioning"]) as opened:
         page = opened.page
@@ -79,6 +80,7 @@ LESSONS = {
 }
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("name", LESSONS)
 def test_lessons_begin_unsolved_and_can_be_solved(browser: Any, files: dict[str, Path], name: str) -> None:
     knobs = data_of(files[name])["knobs"]
@@ -115,6 +117,7 @@ def test_without_scripts_the_scenario_is_shown_as_written(browser: Any, files: d
         assert opened.page.locator("#contour-XZ").bounding_box()["width"] > 700
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("width", [360, 800, 1600])
 def test_it_fits_at_any_width(browser: Any, files: dict[str, Path], width: int) -> None:
     with Opened(browser, files["xz_circle"], width=width) as opened:
@@ -151,6 +154,7 @@ MOVING = """() => [...document.querySelectorAll("#page *")]
     .filter(node => parseFloat(getComputedStyle(node).transitionDuration) > 0).length"""
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_contrast_is_enough_and_motion_is_reduced_where_asked(
     browser: Any, files: dict[str, Path], scheme: str

@@ -112,6 +112,7 @@ def expected(name: str) -> tuple[dict[str, Any], list[Expected]]:
     return data, found
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
 @pytest.mark.parametrize("name", SHORT)
 def test_random_states_are_runs_of_the_same_settings(name: str, tmp_path: Path) -> None:
@@ -145,6 +146,7 @@ def test_random_states_are_runs_of_the_same_settings(name: str, tmp_path: Path) 
         _compare_loop(page["loop"], each.asked)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("name", SHORT)
 def test_random_states_in_a_browser(browser: Any, name: str, tmp_path: Path) -> None:
     """The same in Chromium, as a reader of the page has it: figures to the digits shown, positions by the CSV."""

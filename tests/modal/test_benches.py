@@ -71,6 +71,7 @@ def test_a_drift_of_the_angle_leaves_the_lines(kind: str) -> None:
     assert np.quantile(np.abs(ratio - 1), 0.9) < 5e-3
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("kind", ["multisine", "binary", "noise"])
 @pytest.mark.parametrize("ratio", [0.3, 0.7, 1.05, 2.0, 4.0])
 def test_two_inertias_of_any_ratio(ratio: float, kind: str) -> None:

@@ -202,6 +202,7 @@ def test_sines_have_their_amplitude_and_frequency_between_the_fades(fade: float)
     assert x[-1] == 0
 
 
+@pytest.mark.extensive
 def test_a_faded_sine_has_a_continuous_acceleration_and_true_derivatives() -> None:
     move = SineMove(amplitude=1.0, frequency=1.0, periods=2)
     for fade in (0.5, 1.0, 1.3):

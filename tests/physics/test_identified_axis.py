@@ -122,6 +122,7 @@ def test_logs_without_noise_give_the_parameters(quiet: dict[str, Identification]
     assert abs(quiet[axis].estimates["delay"].value) < 20e-6
 
 
+@pytest.mark.extensive
 def test_every_noisy_log_gives_the_parameters(noisy: list[Identification]) -> None:
     for seed, result in enumerate(noisy):
         off = {name: value for name, value in errors(result).items() if abs(value) > GOALS[name][1]}

@@ -17,6 +17,8 @@ from feedsim.estimation.identify.parameters import estimate
 from feedsim.foundation.errors import InputError
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 
+pytestmark = pytest.mark.extensive
+
 I_P, J, M_0, H = 0.02 / (2 * pi), 0.0164, 0.2, 2e-3
 TRUE = Z_AXIS | {"spread": 35.0, "skew": 0.4, "sigma_1": 0.5, "C": 70.0}
 MOVES = ((5e-6, 10.0, 1.0), (20e-6, 5.0, 1.6), (100e-6, 2.0, 3.0), (400e-6, 1.0, 4.0))  # [m], [Hz], [s]

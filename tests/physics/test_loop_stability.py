@@ -78,6 +78,7 @@ def damped(modes: Modes, factor: float) -> Modes:
     return replace(modes, damping=modes.damping * factor)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(
     ("machine", "damping", "settings"),
     [

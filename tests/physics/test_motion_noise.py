@@ -19,6 +19,8 @@ from feedsim.estimation.least_squares import NORMAL_95
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 from identify_records import constant_speeds, noisy
 
+pytestmark = pytest.mark.extensive
+
 Floats = NDArray[np.float64]
 
 I_P = 0.02 / (2 * np.pi)

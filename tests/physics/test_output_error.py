@@ -146,7 +146,7 @@ def test_without_noise_the_parameters_come_back(law: FrictionLaw, closed_loop: c
     np.testing.assert_array_less(np.abs(errors(found)), [0.1, 0.1, 0.1, 0.3])
 
 
-@pytest.mark.statistics
+@pytest.mark.extensive
 @pytest.mark.parametrize("noise", ASKED)
 def test_monte_carlo(law: FrictionLaw, closed_loop: cosim.Run, noise: float) -> None:
     """Errors as asked at every seed, and their root mean square, bias included, within LIMIT of the Cramer-Rao bound.
@@ -175,6 +175,7 @@ def test_monte_carlo(law: FrictionLaw, closed_loop: cosim.Run, noise: float) -> 
     np.testing.assert_allclose(np.mean(told, axis=0), np.maximum(of_bound, least_told), rtol=0.1)
 
 
+@pytest.mark.extensive
 def test_a_late_torque_is_told_and_costs_sigma_1_nothing(law: FrictionLaw, closed_loop: cosim.Run) -> None:
     quiet = dynamic([logged(closed_loop, delay=0.5e-3)], law, prior=stage_1(1e-3), J=INERTIA)
     assert quiet.estimates["delay"].value == pytest.approx(0.5e-3, abs=0.1e-3)

@@ -69,6 +69,7 @@ def case(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Case:
         return Case(plan.machine, plants, recorded, run, errors, driven, study.errors(check, expected, recorded))
 
 
+@pytest.mark.extensive
 def test_the_error_falls_as_the_grid_is_refined(case: Case) -> None:
     # Cells of 40, 20 and 10 mm. K is wrong by what it changes over half a cell at most, so that the error halves.
     errors = [case.errors[count]["x_a rms"] for count in COUNTS]

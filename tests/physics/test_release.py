@@ -51,6 +51,7 @@ WITHOUT = {
 }
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("without", WITHOUT)
 @pytest.mark.parametrize("name", OPTIONS)
 def test_agrees_with_the_reference(archive: Archive, name: str, without: str) -> None:

@@ -101,6 +101,7 @@ def test_neutral_symmetry_leaves_the_radius(setpoint: str) -> None:
     assert abs(circle_figures(monolithic.frictionless(machine(setpoint)))["mean um"]) < 0.02
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("K_v", [3, 4, 5])
 def test_radius_change(K_v: float) -> None:
     neutral = with_drives(monolithic.machine(), K_v=K_v * 1000 / 60)
@@ -115,6 +116,7 @@ def test_radius_change(K_v: float) -> None:
         assert found == pytest.approx(expected, rel=0.005)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("setpoint", "expected"), [("ramped", -1.5), ("held", -1.2)])
 def test_lag_instead_of_dead_time(setpoint: str, expected: float) -> None:
     m = machine(setpoint)

@@ -48,6 +48,7 @@ def test_scenario_as_one_unit(wanted: system.Scenario, fmus: Path) -> None:
     assert len(found.variables) == len(wanted.variables)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("unit", "name", "held"), CASES)
 def test_what_is_off_between_the_rows_of_a_reference_is_found(unit: str, name: str, held: bool) -> None:
     """Half a unit more, or a tenth of the range, in every row that the reference has not: by its lines and bounds."""
@@ -101,6 +102,7 @@ def test_pinned_files_are_what_is_made(tmp_path: Path) -> None:
             np.testing.assert_allclose(fresh[name], values, rtol=share, atol=max(limit, share * np.ptp(values)))
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("wanted", friction_cases(), ids=lambda wanted: wanted.case.name)
 def test_own_error_of_the_friction_reference(wanted: Pinned) -> None:
     """Twice as many steps: what is left is far below what the files are compared to, a share of 1e-11."""
@@ -110,6 +112,7 @@ def test_own_error_of_the_friction_reference(wanted: Pinned) -> None:
         np.testing.assert_allclose(whole[name], halved[name], rtol=1e-15, atol=OWN_ERROR * np.ptp(halved[name]))
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("wanted", friction_gms_cases(), ids=lambda wanted: wanted.case.name)
 def test_own_error_of_the_reference_of_maxwell_slip(wanted: Pinned) -> None:
     case = make_reference.refined(read_case("friction_gms", wanted.case.name), wanted.case.step)

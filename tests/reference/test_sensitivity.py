@@ -11,6 +11,8 @@ import system
 from monolithic.machine import MODES_FILE
 from reference_files import HERE, read_case
 
+pytestmark = pytest.mark.extensive
+
 
 @pytest.mark.parametrize("held", [False, True], ids=["linear", "held"])
 @pytest.mark.parametrize("case", ["presliding", "reversal", "reversal_lugre", "stick", "constant_speed"])

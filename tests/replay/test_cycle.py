@@ -64,6 +64,7 @@ def test_values_that_depend_on_an_undecided_cycle() -> None:
     assert either["W"] == own["W"]
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("cycle", ["125 us", "2 ms"])
 def test_a_delay_of_half_a_cycle_does_not_hide_it(cycle: str, tmp_path: Path) -> None:
     """T_sym of 0.95 ms: taken for a drive that closes the loop every 125 us, a control that does so every 2 ms has a

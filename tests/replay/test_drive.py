@@ -102,6 +102,7 @@ def test_the_values_are_the_same_with_one_core_and_with_several(
     assert found[0].runs == found[1].runs
 
 
+@pytest.mark.extensive
 def test_a_rigid_machine_is_written_whole(tmp_path: Path) -> None:
     """Without a machine: a folder is made that the master runs. The axis is not rigid, and its control has a current
     loop and a reference model that a rigid machine leaves out: its inertia comes out within 5 % all the same."""
@@ -122,6 +123,7 @@ def test_a_rigid_machine_is_written_whole(tmp_path: Path) -> None:
     assert found.position < 5e-6
 
 
+@pytest.mark.extensive
 def test_the_cycle_of_the_position_loop_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A control that closes its position loop every 2 ms and logs it as the real one does, exact to the digits: taken
     for a drive that closes the loop every 125 us, the record was met to 10 um with T_sym at its bound of 0."""

@@ -76,6 +76,7 @@ def test_drawn_mounts_are_found_and_predict_unseen_jerks(rubber: Machine, fmus: 
         assert second.frequency == pytest.approx(first.frequency, rel=0.05)
 
 
+@pytest.mark.extensive
 def test_a_linear_machine_is_called_linear(rubber: Machine, fmus: Path) -> None:
     """The default machine, whose mounts are springs and whose modes are damped instead."""
     default = scenario.load_machine(SCENARIOS / "machines" / "test_centre")
@@ -117,6 +118,7 @@ def identified(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
     return folder
 
 
+@pytest.mark.extensive
 def test_the_sample_logs_are_explained(identified: Path) -> None:
     summary = summary_of(identified / "r")
     assert summary["verdict"] == "not linear"
@@ -138,6 +140,7 @@ def test_a_run_takes_what_was_found(identified: Path, fmus: Path) -> None:
     assert summary_of(identified / "run")["figures"]["Z.settling_time"]["value"] > 0
 
 
+@pytest.mark.extensive
 def test_speed_and_accelerometer_say_the_same(rubber: Machine, fmus: Path, tmp_path: Path) -> None:
     """Actual speed with its setpoint, and a universal file of an accelerometer whose clock is its own."""
     truth = with_factors(rubber, {"K_e": 0.9, "F_max": 1.2})

@@ -40,6 +40,7 @@ def test_a_real_machine(axis: str, position: float, torque: float, why: str) -> 
     assert found.estimates["T_dyn"].value + found.estimates["T_sym"].value == pytest.approx(8.25e-3, abs=1e-6)
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 def test_a_record_that_does_not_decide_on_the_position_cycle(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -81,6 +82,7 @@ def test_the_shipped_machine_on_the_record_that_it_is_of(tmp_path: Path) -> None
     assert all(text in moving for text in ("; 32.6", "; 37.19 Hz", "which no setpoint drives"))
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 @pytest.mark.parametrize(
     ("seen", "unseen", "most"), [("0 s..2.6 s", "2.6 s..4.6 s", 8.0), ("2.6 s..4.6 s", "0 s..2.6 s", 2.0)]
@@ -121,6 +123,7 @@ def test_the_published_controller_of_a_measured_axis() -> None:
     assert found.position < 2.5e-6
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 @pytest.mark.parametrize("window", ["0 s..0.6 s", "0.1 s..0.42 s", "0.6 s..1.2 s", "1.5 s..2.25 s", "0.75 s..2.2 s"])
 def test_a_real_axis_under_its_weight_that_moves_one_way(window: str, tmp_path: Path) -> None:
@@ -134,6 +137,7 @@ def test_a_real_axis_under_its_weight_that_moves_one_way(window: str, tmp_path: 
         assert status == 2
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 def test_intervals_of_stretches_overlap(tmp_path: Path) -> None:
     """A gentle move and a rapid one of X, 0.3 and 0.5 s, with nothing in common: what either states, the other allows.
@@ -159,6 +163,7 @@ def numbers_of(file: Path) -> tuple[list[str], list[float]]:
     return number.sub("#", text).split(), [float(one) for one in number.findall(text)]
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 def test_the_shipped_machine_is_what_its_command_makes(tmp_path: Path) -> None:
     """The command that stands in its file: values, intervals and modes, within a fifth of the digits that are shown of

@@ -62,6 +62,7 @@ def simple_axis(
     return scenario.machine, identify_drives(read, records, None, [], "made", "by a test", position_cycle=125e-6)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("limit", [0.8, 0.65])
 def test_torque_that_is_cut_off_determines_nothing(
     limit: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -130,6 +131,7 @@ logging:
 """
 
 
+@pytest.mark.extensive
 def test_an_axis_that_is_refused_does_not_take_another_along(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -160,6 +162,7 @@ def test_an_axis_that_is_refused_does_not_take_another_along(
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("by", "feed"), [(-3.0, 350.0), (-30.0, 6000.0), (60.0, 18000.0), (5.0, 600.0)])
 def test_motion_of_a_loaded_axis_in_one_direction(
     by: float, feed: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -192,6 +195,7 @@ def test_motion_of_a_loaded_axis_in_one_direction(
         assert not (tmp_path / "own" / "summary.json").exists()
 
 
+@pytest.mark.extensive
 def test_a_fit_that_leaves_most_of_the_torque_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A torque that is not of this motion: no drive is written, and the status says so."""
     machine = rigid_copy(MACHINES / "sinumerik_840d", tmp_path / "rigid")

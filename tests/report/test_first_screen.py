@@ -195,6 +195,7 @@ def test_the_diagnosis_names_the_same_peaks_as_the_figures() -> None:
     assert np.isfinite(figures["XZ.G"].value)
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif("FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (make axe)")
 @pytest.mark.parametrize("name", KINDS)
 def test_axe_core_finds_nothing(name: str, browser: Any, kinds: Kinds) -> None:

@@ -87,6 +87,7 @@ def test_structure_and_sheet_of_the_default_machine(tmp_path: Path, capsys: Capt
         assert "var(--" not in text
 
 
+@pytest.mark.extensive
 def test_a_mode_by_its_frequency_still_and_in_motion(tmp_path: Path, capsys: Capture) -> None:
     arguments = ["machine", "view", str(TEST_CENTRE), "--mode", "21Hz", "--animate", "--out", str(tmp_path)]
     assert cli.main(arguments) == 0

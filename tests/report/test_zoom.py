@@ -138,6 +138,7 @@ ZOOMED = """async ([figure, zooms]) => {
 }"""
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("name", [*(kind for kind in KINDS if kind != "machine"), "far"])
 def test_no_zoom_repeats_a_tick(name: str, browser: Any, kinds: Kinds, tmp_path: Path) -> None:
     page = opened(browser, far_page(tmp_path) if name == "far" else kinds.page(name))

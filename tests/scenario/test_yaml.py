@@ -182,6 +182,7 @@ def test_questions_in_comments_are_read_fast(monkeypatch: pytest.MonkeyPatch) ->
         assert values("  # why?\na: {b: 1} \n") == {"a": {"b": 1}}
 
 
+@pytest.mark.extensive
 def test_a_file_of_too_many_values_is_given_up_early() -> None:
     """A list of a hundred thousand groups, in brackets: neither parser composes it to its end first."""
     text = "motions:\n" + "  - {kind: dwell, duration: 10 ms}\n" * 100_000

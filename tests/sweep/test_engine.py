@@ -111,6 +111,7 @@ def test_a_run_that_kills_its_worker_once_is_made_on_another(crowd: tuple[Engine
     assert len(list(notes.glob("7-*"))) >= 2
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("way", ["kill", "segfault"])
 def test_a_run_that_always_kills_its_worker_is_a_row(crowd: tuple[Engine, Path], notes: Path, way: str) -> None:
     tasks = [chore(i, way) if i == 11 else chore(i, data=0.02) for i in range(40)]
@@ -123,6 +124,7 @@ def test_a_run_that_always_kills_its_worker_is_a_row(crowd: tuple[Engine, Path],
     assert len(list(notes.glob("11-*"))) <= 3
 
 
+@pytest.mark.extensive
 def test_exhausted_memory(crowd: tuple[Engine, Path], notes: Path) -> None:
     ways = {3: "exhaust", 5: "exhaust once"}
     tasks = [chore(i, ways.get(i, "sleep"), 0.01) for i in range(30)]
@@ -196,6 +198,7 @@ def test_a_script(tmp_path: Path) -> None:
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
+@pytest.mark.extensive
 def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     process = started(script(tmp_path, guarded=False))
     out, err = process.communicate(timeout=PATIENCE)
@@ -204,6 +207,7 @@ def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     assert out == ""
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 def test_a_signal_leaves_nothing_running(tmp_path: Path, number: int) -> None:
@@ -223,6 +227,7 @@ def test_a_signal_leaves_nothing_running(tmp_path: Path, number: int) -> None:
     assert "Error" not in err
 
 
+@pytest.mark.extensive
 def test_a_killed_client_leaves_no_workers(tmp_path: Path) -> None:
     process = started(script(tmp_path, guarded=True, count=100_000, seconds=0.05))
     assert process.stdout is not None

@@ -21,6 +21,8 @@ from feedsim.design.sweep.design import Outcome, Task
 from feedsim.design.sweep.engine import open_engine
 from feedsim.foundation.errors import InputError, SimulationError
 
+pytestmark = pytest.mark.extensive
+
 
 @pytest.fixture
 def a_cluster(tmp_path: Path) -> Iterator[Cluster]:

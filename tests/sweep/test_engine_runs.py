@@ -113,6 +113,7 @@ def test_two_local_workers(bundle: Bundle, reference: Rows) -> None:
         assert rows(engine.map(tasks())) == reference
 
 
+@pytest.mark.extensive
 def test_a_cluster_that_shares_no_folder(bundle: Bundle, reference: Rows, tmp_path: Path) -> None:
     """A scheduler and two workers; one is killed for good in the middle of the study."""
     with scheduler(tmp_path / "cluster") as cluster:

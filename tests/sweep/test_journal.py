@@ -148,6 +148,7 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [JOURNAL_NAME]
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 def test_killed_while_it_is_written(tmp_path: Path) -> None:
     """Five times killed at random moments: what was told to be added is there, once."""

@@ -71,6 +71,7 @@ def test_outermost_runs_have_all_figures(fmus: Path, file: Path) -> None:
         assert np.isfinite(found[pattern]).all(), pattern
 
 
+@pytest.mark.extensive
 def test_friction_never_breaks_its_rule() -> None:
     """F_S is at least F_C, in every seventh run looked at: the factors are cut so that it is."""
     study = load_study(FRICTION)

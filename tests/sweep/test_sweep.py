@@ -169,6 +169,7 @@ def test_another_state_of_the_study_is_refused(study: Write, fmus: Path, tmp_pat
     run(load_study(study(), runs=2), tmp_path / "out", workers=0, fmus=fmus)
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 def test_killed_and_continued(study: Write, fmus: Path, tmp_path: Path) -> None:
     """The whole command killed at random moments; the table in the end is that of a study nobody has disturbed."""

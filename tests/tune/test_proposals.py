@@ -198,6 +198,7 @@ def test_nothing_is_proposed_for_what_another_maker_drives(fmus: Path) -> None:
     assert of_run(replace(result, scenario=scenario.model_copy(update={"machine": gone})), causes, {}) == []
 
 
+@pytest.mark.extensive
 def test_try_runs_and_overlays(fmus: Path, tmp_path: Path) -> None:
     settings = ["--set", DRIVE.format("Z", "T_sym=4.158 ms")]
     plain = feedsim("run", CIRCLE, *settings, "--out", "plain", fmus=fmus, cwd=tmp_path)

@@ -164,6 +164,7 @@ def few_circles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(circles_module, "COUNT", 2)
 
 
+@pytest.mark.extensive
 @pytest.mark.usefixtures("few_circles")
 def test_the_command_leaves_values_that_a_scenario_takes(fmus: Path, tmp_path: Path) -> None:
     command = ("tune", "compensation", CIRCLE, "--kind", "pulse", "--out", "r")
@@ -305,6 +306,7 @@ def test_effects_of_other_machines() -> None:
     assert "guide" not in [effect.name for effect, _ in effects_of(own, ["Z"])]
 
 
+@pytest.mark.extensive
 @pytest.mark.usefixtures("few_circles")
 def test_a_compensation_is_judged_on_draws(fmus: Path, tmp_path: Path) -> None:
     """A friction set of 10 % doubt: the model, which takes nearly all off, leaves what the draws differ by."""

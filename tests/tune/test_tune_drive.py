@@ -376,6 +376,7 @@ def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
     assert found.machine is load(ONE).machine or not changed_values(load(ONE).machine, found.machine)
 
 
+@pytest.mark.extensive
 def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> None:
     """The drive changes, stays, stays: each time the files are of the present result, and what goes is named."""
     command = ("tune", "drive", ONE, "--axes", "X", "--evaluations", "10", "--out", "r")

@@ -88,6 +88,7 @@ def test_typed_values_do_not_vary(tmp_path: Path) -> None:
     assert typed_on(draw, machine, machine) == draw
 
 
+@pytest.mark.extensive
 def test_the_command_with_doubt(fmus: Path, tmp_path: Path) -> None:
     changed = ("--set", f"machine.axes.X.friction={identified(tmp_path, inertia=0.02)}")
     command = ("tune", "drive", ONE, "--axes", "X", "--evaluations", "10", *changed, "--out", "r")

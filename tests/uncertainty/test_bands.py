@@ -16,6 +16,8 @@ from feedsim.scenario import load
 from feedsim.simulation import cosim
 from identified_sets import CIRCLE, write_set
 
+pytestmark = pytest.mark.extensive
+
 SHORT = ("motions.0.radius=5 mm",)
 
 

@@ -351,6 +351,7 @@ def test_each_cause_is_recovered_within_its_interval(
         assert within[key] / count > 0.95 - 3 * math.sqrt(0.95 * 0.05 / count), key
 
 
+@pytest.mark.extensive
 def test_no_cause_is_invented(drawn: tuple[Counter[str], Counter[str], list[tuple[str, float]]]) -> None:
     *_, absent = drawn
     assert len(absent) > 1000

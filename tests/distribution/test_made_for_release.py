@@ -54,6 +54,7 @@ def test_the_same_again(made: Path) -> None:
     assert first["requirements.lock"] == (ROOT / "requirements.lock").read_bytes()
 
 
+@pytest.mark.extensive
 def test_wheels_hold_the_documentation(made: Path) -> None:
     for path in (made / "first").glob("*.whl"):
         with zipfile.ZipFile(path) as opened:
@@ -61,6 +62,7 @@ def test_wheels_hold_the_documentation(made: Path) -> None:
         assert pages == ["feedsim/shipped/site/how-to/page.html", "feedsim/shipped/site/index.html"]
 
 
+@pytest.mark.extensive
 def test_sums_are_of_every_file(made: Path) -> None:
     folder = made / "first"
     sums = sums_of((folder / "SHA256SUMS").read_text())
@@ -68,6 +70,7 @@ def test_sums_are_of_every_file(made: Path) -> None:
     assert all(hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest for name, digest in sums.items())
 
 
+@pytest.mark.extensive
 def test_units_come_with_references_icons_and_sums(made: Path, fmus: Path) -> None:
     with zipfile.ZipFile(made / "first" / f"feedsim-fmus-{VERSION}.zip") as opened:
         files = {name: opened.read(name) for name in opened.namelist()}
@@ -85,6 +88,7 @@ def test_units_come_with_references_icons_and_sums(made: Path, fmus: Path) -> No
     assert all(hashlib.sha256(files[name]).hexdigest() == digest for name, digest in sums.items())
 
 
+@pytest.mark.extensive
 def test_the_wheel_is_for_every_platform_and_has_its_libraries(made: Path) -> None:
     (path,) = (made / "first").glob("*.whl")
     assert path.name == f"feedsim-{VERSION}-py3-none-any.whl"
@@ -100,6 +104,7 @@ def test_libraries_of_all_platforms_lie_side_by_side() -> None:
     assert library_name("exchange") == f"exchange{host_target().ending}"
 
 
+@pytest.mark.extensive
 def test_bill_of_materials_has_what_is_locked(made: Path) -> None:
     bill = json.loads((made / "first" / f"feedsim-{VERSION}.cdx.json").read_text())
     assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.5")
@@ -113,6 +118,7 @@ def test_bill_of_materials_has_what_is_locked(made: Path) -> None:
     assert all(f"--hash=sha256:{digest}" in "".join(lines) for digest in digests)
 
 
+@pytest.mark.extensive
 def test_changes_are_those_of_the_changelog(made: Path) -> None:
     notes = (made / "first" / f"feedsim-{VERSION}-changes.md").read_text()
     head, changes = notes.split("\n\n", 1)

@@ -130,6 +130,7 @@ def test_every_noisy_log_gives_the_parameters(noisy: list[Identification]) -> No
         assert curve_error(result) < 0.01, f"seed {seed}"
 
 
+@pytest.mark.extensive
 def test_an_unknown_delay_is_told_and_costs_sigma_1_little(
     noisy: list[Identification], runs: dict[str, dict[str, cosim.Run]], law: FrictionLaw
 ) -> None:
@@ -166,6 +167,7 @@ def without_drift(result: Identification, name: str) -> float:
     return float(np.sqrt(variance))
 
 
+@pytest.mark.extensive
 def test_intervals_hold_what_they_promise(noisy: list[Identification]) -> None:
     """Scatter over the standard deviation that is said; 1.3 and 0.5: of 20 seeds the scatter itself is known to 16 %,
     and stage 1 says somewhat more than its scatter."""
@@ -195,6 +197,7 @@ def circle(frictions: dict[str, Friction], fmus: Path) -> dict[str, float]:
     return {name: figure.value for name, figure in analysis.evaluate(cosim.run(changed, fmus=fmus)).items()}
 
 
+@pytest.mark.extensive
 def test_the_identified_set_predicts_the_circle(
     quiet: dict[str, Identification], noisy: list[Identification], fmus: Path
 ) -> None:
@@ -205,12 +208,12 @@ def test_the_identified_set_predicts_the_circle(
             assert predicted[name] == pytest.approx(true[name], rel=0.02), name
 
 
-@pytest.mark.parametrize(("case", "reach"), [("quiet", 0.25), ("noisy", 0.6)])
+@pytest.mark.parametrize(("case", "reach"), [("quiet", 0.25), pytest.param("noisy", 0.6, marks=pytest.mark.extensive)])
 def test_the_identified_set_compensates_the_circle(
     case: str,
     reach: float,
     quiet: dict[str, Identification],
-    noisy: list[Identification],
+    request: pytest.FixtureRequest,
     runs: dict[str, dict[str, cosim.Run]],
     law: FrictionLaw,
     fmus: Path,
@@ -219,6 +222,7 @@ def test_the_identified_set_compensates_the_circle(
     if case == "quiet":
         sets = {axis: friction(each) for axis, each in quiet.items()}
     else:
+        noisy: list[Identification] = request.getfixturevalue("noisy")
         sets = {"Z": friction(noisy[0]), "X": friction(found(logs(runs["X"], "X", 0.05, LATE), law, "X"))}
     loaded = scenario.load(SCENARIOS / "xz_circle.yaml")
     done = compensate(loaded, nc.plan(loaded), frictions=sets, table=False, fmus=fmus)

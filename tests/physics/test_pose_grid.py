@@ -23,6 +23,8 @@ from feedsim.simulation import judge
 from feedsim.structure.poses import grid_axis, pose_grid
 from fmi_helpers import Archive, Instance
 
+pytestmark = pytest.mark.extensive
+
 Floats = NDArray[np.float64]
 
 START, END = 0.3, 0.34
@@ -69,7 +71,6 @@ def case(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Case:
         return Case(plan.machine, plants, recorded, run, errors, driven, study.errors(check, expected, recorded))
 
 
-@pytest.mark.extensive
 def test_the_error_falls_as_the_grid_is_refined(case: Case) -> None:
     # Cells of 40, 20 and 10 mm. K is wrong by what it changes over half a cell at most, so that the error halves.
     errors = [case.errors[count]["x_a rms"] for count in COUNTS]

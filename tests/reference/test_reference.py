@@ -77,6 +77,7 @@ def test_every_unit_has_its_cases() -> None:
 # --- the files
 
 
+@pytest.mark.extensive
 def test_pinned_files_are_what_is_made(tmp_path: Path) -> None:
     assert set(make_reference.make(tmp_path)) == NAMES | SYSTEMS
     made = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}

@@ -35,7 +35,7 @@ CASES: dict[str, tuple[list[str], ...]] = {
     "`frf`": (["frf", CIRCLE, "--quiet", "--out", "OUT"],),
     "`identify friction`, two logs": (
         ["identify", "friction", "LOGS", "--axes", "Z", "--machine", MACHINE, "--quiet", "--out", "OUT"],
-        ["identify", "LOGS", "--axes", "Z", "--machine", MACHINE, "--quiet", "--out", "OUT"],
+        ["identify", "LOGS", "--axis", "Z", "--machine", MACHINE, "--quiet", "--out", "OUT"],
     ),
     "`identify drive`": (
         ["identify", "drive", str(RECORDS / "log" / "log.csv"), "--columns", str(RECORDS / "log" / "columns.yaml"),
@@ -136,16 +136,18 @@ def main(words: Sequence[str] | None = None) -> int:
             run = [ROOT / ".venv/bin/feedsim", "run", f"scenarios/{name}.yaml", "--quiet", "--out", out]
             subprocess.run([str(word) for word in run], cwd=ROOT, check=True, capture_output=True)
             logs.append(str(out / "log.csv"))
-        for name in bench.only:
-            if bench.short and name not in SHOWN_SHORT:
-                continue
-            contestants = []
+        chosen = [name for name in bench.only if not bench.short or name in SHOWN_SHORT]
+        # All of them once, ahead of the first measurement: a command that fails does so at once.
+        cases: dict[str, list[Contestant]] = {name: [] for name in chosen}
+        for case, (name, contestants) in enumerate(cases.items()):
             for number, folder in enumerate((ROOT, other)):
-                files = {"OUT": [f"{place}/{number}"], "LOGS": logs}
+                # A folder a case: a result of one kind does not replace one of another.
+                files = {"OUT": [f"{place}/{number}-{case}"], "LOGS": logs}
                 feedsim = folder / ".venv" / "bin" / "feedsim"
                 command = known_words(feedsim, folder, CASES[name], lambda word, files=files: files.get(word, [word]))
                 force = ["--force"] if "--out" in command else []
                 contestants.append(Contestant(("now", "before")[number], timed([*command, *force], folder)))
+        for name, contestants in cases.items():
             costs = measure(contestants, bench.rounds, title=name)
             if is_slower(costs, "now", "before"):
                 slower.append(name)

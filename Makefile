@@ -169,12 +169,12 @@ check: fmus $(VENV)/.dev ## the quick set, below two minutes: layers, units of C
 	$(VENV)/bin/feedsim run scenarios/z_positioning.yaml --out $(BUILD)/check --quiet
 	@test -s $(BUILD)/check/report.html && echo "$(BUILD)/check/report.html is there"
 
-test: fmus $(VENV)/.importers ## C tests, sanitisers, leak check, Python tests but those marked extensive
+test: fmus $(VENV)/.importers ## C tests, sanitisers, leak check, Python tests but those for test-all
 	@$(MAKE) -s -j2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-c test-sanitize test-sanitize-scenario test-valgrind
 	@$(MAKE) -s test-python
 
 # What does not fit beside every change: many draws, pairs of everything with everything, other processors' arithmetic.
-test-all: ## test, the tests marked extensive, other processors' arithmetic: what a release needs (an hour)
+test-all: ## test, the tests marked extensive or statistics, other processors' arithmetic: what a release needs (an hour)
 	@$(MAKE) -s test CHOSEN=
 	@$(MAKE) -s test-processors
 
@@ -197,7 +197,7 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 # What tests start by the hundred finds feedsim compiled, even where the shell lets Python write no bytecode.
-CHOSEN := -m 'not extensive'
+CHOSEN := -m 'not extensive and not statistics'
 test-python: fmus $(VENV)/.importers
 	@set -e; if $(MAKE) -s wasm-compiler; then $(MAKE) -s page-module; \
 	else echo "no compiler for WebAssembly here: tests of pages are left out"; fi
@@ -242,7 +242,7 @@ reference: $(VENV)/.dev $(VARIABLES) ## make the pinned reference CSVs anew, fro
 check-reference: fmus $(VENV)/.run ## compare all units and both scenarios, wired and as one unit, with the pinned reference CSVs
 	$(PY) tests/reference/check_reference.py --junit $(BUILD)/check-reference.xml
 
-bench: fmus $(VENV)/.importers ## measure everything, other simulators too; writes docs/benchmarks and the pages' figures (seven minutes)
+bench: fmus $(VENV)/.importers ## measure everything, other simulators too; writes docs/benchmarks and the pages' figures (half an hour)
 	$(PY) benchmarks/all.py --images docs/images
 	$(PY) benchmarks/page.py
 

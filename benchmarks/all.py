@@ -1,4 +1,4 @@
-"""All benchmarks but the longest, one after the other, a process each; seven minutes on an idle machine.
+"""All benchmarks but the longest, one after the other, a process each; half an hour on two idle cores.
 
 Goes on where one fails, says at the end which have, and then exits with 1. Tables and figures are left in
 build/bench/<name>.md and <name>.json; those of an earlier run are removed first, so that none is taken for new.

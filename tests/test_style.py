@@ -54,12 +54,12 @@ def test_readme_fits_on_two_screens() -> None:
 def test_files_of_the_house_are_where_a_page_says(page: str) -> None:
     """By their path from the root, or its end; files of other repositories are none of the house."""
     text = (ROOT / page).read_text(encoding="utf-8")
-    named = re.findall(r"`([\w./*-]+/[\w./*-]+|[\w*-]+\.(?:py|c|h|js|def))`", text)
+    paths = re.findall(r"`([\w./*-]+/[\w./*-]+|[\w*-]+\.(?:py|c|h|js|def))`", text)
     places = [path for path in ("master/feedsim", "src", "tests", "docs", ".ci", "ci") if (ROOT / path).is_dir()]
-    assert len(named) > 10
+    assert len(paths) > 10
     missing = [
         name
-        for name in dict.fromkeys(named)
+        for name in dict.fromkeys(paths)
         if not any(ROOT.glob(name)) and not any(any((ROOT / place).rglob(name)) for place in places)
     ]
     assert sorted(set(missing) - {"demo/freq_trace.XML"}) == []

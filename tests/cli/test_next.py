@@ -154,7 +154,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
     return place
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize("kind", MADE)
 def test_the_next_command_works_as_it_is_printed(kind: str, folder: Path, fmus: Path) -> None:
     words, expected = MADE[kind]

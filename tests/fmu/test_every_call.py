@@ -244,7 +244,6 @@ def _goes_on(slave: Slave, place: str) -> None:
     slave.get(list(of(slave.archive, "output").values()))
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize("name", ALLOWED)
 @apart
 def test_every_function_in_every_state(archive: Archive, name: str) -> None:

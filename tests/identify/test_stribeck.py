@@ -74,7 +74,7 @@ def test_held_values_are_freed_on_request() -> None:
     assert held.estimates["F_C"].value == pytest.approx(1.6, rel=1e-6)
 
 
-@pytest.mark.extensive
+@pytest.mark.statistics
 def test_confidence_and_band_are_the_scatter() -> None:
     names = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
     values, curves, scores = [], [], []
@@ -198,8 +198,7 @@ def test_a_shape_that_is_held_wrongly_is_told(name: str, value: float, noise: fl
     assert not freeing(stribeck.stationary(plateaus, hold={"beta": 1.0, "v_log": 3.0}))
 
 
-@pytest.mark.extensive
-@pytest.mark.extensive
+@pytest.mark.statistics
 @pytest.mark.parametrize("scatter", [1.0, 5.0], ids=["noise", "beyond"])
 def test_scatter_is_no_shape(scatter: float) -> None:
     for seed in range(20):
@@ -292,7 +291,7 @@ def random_course(seed: int) -> Callable[[float], float]:
     )
 
 
-@pytest.mark.extensive
+@pytest.mark.statistics
 @pytest.mark.parametrize("order", ["slow to fast", "fastest first and last"])
 def test_intervals_are_the_scatter_by_warming(order: str) -> None:
     speeds = [*SPEEDS] if order == "slow to fast" else [SPEEDS[-1], *SPEEDS]

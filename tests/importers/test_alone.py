@@ -24,7 +24,6 @@ def _agree(result: Result, expected: Result, *, first: int = 0) -> None:
         assert difference(result[key][first:], values[first:]) <= SAME * scale, key
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize("case", alone.CASES, ids=lambda case: case.unit)
 def test_a_unit_alone(case: alone.Case, importer: Importer, fmus: Path, tmp_path: Path) -> None:
     if importer.sequential:

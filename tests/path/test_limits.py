@@ -126,7 +126,6 @@ def largest_use(planned: PlannedPath, t: Floats) -> tuple[float, float, float]:
     )
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_random_programs_keep_every_limit(group: int) -> None:
     for seed in range(group, COUNT, GROUPS):

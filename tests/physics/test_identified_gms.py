@@ -17,8 +17,6 @@ from feedsim.estimation.identify.parameters import estimate
 from feedsim.foundation.errors import InputError
 from feedsim.simulation.cosim.friction_law import FrictionLaw
 
-pytestmark = pytest.mark.extensive
-
 I_P, J, M_0, H = 0.02 / (2 * pi), 0.0164, 0.2, 2e-3
 TRUE = Z_AXIS | {"spread": 35.0, "skew": 0.4, "sigma_1": 0.5, "C": 70.0}
 MOVES = ((5e-6, 10.0, 1.0), (20e-6, 5.0, 1.6), (100e-6, 2.0, 3.0), (400e-6, 1.0, 4.0))  # [m], [Hz], [s]
@@ -73,6 +71,7 @@ def test_pre_sliding_comes_back(law: FrictionLaw, solutions: list[Record], noise
         assert abs(each.value - true) < 1.96 * each.sigma, each
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("seed", [2, 19])
 def test_valleys_of_noise_are_left(law: FrictionLaw, solutions: list[Record], seed: int) -> None:
     """5 % noise, of which these draws once ended 15 standard deviations off in sigma_0, and 230 off in skew.

@@ -232,7 +232,6 @@ def measured(
     return {output: back @ np.array(values)[SETTLE:] for output, values in rows.items()}
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize(
     ("name", "amplitude"), [("Z.M_add", 0.5), ("X.n_add", 0.05), ("Z.x_s", 2e-6), ("tool.F_Z", 50.0)]
 )

@@ -82,7 +82,6 @@ def reference(run: Run, machine: Path, step: float = 2.5e-6) -> dict[str, Array]
     return monolithic.simulate(model, setpoints, duration=float(run.trace.time[-1]), step=step)
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize(("motions", "jerk"), [(STOP, 150), (STOP, 500), (CIRCLE, 150)])
 def test_runs_agree_with_a_program_of_their_own(rubber: Path, fmus: Path, motions: str, jerk: int) -> None:
     """Within 2 nm at the control cycle, and of second order: what is left is the exchange with friction."""

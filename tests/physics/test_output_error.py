@@ -146,7 +146,7 @@ def test_without_noise_the_parameters_come_back(law: FrictionLaw, closed_loop: c
     np.testing.assert_array_less(np.abs(errors(found)), [0.1, 0.1, 0.1, 0.3])
 
 
-@pytest.mark.extensive
+@pytest.mark.statistics
 @pytest.mark.parametrize("noise", ASKED)
 def test_monte_carlo(law: FrictionLaw, closed_loop: cosim.Run, noise: float) -> None:
     """Errors as asked at every seed, and their root mean square, bias included, within LIMIT of the Cramer-Rao bound.

@@ -132,7 +132,7 @@ def main(arguments: list[str] | None = None) -> int:
         tests = given.pytest or [str(TESTS / place) for place in (ALL if given.all else setting.tests)]
         begun = time.perf_counter()
         spread = ["-n", "auto", "--dist", "loadfile", "-p", "no:cacheprovider", "--durations=5"]
-        which = [] if given.all or given.pytest else ["-m", "not extensive"]
+        which = [] if given.all or given.pytest else ["-m", "not statistics"]
         command = [sys.executable, "-m", "pytest", "-q", *spread, *plugin, *which, *tests]
         done = subprocess.run(command, env=environment, check=False)
         print(f"{setting.name}: {time.perf_counter() - begun:.0f} s", flush=True)

@@ -43,7 +43,6 @@ COLUMNS = drive_helpers.COLUMNS + "speed_setpoint: {column: X.n_s}\nfeedforward:
 TWO = [ElasticMode(24.0, 0.03, 0.2, 0.2), ElasticMode(47.0, 0.02, 0.35, -0.3)]
 
 
-@pytest.mark.extensive
 def test_modes_of_a_simulated_axis_come_back(tmp_path: Path) -> None:
     """Two modes, a log of 2 ms, 5 % noise on the torque and 0.1 um on the position: two modes are found, no more, and
     their frequencies within 2 %. The position is met nearly to its noise (a rigid axis: 0.35 um and more), and what is

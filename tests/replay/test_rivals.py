@@ -37,7 +37,6 @@ CURRENT_LOOP = ("drive.ideal_current_loop=false", "drive.current={K_p: 22 V/A, T
 REFERENCE_MODEL = ("drive.reference_model=true", "drive.omega_0=900 rad/s", "drive.D=1.3", "drive.T_sym=3.5 ms")
 
 
-@pytest.mark.extensive
 @pytest.mark.parametrize(
     ("changes", "taken"),
     [((), []), (CURRENT_LOOP, ["current loop"]), (REFERENCE_MODEL, ["reference model"])],

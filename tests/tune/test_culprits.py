@@ -30,7 +30,6 @@ def circle(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder / "xz_circle.yaml")
 
 
-@pytest.mark.extensive
 def test_the_parameter_that_is_off_is_named(circle: str) -> None:
     """Twenty draws of the default machine: axis, parameter and factor at random. Nothing contradicts anything."""
     draw = random.Random(40)

@@ -164,7 +164,6 @@ def few_circles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(circles_module, "COUNT", 2)
 
 
-@pytest.mark.extensive
 @pytest.mark.usefixtures("few_circles")
 def test_the_command_leaves_values_that_a_scenario_takes(fmus: Path, tmp_path: Path) -> None:
     command = ("tune", "compensation", CIRCLE, "--kind", "pulse", "--out", "r")

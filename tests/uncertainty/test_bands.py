@@ -16,11 +16,10 @@ from feedsim.scenario import load
 from feedsim.simulation import cosim
 from identified_sets import CIRCLE, write_set
 
-pytestmark = pytest.mark.extensive
-
 SHORT = ("motions.0.radius=5 mm",)
 
 
+@pytest.mark.extensive
 def test_bands_hold_what_other_draws_give(tmp_path: Path, fmus: Path) -> None:
     """39 draws hold 95 % of further ones on average. If one value moved all of a curve, the share would have a beta
     distribution of 38 and 2, with a deviation of 3.4 %; eight values move different parts."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +18,9 @@ from drive_helpers import COLUMNS, MACHINES, SCENARIO, identified, logged
 from feedsim.cli import main
 from feedsim.estimation.identify import Record
 from feedsim.estimation.replay.closed_loop import AxisRecord, read_axes
-from feedsim.estimation.replay.drive import feedforward_of
+from feedsim.estimation.replay.drive import DriveFound, feedforward_of
 from feedsim.estimation.replay.identified import _refuse_implausible
+from feedsim.estimation.replay.tuning import Problem
 from feedsim.files.columns import load_columns
 from feedsim.files.trace import write_csv
 from feedsim.files.trace.trace import Array
@@ -88,18 +92,56 @@ def test_intervals_hold_the_truth_under_noise(tmp_path: Path) -> None:
     assert misses <= 4
 
 
+def same_with_one_core_and_with_three(monkeypatch: pytest.MonkeyPatch, identify: Callable[[], DriveFound]) -> None:
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+        found.append(identify())
+    assert found[0].estimates == found[1].estimates
+    assert found[0].parts == found[1].parts
+    assert [(one.name, one.gain, one.taken) for one in found[0].rivals] == [
+        (one.name, one.gain, one.taken) for one in found[1].rivals
+    ]
+    assert found[0].runs == found[1].runs
+
+
 def test_the_values_are_the_same_with_one_core_and_with_several(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the last bit, and so is the number of runs: threads share the runs of a Jacobian."""
     machine = load_machine(MACHINES / "one_axis")
     log = logged(tmp_path, "X", "M_a: 2 %", machine=MACHINES / "one_axis")
-    found = []
+    same_with_one_core_and_with_three(monkeypatch, lambda: identified(log, "X", machine)[0])
+
+
+@pytest.mark.extensive
+def test_structures_tried_side_by_side_are_those_of_one_core(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of an axis whose structure is not known: parts of the friction law and rival structures, fitted in processes."""
+    monkeypatch.setattr(threading, "active_count", lambda: 1)  # whatever other tests have started in this process
+    log = logged(tmp_path, "X", "M_a: 2 %", machine=MACHINES / "one_axis")
+    (tmp_path / "columns.yaml").write_text(COLUMNS)
+    mapping = load_columns(tmp_path / "columns.yaml")
+    same_with_one_core_and_with_three(monkeypatch, lambda: identified(log, "X", mapping=mapping)[0])
+
+
+def test_a_problem_does_not_see_what_others_beside_it_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start and weights are its own, runs are summed up: the same with one core and with three."""
+    monkeypatch.setattr(threading, "active_count", lambda: 1)  # whatever other tests have started in this process
+    nothing: Any = None
     for cores in (1, 3):
         monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
-        found.append(identified(log, "X", machine)[0])
-    assert found[0].estimates == found[1].estimates
-    assert found[0].runs == found[1].runs
+        problem = Problem(nothing, nothing, nothing, {"J": 1.0}, None, 1.0, {}, np.arange(3), runs=5)
+
+        def change(beside: Problem, value: float) -> dict[str, float]:
+            before = beside.start
+            beside.start, beside.runs = beside.start | {"J": value}, beside.runs + int(value)
+            return before
+
+        done = problem.branch(change, [2.0, 3.0, 4.0])
+        assert [before for before, _ in done] == 3 * [{"J": 1.0}]
+        assert [beside.start["J"] for _, beside in done] == [2.0, 3.0, 4.0]
+        assert problem.start == {"J": 1.0}
+        assert problem.runs == 5 + 2 + 3 + 4
 
 
 @pytest.mark.extensive

@@ -103,19 +103,10 @@ def friction_parts(
         # As near to its end as what it is compared with.
         tuned = problem.near(problem.continued(tuned))
         score = _predict_parts(problem, tuned)
-        tried = {}
-        for part, block in BLOCKS.items():
-            if part in chosen:
-                continue
-            begin = {**tuned.values, **{name: _start_value(problem, name) for name in block}}
-            tried[part] = problem.fitted([*tuned.names, *block], begin, tuned)
-            if _at_end(problem, tried[part], block):
-                gains[part] = -inf
-                continue
-            tried[part] = problem.near(tried[part])
-            by = _predict_parts(problem, tried[part]) - score
-            # Both partitions ask for it: what one gains at the other's cost is no law.
-            gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
+        parts = [part for part in BLOCKS if part not in chosen]
+        done = problem.branch(partial(_try_part, tuned=tuned, score=score), parts)
+        tried = {part: fit for part, ((fit, _), _) in zip(parts, done, strict=True)}
+        gains |= {part: gain for part, ((_, gain), _) in zip(parts, done, strict=True)}
         asked = [part for part in tried if gains[part] >= MIN_LIKELIHOOD_GAIN]
         if not asked:
             undecided = [value for part, value in tried.items() if gains[part] > -MIN_LIKELIHOOD_GAIN]
@@ -124,6 +115,19 @@ def friction_parts(
         tuned = tried[asked[0]]
         problem.weigh(tuned)
     return tuple(chosen), gains, tuned, undecided
+
+
+def _try_part(problem: Problem, part: str, tuned: DriveFit, score: Array) -> tuple[DriveFit, float]:
+    """A fit with one part more than `tuned`, and the gain over its score."""
+    block = BLOCKS[part]
+    begin = {**tuned.values, **{name: _start_value(problem, name) for name in block}}
+    fit = problem.fitted([*tuned.names, *block], begin, tuned)
+    if any(problem.no_effect(name, fit.values[name]) for name in block):  # the record does not determine it
+        return fit, -inf
+    fit = problem.near(fit)
+    by = _predict_parts(problem, fit) - score
+    # Both partitions ask for it: what one gains at the other's cost is no law.
+    return fit, float(np.sum(by) if np.all(by > 0) else np.min(by))
 
 
 def with_elastic_modes(problem: Problem, result: DriveFit, count: int | None) -> tuple[DriveFit, Mapping[int, float]]:
@@ -142,21 +146,18 @@ def with_elastic_modes(problem: Problem, result: DriveFit, count: int | None) ->
         one = resonance(problem.each, simulated, problem.per_row, K_v)
         if one is None:
             break
-        before, start = result, dict(problem.start)
-        best: tuple[float, DriveFit, dict[str, float]] | None = None
-        for sign in (1.0, -1.0):
-            first = begin_mode(k, one, sign)
-            problem.start = start | first
-            with suppress(InputError):  # the units cannot run it
-                fit = problem.fitted([*before.names, *first], {**before.values, **first}, before)
-                cost = float(np.sum(fit.residuals**2))
-                if best is None or cost < best[0]:
-                    best = cost, fit, problem.start
-        problem.start = start
-        if best is None:
+        before, start = result, problem.start
+        fits = [
+            (fit, beside.start)
+            for fit, beside in problem.branch(
+                partial(_fit_mode, before=before), [begin_mode(k, one, sign) for sign in (1.0, -1.0)]
+            )
+            if fit is not None
+        ]
+        if not fits:
             break
-        problem.start = best[2]
-        fit = problem.near(best[1])
+        fit, problem.start = min(fits, key=lambda one: float(np.sum(one[0].residuals ** 2)))
+        fit = problem.near(fit)
         gain = _likelihood(problem, fit, folds) - _likelihood(problem, before, folds)
         predicted[k] = prediction_errors(problem, fit, folds)[0] * problem.weights["position"]
         if count is None and not gain > MIN_LIKELIHOOD_GAIN:
@@ -168,14 +169,18 @@ def with_elastic_modes(problem: Problem, result: DriveFit, count: int | None) ->
     return result, predicted
 
 
+def _fit_mode(problem: Problem, begin: dict[str, float], before: DriveFit) -> DriveFit | None:
+    """A fit with one elastic mode more; None: the units cannot run it."""
+    problem.start = problem.start | begin
+    try:
+        return problem.fitted([*before.names, *begin], {**before.values, **begin}, before)
+    except InputError:
+        return None
+
+
 def _start_value(problem: Problem, name: str) -> float:
     F_C = problem.start["F_C"]
     return {"F_log": 0.1 * F_C, "gamma": 0.5, EXCESS: 0.1 * F_C, "asymmetry": 0.0}.get(name, problem.start[name])
-
-
-def _at_end(problem: Problem, tuned: DriveFit, block: Sequence[str]) -> bool:
-    """Whether a part sits at a bound: the record does not determine it."""
-    return any(problem.no_effect(name, tuned.values[name]) for name in block)
 
 
 def _predict_parts(problem: Problem, tuned: DriveFit) -> Array:
@@ -493,26 +498,23 @@ def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict
 
     Raises InputError: the units can run none of them.
     """
-    weights = problem.weights
-    best: tuple[float, dict[str, float], dict[str, float], DriveFit] | None = None
-    failed: InputError | None = None
-    for start in candidates:
-        problem.start, problem.weights = start, dict(weights)
+
+    def first(beside: Problem, start: dict[str, float]) -> tuple[float, DriveFit | InputError]:
+        """How much a first fit leaves, and the fit; or why there is none."""
+        beside.start = start
         try:
-            found = problem.first(free)
+            fit = beside.first(free)
         except InputError as error:
-            failed = error
-            continue
+            return inf, error
         # Weights are of each fit's own residuals: fits are compared by those, and by how far the start is away.
-        left = independent(problem, len(problem.rows)) * (log(rms(found.position)) + log(rms(found.torque)))
-        left += 0.5 * float(np.sum(found.residuals[2 * len(problem.rows) :] ** 2))
-        if best is None or left < best[0]:
-            best = left, start, problem.weights, found
-    if best is None:
-        assert failed is not None
-        raise failed
-    _, problem.start, problem.weights, found = best
-    return found
+        remaining = independent(beside, len(beside.rows)) * (log(rms(fit.position)) + log(rms(fit.torque)))
+        return remaining + 0.5 * float(np.sum(fit.residuals[2 * len(beside.rows) :] ** 2)), fit
+
+    (_, best), beside = min(problem.branch(first, candidates), key=lambda one: one[0][0])
+    if isinstance(best, InputError):
+        raise best
+    problem.start, problem.weights = beside.start, beside.weights
+    return best
 
 
 # --- Whether the position of a record can be that of an axis that follows its setpoint, by the record alone -----------

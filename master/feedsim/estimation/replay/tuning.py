@@ -11,13 +11,14 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import exp, hypot, inf, log, log1p, nan, sqrt
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from feedsim.estimation.identify.clipping import limit_shown
 from feedsim.estimation.identify.parameters import EXCESS
@@ -39,7 +40,7 @@ from feedsim.estimation.replay.closed_loop import AxisRecord, Mask, Replay, of_c
 from feedsim.estimation.replay.machine_files import KEYS, modes_of, with_modes
 from feedsim.files.trace.trace import Array
 from feedsim.foundation.errors import FeedsimError, InputError
-from feedsim.foundation.parallel import in_threads
+from feedsim.foundation.parallel import in_parallel, in_threads
 from feedsim.scenario import Filter, Machine
 
 # --- The parameters of a fit of a drive: what each may be, how it is scaled, and what is known of it beforehand -------
@@ -149,6 +150,8 @@ def no_effect(name: str, value: float, start: Mapping[str, float]) -> bool:
 
 
 Rows = NDArray[np.int64]
+S = TypeVar("S")
+T = TypeVar("T")
 
 # A tuned speed loop has this damping at least, give or take DAMPING_DEVIATION of the logarithm.
 LEAST_DAMPING, DAMPING_DEVIATION = 0.7, 0.2
@@ -221,6 +224,24 @@ class Problem:
     runs: int = 0
     simulated: deque[Simulated] = field(default_factory=lambda: deque(maxlen=8))  # the last runs
     lock: Lock = field(default_factory=Lock)
+
+    def branch(self, of: Callable[[Problem, S], T], values: Sequence[S]) -> list[tuple[T, Problem]]:
+        """`of` every value, each with a problem of its own, that it may change, and that problem behind it.
+
+        In processes side by side: threads would wait for each other, as a third of a run is Python. As many runs as one
+        after the other, and the same ones, since a problem does not see the last runs of those beside it.
+        """
+
+        def one(value: S, _: object) -> tuple[T, int, dict[str, Any]]:
+            beside = replace(self, runs=0, simulated=deque(self.simulated, maxlen=8), lock=Lock())
+            result = of(beside, value)
+            own = {name: getattr(beside, name) for name in ("machine", "start", "weights")}
+            changed = {name: value for name, value in own.items() if value is not getattr(self, name)}
+            return result, beside.runs, changed
+
+        done = in_parallel([partial(one, value) for value in values])
+        self.runs += sum(runs for _, runs, _ in done)
+        return [(result, replace(self, **changed)) for result, _, changed in done]
 
     def tuned(self, values: Mapping[str, float]) -> tuple[Machine, float]:
         """The machine with values, and what its torques are to be multiplied with.
@@ -615,17 +636,16 @@ def rivals_of(problem: Problem) -> list[RivalStructure]:
 def possible_modes(problem: Problem, fit: DriveFit) -> list[TriedRival]:
     """What an elastic mode may do to the values of a rigid axis: at places over the usual range, by two runs each, in
     which the scale moves with the motor and against it."""
-    start, result = dict(problem.start), []
-    count = 2 * len(MODE_PLACES)
-    for frequency in MODE_PLACES:
-        both = []
-        for sign in (1.0, -1.0):
-            mode = frequency, MODE_DAMPING, MODE_SHAPE, sign * MODE_SHAPE
-            problem.start = start | dict(zip((f"{key}_1" for key in KEYS), mode, strict=True))
-            both.append(_predict_rival(problem, fit, RivalStructure(f"elastic mode of {frequency:g} Hz", {}), count))
-        result.append(max(both, key=lambda one: one.gain))
-    problem.start = start
-    return result
+    places = [(frequency, sign) for frequency in MODE_PLACES for sign in (1.0, -1.0)]
+
+    def predict(beside: Problem, place: tuple[float, float]) -> TriedRival:
+        frequency, sign = place
+        mode = frequency, MODE_DAMPING, MODE_SHAPE, sign * MODE_SHAPE
+        beside.start = problem.start | dict(zip((f"{key}_1" for key in KEYS), mode, strict=True))
+        return _predict_rival(beside, RivalStructure(f"elastic mode of {frequency:g} Hz", {}), fit, len(places))
+
+    tried = [one for one, _ in problem.branch(predict, places)]
+    return [max(both, key=lambda one: one.gain) for both in zip(tried[::2], tried[1::2], strict=True)]
 
 
 def with_rivals(
@@ -640,34 +660,39 @@ def with_rivals(
     far = misses(fit)
     while True:
         fit = problem.near(fit)
-        machine, start = problem.machine, problem.start
-        best: tuple[TriedRival, DriveFit, Machine, dict[str, float]] | None = None
-        for rival in rivals_of(problem):
-            problem.machine, problem.start = _apply_rival(machine, problem.each.axis, rival), start | dict(rival.begin)
-            one = _predict_rival(problem, fit, rival)
-            if far or one.gain > FITTED_SHARE * one.least:
-                other = _best_fit(problem, fit, rival, one.least, misses if far else None)
-                if other is not None:  # else it has ended elsewhere: the fit is one of it in the limit
-                    gain = 0.5 * float(np.sum(fit.residuals**2) - np.sum(other.residuals**2))
-                    one = replace(one, gain=gain, values=other.values)
-                    if gain > max(one.least, best[0].gain if best is not None else 0.0):
-                        best = replace(one, taken=True, values={}), other, problem.machine, problem.start
-            tried[rival.name] = one
-        problem.machine, problem.start = machine, start
+        rivals = rivals_of(problem)
+        predicted = [one for one, _ in problem.branch(partial(_predict_rival, fit=fit), rivals)]
+        tried |= {one.name: one for one in predicted}
+        asked = [
+            (rival, one)
+            for rival, one in zip(rivals, predicted, strict=True)
+            if far or one.gain > FITTED_SHARE * one.least
+        ]
+        best: tuple[TriedRival, DriveFit, Problem] | None = None
+        fits = problem.branch(partial(_best_fit, fit=fit, misses=misses if far else None), asked)
+        for (_, one), (other, beside) in zip(asked, fits, strict=True):
+            if other is None:  # it has ended elsewhere: the fit is one of it in the limit
+                continue
+            gain = 0.5 * float(np.sum(fit.residuals**2) - np.sum(other.residuals**2))
+            tried[one.name] = replace(one, gain=gain, values=other.values)
+            if gain > max(one.least, best[0].gain if best is not None else 0.0):
+                best = replace(tried[one.name], taken=True, values={}), other, beside
         if best is None:
             return fit, list(tried.values())
-        tried[best[0].name], fit, problem.machine, problem.start = best
+        one, fit, beside = best
+        tried[one.name], problem.machine, problem.start = one, beside.machine, beside.start
         problem.weigh(fit)
         fit, far = problem.continued(fit), False
 
 
-def _predict_rival(problem: Problem, fit: DriveFit, rival: RivalStructure, tests: int = 1) -> TriedRival:
+def _predict_rival(problem: Problem, rival: RivalStructure, fit: DriveFit, tests: int = 1) -> TriedRival:
     """By one run with the rival as it begins: what a step towards it gains, and how far it may lead at 95 %.
 
     Of the change of the residuals, what the parameters of the fit make up for says nothing. tests: that share the error
     rate.
     """
-    least = 0.5 * float(chi2.isf(ERROR_RATE / tests, rival.freedom))
+    least = 0.5 * float(chdtri(rival.freedom, ERROR_RATE / tests))
+    _apply_rival(problem, rival)
     try:
         changed = problem.residuals(fit.names, fit.values) - fit.residuals
     except InputError:  # the units cannot run it
@@ -683,20 +708,28 @@ def _predict_rival(problem: Problem, fit: DriveFit, rival: RivalStructure, tests
     return TriedRival(rival.name, 0.5 * max(towards, 0.0) ** 2 * size, least, False, values)
 
 
-def _apply_rival(machine: Machine, axis: str, rival: RivalStructure) -> Machine:
-    own = machine.axes[axis]
-    drive = machine.shipped_drive(axis, "the identification of a drive").model_copy(update=dict(rival.drive))
-    return machine.model_copy(update={"axes": machine.axes | {axis: own.model_copy(update={"drive": drive})}})
+def _apply_rival(problem: Problem, rival: RivalStructure) -> None:
+    axis = problem.each.axis
+    own = problem.machine.axes[axis]
+    drive = problem.machine.shipped_drive(axis, "the identification of a drive").model_copy(update=dict(rival.drive))
+    axes = problem.machine.axes | {axis: own.model_copy(update={"drive": drive})}
+    problem.machine = problem.machine.model_copy(update={"axes": axes})
+    problem.start = problem.start | dict(rival.begin)
 
 
 def _best_fit(
-    problem: Problem, fit: DriveFit, rival: RivalStructure, least: float, misses: Callable[[DriveFit], bool] | None
+    problem: Problem,
+    asked: tuple[RivalStructure, TriedRival],
+    fit: DriveFit,
+    misses: Callable[[DriveFit], bool] | None,
 ) -> DriveFit | None:
     """From the fit without the rival; where that may have ended far away, from where it began, too, unless the first
     has found what is missing. None: there is no better one.
 
-    least: gain of the logarithm of the likelihood that a rival needs. misses: as of with_rivals; None: it has not.
+    asked: the rival, and what is predicted of it. misses: as of with_rivals; None: it has not ended far away.
     """
+    rival, least = asked[0], asked[1].least
+    _apply_rival(problem, rival)
     names = [*fit.names, *rival.begin]
     without = 0.5 * float(np.sum(fit.residuals**2))
 

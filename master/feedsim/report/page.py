@@ -26,7 +26,7 @@ from feedsim.report.content import TILES, Report, split_finding
 from feedsim.report.formatting import PALETTE, typeset
 
 if TYPE_CHECKING:
-    from jinja2 import BytecodeCache, Environment
+    from jinja2 import Environment
 
     from feedsim.report.run.sheet import FilledSheet
 
@@ -42,15 +42,9 @@ def html(report: Report, kind: str = "", folder: Path | None = None) -> str:
 
     kind: of the result, which the page names as its generator. folder: that the result is written to.
     """
-    environment = _environment()
-    environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
-    environment.filters["typeset"] = typeset
-    environment.filters["kind"] = lambda part: type(part).__name__
-    environment.filters["parted"] = split_finding
-    environment.filters["named"] = lambda text: PATH.sub("", text)
     charts = report.charts
     step = report.next_step.line(folder) if report.next_step is not None else ""
-    return environment.get_template("report.html.j2").render(
+    return _environment().get_template("report.html.j2").render(
         report=report, palette=PALETTE, data=embed_charts(charts) if charts else "", script=script() if charts else "",
         policy=policy(script() if charts else ""), kind=kind, most_tiles=TILES, next=step,
     )  # fmt: skip
@@ -58,10 +52,10 @@ def html(report: Report, kind: str = "", folder: Path | None = None) -> str:
 
 def sheet_html(title: str, sheets: Sequence[FilledSheet], rule: str) -> str:
     """HTML text of acceptance sheets, for print; all text is escaped. rule: how is decided."""
-    environment = _environment()
-    environment.filters["typeset"] = typeset
-    return environment.get_template("sheet.html.j2").render(
-        title=title, sheets=sheets, rule=rule, palette=PALETTE, policy=policy("")
+    return (
+        _environment()
+        .get_template("sheet.html.j2")
+        .render(title=title, sheets=sheets, rule=rule, palette=PALETTE, policy=policy(""))
     )
 
 
@@ -71,22 +65,16 @@ def style() -> str:
 
 
 def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # on first use: most commands write no report
-
-    return Environment(
-        loader=PackageLoader("feedsim.report", "template"),
-        bytecode_cache=_template_cache(),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    return _environment_with(own_folder("templates", [Path(__file__)]))
 
 
-def _template_cache() -> BytecodeCache | None:
-    """Templates that an earlier process has compiled, a tenth of a short run's time; None: none are kept."""
-    from jinja2 import FileSystemBytecodeCache
+@cache
+def _environment_with(place: Path | None) -> Environment:
+    """Templates, compiled once a process.
+
+    place: of those that an earlier process has compiled, a tenth of a short run's time; None: none are kept.
+    """
+    from jinja2 import Environment, FileSystemBytecodeCache, PackageLoader, StrictUndefined  # most commands need none
     from jinja2.bccache import Bucket
 
     class Kept(FileSystemBytecodeCache):
@@ -94,8 +82,23 @@ def _template_cache() -> BytecodeCache | None:
             with suppress(OSError):  # a full disk keeps nobody from a report
                 super().dump_bytecode(bucket)
 
-    place = own_folder("templates", [Path(__file__)])
-    return Kept(str(place)) if place is not None else None
+    environment = Environment(
+        loader=PackageLoader("feedsim.report", "template"),
+        bytecode_cache=Kept(str(place)) if place is not None else None,
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {
+        "base64": lambda content: base64.b64encode(content).decode("ascii"),
+        "typeset": typeset,
+        "kind": lambda part: type(part).__name__,
+        "parted": split_finding,
+        "named": lambda text: PATH.sub("", text),
+    }
+    return environment
 
 
 def drawing_script() -> str:

@@ -327,7 +327,14 @@ def simulate(archive: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("unit", ["friction", "friction_gms", "controller", "plant", "setpoint"])
+@pytest.mark.parametrize(
+    "unit",
+    [
+        *(pytest.param(unit, marks=pytest.mark.extensive) for unit in ("friction", "friction_gms", "controller")),
+        "plant",
+        "setpoint",
+    ],
+)
 def test_the_script_for_integrators(unit: str, fmus: Path, tmp_path: Path) -> None:
     """The references in an archive through FMPy, with the tolerances that lie beside them."""
     done = simulate(fmus / f"{unit}.fmu", tmp_path)

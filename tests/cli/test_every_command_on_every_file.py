@@ -174,8 +174,8 @@ SUBJECTS = (
 )  # fmt: skip
 # They take most commands the longest way. A change of one command shows with the others.
 LONG = (
-    "capture.json", "gms.yaml", "short.yaml", "circle.yaml", "machines/gms", "machines/test_centre/machine.yaml",
-    "circle/result.csv",
+    "capture.json", "gms.yaml", "short.yaml", "circle.yaml", "machines/gms", "machines/test_centre",
+    "machines/test_centre/machine.yaml", "circle/result.csv",
 )  # fmt: skip
 
 

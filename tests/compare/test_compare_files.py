@@ -207,6 +207,7 @@ def test_folders_that_vanish_while_it_looks_are_passed_over(tmp_path: Path, monk
     ]
 
 
+@pytest.mark.extensive
 def test_time_of_a_comparison_grows_with_the_number_of_columns_alone(tmp_path: Path) -> None:
     """Of columns that are the same, differ or are missing; four times as many would take sixteen times as long."""
 

@@ -140,7 +140,7 @@ def circle(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Packed:
 
 
 @pytest.mark.parametrize("step", [125e-6, 1e-3, 10e-3, 7.3e-3])
-@pytest.mark.parametrize("which", ["z_move", "circle"])
+@pytest.mark.parametrize("which", ["z_move", pytest.param("circle", marks=pytest.mark.extensive)])
 def test_an_importer_gets_the_run_at_every_step(which: str, step: float, request: pytest.FixtureRequest) -> None:
     case: Packed = request.getfixturevalue(which)
     stop = float(case.result.trace.time[-1])

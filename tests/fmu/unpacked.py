@@ -5,6 +5,7 @@ import re
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -42,8 +43,12 @@ class Archive:
     def source_files(self) -> list[str]:
         return [file.attrib["name"] for file in self.description.iterfind("CoSimulation/SourceFiles/File")]
 
-    def variables(self) -> dict[str, ET.Element]:
+    @cached_property
+    def _variables(self) -> dict[str, ET.Element]:
         return {each.attrib["name"]: each for each in self.description.iterfind("ModelVariables/ScalarVariable")}
+
+    def variables(self) -> dict[str, ET.Element]:
+        return self._variables
 
 
 def unpack(unit: str, fmus: Path, folder: Path) -> Archive:

@@ -15,7 +15,7 @@ if platform.system() != "Linux":
 
 from fuzz import readers, sizes
 
-SECONDS = 15
+SECONDS = 6
 ALLOWED = ("read", "refused")
 
 

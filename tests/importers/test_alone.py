@@ -24,7 +24,15 @@ def _agree(result: Result, expected: Result, *, first: int = 0) -> None:
         assert difference(result[key][first:], values[first:]) <= SAME * scale, key
 
 
-@pytest.mark.parametrize("case", alone.CASES, ids=lambda case: case.unit)
+# Two units show how an importer calls them; the wired system, which is run with each importer, has all of them.
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, marks=() if case.unit in ("plant", "friction") else pytest.mark.extensive)
+        for case in alone.CASES
+    ],
+    ids=lambda case: case.unit,
+)
 def test_a_unit_alone(case: alone.Case, importer: Importer, fmus: Path, tmp_path: Path) -> None:
     if importer.sequential:
         pytest.skip("one after the other, the unit would get its inputs a step early: compared in the wired system")

@@ -126,7 +126,7 @@ def largest_use(planned: PlannedPath, t: Floats) -> tuple[float, float, float]:
     )
 
 
-@pytest.mark.parametrize("group", range(GROUPS))
+@pytest.mark.parametrize("group", [0, *(pytest.param(k, marks=pytest.mark.extensive) for k in range(1, GROUPS))])
 def test_random_programs_keep_every_limit(group: int) -> None:
     for seed in range(group, COUNT, GROUPS):
         random = np.random.default_rng(seed)

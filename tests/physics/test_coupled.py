@@ -107,7 +107,7 @@ def test_friction_torque(circle: Path, fmus: Path) -> None:
 
 
 @pytest.mark.parametrize("held", [False, True], ids=["ramped", "held"])
-@pytest.mark.parametrize("name", ["z_positioning", "xz_circle"])
+@pytest.mark.parametrize("name", ["z_positioning", pytest.param("xz_circle", marks=pytest.mark.extensive)])
 def test_shipped_scenarios(fmus: Path, name: str, held: bool) -> None:
     """2 nm against the reference, whose own figures test_monolithic compares with what is right."""
     machine = monolithic.machine()

@@ -49,7 +49,7 @@ def options(**more: object) -> Options:
     return Options("Z", I_P, **{**known, **more})  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.01, marks=pytest.mark.extensive)])
 def test_pre_sliding_comes_back(law: FrictionLaw, solutions: list[Record], noise: float) -> None:
     """The curve over speed is held, as strokes at constant speed would determine it. White noise [N.m].
 

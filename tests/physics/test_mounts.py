@@ -82,7 +82,14 @@ def reference(run: Run, machine: Path, step: float = 2.5e-6) -> dict[str, Array]
     return monolithic.simulate(model, setpoints, duration=float(run.trace.time[-1]), step=step)
 
 
-@pytest.mark.parametrize(("motions", "jerk"), [(STOP, 150), (STOP, 500), (CIRCLE, 150)])
+@pytest.mark.parametrize(
+    ("motions", "jerk"),
+    [
+        (STOP, 150),
+        pytest.param(STOP, 500, marks=pytest.mark.extensive),
+        pytest.param(CIRCLE, 150, marks=pytest.mark.extensive),
+    ],
+)
 def test_runs_agree_with_a_program_of_their_own(rubber: Path, fmus: Path, motions: str, jerk: int) -> None:
     """Within 2 nm at the control cycle, and of second order: what is left is the exchange with friction."""
     runs = [run(rubber, fmus, motions, f"machine.path.jerk={jerk} m/s^3", f"coupling.substeps={n}") for n in (1, 2)]

@@ -72,7 +72,10 @@ def test_positioning(setpoint: str) -> None:
         assert found[name] == pytest.approx(expected, rel=0.02), name
 
 
-@pytest.mark.parametrize(("setpoint", "friction"), CIRCLE)
+@pytest.mark.parametrize(
+    ("setpoint", "friction"),
+    [pytest.param(*case, marks=() if case == ("ramped", "engaging") else pytest.mark.extensive) for case in CIRCLE],
+)
 def test_circle(setpoint: str, friction: str) -> None:
     m = machine(setpoint)
     found = circle_figures(m if friction == "engaging" else monolithic.pure_lugre(m))

@@ -77,6 +77,7 @@ def test_a_fit_begins_with_the_feedforward_of_the_record(weight: str, tmp_path: 
     assert found == pytest.approx(float(weight.split()[0]) / 100, abs=0.03)
 
 
+@pytest.mark.statistics
 def test_intervals_hold_the_truth_under_noise(tmp_path: Path) -> None:
     """5 % noise on the torque, 0.3 um on the position: 8 parameters from 3 logs, 95 % each, 4 of 24 may miss."""
     machine = load_machine(MACHINES / "one_axis")

@@ -250,6 +250,7 @@ STRANGE: tuple[Any, ...] = (
 )  # fmt: skip
 
 
+@pytest.mark.extensive
 def test_every_type_in_every_place(exported: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each value of the annotation replaced by each strange one, and pairs of them: words, or a scenario; never a
     traceback. What comes before and behind the annotation stays as it is, for the time it takes."""

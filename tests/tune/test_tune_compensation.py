@@ -184,6 +184,7 @@ def test_the_command_leaves_values_that_a_scenario_takes(fmus: Path, tmp_path: P
     assert summary["values"]["X"]["amplitude"] == pytest.approx(found, rel=1e-12)
 
 
+@pytest.mark.extensive
 @pytest.mark.usefixtures("few_circles")
 def test_the_model_takes_nearly_all_off(fmus: Path, tmp_path: Path) -> None:
     done = feedsim("tune", "compensation", CIRCLE, "--kind", "model", "--out", "m", fmus=fmus, cwd=tmp_path)

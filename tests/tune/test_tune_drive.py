@@ -365,6 +365,7 @@ def test_values_that_are_typed_have_the_margins(tuned: Path) -> None:
         assert min(loop.phase_margin for loop in own) >= 40
 
 
+@pytest.mark.extensive
 def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
     found = tune_drive(load(ONE), "X", Limits(300.0, 80.0, 1e-5), fmus=fmus, progress=lambda *_: None, evaluations=20)
     assert found.evaluations[1] == 0

@@ -67,6 +67,7 @@ def test_run_with_intervals(tmp_path: Path, fmus: Path) -> None:
     assert same[0] == same[1]
 
 
+@pytest.mark.extensive
 def test_compensation_with_an_uncertain_set(tmp_path: Path, fmus: Path) -> None:
     file = write_set(tmp_path, 0.05)
     done = feedsim(

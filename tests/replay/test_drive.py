@@ -93,7 +93,7 @@ def test_intervals_hold_the_truth_under_noise(tmp_path: Path) -> None:
     assert misses <= 4
 
 
-def same_with_one_core_and_with_three(monkeypatch: pytest.MonkeyPatch, identify: Callable[[], DriveFound]) -> None:
+def assert_same_on_one_core_and_on_three(monkeypatch: pytest.MonkeyPatch, identify: Callable[[], DriveFound]) -> None:
     found = []
     for cores in (1, 3):
         monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
@@ -112,7 +112,7 @@ def test_the_values_are_the_same_with_one_core_and_with_several(
     """To the last bit, and so is the number of runs: threads share the runs of a Jacobian."""
     machine = load_machine(MACHINES / "one_axis")
     log = logged(tmp_path, "X", "M_a: 2 %", machine=MACHINES / "one_axis")
-    same_with_one_core_and_with_three(monkeypatch, lambda: identified(log, "X", machine)[0])
+    assert_same_on_one_core_and_on_three(monkeypatch, lambda: identified(log, "X", machine)[0])
 
 
 @pytest.mark.extensive
@@ -122,7 +122,7 @@ def test_structures_tried_side_by_side_are_those_of_one_core(tmp_path: Path, mon
     log = logged(tmp_path, "X", "M_a: 2 %", machine=MACHINES / "one_axis")
     (tmp_path / "columns.yaml").write_text(COLUMNS)
     mapping = load_columns(tmp_path / "columns.yaml")
-    same_with_one_core_and_with_three(monkeypatch, lambda: identified(log, "X", mapping=mapping)[0])
+    assert_same_on_one_core_and_on_three(monkeypatch, lambda: identified(log, "X", mapping=mapping)[0])
 
 
 def test_a_problem_does_not_see_what_others_beside_it_change(monkeypatch: pytest.MonkeyPatch) -> None:

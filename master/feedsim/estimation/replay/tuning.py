@@ -226,17 +226,22 @@ class Problem:
     lock: Lock = field(default_factory=Lock)
 
     def branch(self, of: Callable[[Problem, S], T], values: Sequence[S]) -> list[tuple[T, Problem]]:
-        """`of` every value, each with a problem of its own, that it may change, and that problem behind it.
+        """`of` every value, and the problem of its own that it was given, with what it has changed there.
 
-        In processes side by side: threads would wait for each other, as a third of a run is Python. As many runs as one
-        after the other, and the same ones, since a problem does not see the last runs of those beside it.
+        In processes side by side: threads would wait for each other, as a third of a run is Python. The runs are those
+        of one after the other, since a problem does not see the last runs of those beside it.
+
+        of: may change machine, start and weights of its problem; its result can be pickled.
         """
 
         def one(value: S, _: object) -> tuple[T, int, dict[str, Any]]:
             beside = replace(self, runs=0, simulated=deque(self.simulated, maxlen=8), lock=Lock())
             result = of(beside, value)
-            own = {name: getattr(beside, name) for name in ("machine", "start", "weights")}
-            changed = {name: value for name, value in own.items() if value is not getattr(self, name)}
+            changed = {
+                name: own
+                for name in ("machine", "start", "weights")
+                if (own := getattr(beside, name)) is not getattr(self, name)
+            }
             return result, beside.runs, changed
 
         done = in_parallel([partial(one, value) for value in values])
@@ -688,8 +693,9 @@ def with_rivals(
 def _predict_rival(problem: Problem, rival: RivalStructure, fit: DriveFit, tests: int = 1) -> TriedRival:
     """By one run with the rival as it begins: what a step towards it gains, and how far it may lead at 95 %.
 
-    Of the change of the residuals, what the parameters of the fit make up for says nothing. tests: that share the error
-    rate.
+    Of the change of the residuals, what the parameters of the fit make up for says nothing.
+
+    problem: has the rival afterwards. tests: that share the error rate.
     """
     least = 0.5 * float(chdtri(rival.freedom, ERROR_RATE / tests))
     _apply_rival(problem, rival)
@@ -726,7 +732,8 @@ def _best_fit(
     """From the fit without the rival; where that may have ended far away, from where it began, too, unless the first
     has found what is missing. None: there is no better one.
 
-    asked: the rival, and what is predicted of it. misses: as of with_rivals; None: it has not ended far away.
+    problem: has the rival afterwards. asked: the rival, and what is predicted of it. misses: as of with_rivals; None:
+        the fit has not ended far away.
     """
     rival, least = asked[0], asked[1].least
     _apply_rival(problem, rival)

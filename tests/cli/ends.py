@@ -63,15 +63,20 @@ class Place:
             write_csv(folder / "log.csv", log_of(law, "Z", strokes(feeds), 5e-4, noise=1e-3))
 
     def started(self, command: str) -> subprocess.Popen[str]:
-        words = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *COMMANDS[command][0]]
+        """A process that runs the first line of its program: what comes before it is the interpreter's to end."""
+        program = "import os; os.write(1, b'!'); from feedsim.cli import entry; entry()"
+        words = [sys.executable, "-c", program, *COMMANDS[command][0]]
         if hasattr(os, "sched_getaffinity") and shutil.which("taskset"):
             words[:0] = ["taskset", "-c", str(self.random.choice([*os.sched_getaffinity(0)]))]
-        return subprocess.Popen(
-            [*words, "--out", "out"], cwd=self.folder, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        process = subprocess.Popen(
+            [*words, "--out", "out"], cwd=self.folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             start_new_session=True,
             env={**os.environ, "FEEDSIM_FMUS": str(self.fmus), "PYTHONPATH": str(ROOT / "master"),
                  "TMPDIR": str(self.folder / "temporary")},
         )  # fmt: skip
+        assert process.stdout is not None
+        process.stdout.read(1)
+        return process
 
     def trial(self, command: str, number: int = signal.SIGTERM) -> None:
         """Start it, and end it at a random instant. AssertionError: it does not end so, or leaves something."""

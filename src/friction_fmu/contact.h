@@ -6,10 +6,15 @@
 #ifndef FEEDSIM_CONTACT_H
 #define FEEDSIM_CONTACT_H
 
+#include <stddef.h>
+
 #include "lugre.h"
 #include "prefix.h"
 
 #define contact_at PREFIXED(contact_at)
+#define contacts_relate PREFIXED(contacts_relate)
+#define contacts_advance PREFIXED(contacts_advance)
+#define contacts_torque PREFIXED(contacts_torque)
 #define contact_advance PREFIXED(contact_advance)
 #define contact_deflection PREFIXED(contact_deflection)
 #define contact_engaged PREFIXED(contact_engaged)
@@ -53,5 +58,23 @@ ContactForce contact_force(const Contact *p, ContactState state, double n);
 /* M_fr [N.m], Eq. 1, at speed n [rad/s], with the share k [1] of the bristle stiffness that goes with lambda (Eq. 2);
  * k is written to *share unless that is NULL. */
 double contact_torque(const Contact *p, ContactState state, double n, double *share);
+
+/* Contacts that move alike, side by side: to the bit what each of them would do alone, at less cost, as those of one
+ * shape of the torque over speed share it. */
+typedef struct ContactInRow {
+    Contact contact;
+    ContactState state;
+    size_t like;      /* the first of the row with the same shape */
+    LugreShape shape; /* of that one, at the speed of the moment */
+} ContactInRow;
+
+/* Fill in `like` of all of them. */
+void contacts_relate(ContactInRow row[], size_t count);
+
+/* contact_advance() of all of them. */
+void contacts_advance(ContactInRow row[], size_t count, double n_start, double n_end, double h);
+
+/* contact_torque() of all of them, to M_fr[0], M_fr[stride] .. */
+void contacts_torque(ContactInRow row[], size_t count, double n, double M_fr[], size_t stride);
 
 #endif

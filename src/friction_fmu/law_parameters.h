@@ -12,9 +12,9 @@
 #define parameters_agree PREFIXED(parameters_agree)
 #define parameters_contact PREFIXED(parameters_contact)
 
-/* The parameters in the order of their rows -> their fields of *v; the other fields are left alone. False where one is
- * out of its row's range or not finite. */
-bool parameters_take(const double values[], Scalars *v);
+/* The parameters in the order of their rows -> their fields of *v; the other fields are left alone. Returns what is
+ * behind the last one; NULL where one is out of its row's range or not finite. */
+const double *parameters_take(const double values[], Scalars *v);
 
 /* Whether the parameters, each within its range, go together: F_S >= F_C. */
 bool parameters_agree(const Scalars *v);

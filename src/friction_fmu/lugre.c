@@ -12,11 +12,31 @@ static double stribeck_exponent(const Lugre *p, double speed) {
     return fabs(p->beta - 1) > 0 ? pow(ratio, p->beta) : ratio;
 }
 
-double lugre_level(const Lugre *p, double n) {
+LugreShape lugre_shape(const Lugre *p, double n) {
     const double speed = fabs(n);
-    double torque = p->F_C + (p->F_S - p->F_C) * exp(-stribeck_exponent(p, speed));
-    if (p->F_log > 0) { /* 0 times an overflowing logarithm's argument would be no number */
-        torque += p->F_log * log1p(speed / p->v_log);
+    /* 0 times an overflowing logarithm's argument would be no number */
+    return (LugreShape){.fall = exp(-stribeck_exponent(p, speed)), .rise = p->F_log > 0 ? log1p(speed / p->v_log) : 0};
+}
+
+/* Equal as values, with no word of a compiler about comparing them. */
+static bool same(double a, double b) {
+    return a <= b && a >= b;
+}
+
+bool lugre_shares_shape(const Lugre *p, const Lugre *q) {
+    const bool rises = p->F_log > 0;
+    return same(p->v_s, q->v_s) && same(p->beta, q->beta) && rises == (q->F_log > 0) &&
+           (!rises || same(p->v_log, q->v_log));
+}
+
+double lugre_level(const Lugre *p, double n) {
+    return lugre_level_of(p, n, lugre_shape(p, n));
+}
+
+double lugre_level_of(const Lugre *p, double n, LugreShape shape) {
+    double torque = p->F_C + (p->F_S - p->F_C) * shape.fall;
+    if (p->F_log > 0) {
+        torque += p->F_log * shape.rise;
     }
     return (1 + p->asymmetry * sign(n)) * torque / p->sigma_0;
 }
@@ -32,22 +52,20 @@ double lugre_level_slope(const Lugre *p, double n) {
     return (1 + p->asymmetry * sign(n)) * torque / p->sigma_0;
 }
 
-double lugre_advance(const Lugre *p, double z, double n, double h) {
-    const double g = lugre_level(p, n);
+double lugre_advance(double z, double n, double g, double h) {
     const double z_end = sign(n) * g;
     /* expm1: the small steps of a slow speed must not be lost in 1 - exp(). */
     return z - (z_end - z) * expm1(-fabs(n) / g * h);
 }
 
-double lugre_rate(const Lugre *p, double z, double n) {
-    const double g = lugre_level(p, n);
+double lugre_rate(double z, double n, double g) {
     /* Eq. 6 factored: exactly 0 at constant speed, where n - |n|/g z leaves a rounding error that sigma_1 would pass
      * on. */
     return fabs(n) / g * (sign(n) * g - z);
 }
 
-double lugre_torque(const Lugre *p, double k, double z, double n) {
-    return k * p->sigma_0 * z + p->sigma_1 * lugre_rate(p, z, n) + p->sigma_2 * n;
+double lugre_torque(const Lugre *p, double k, double z, double n, double g) {
+    return k * p->sigma_0 * z + p->sigma_1 * lugre_rate(z, n, g) + p->sigma_2 * n;
 }
 
 double lugre_torque_by_speed(const Lugre *p, double z, double n) {

@@ -1,5 +1,6 @@
-/* The whole response of the friction contact to a given speed in one call: what the unit computes when it is stepped
- * with the slope of n_fr, without the FMI in between. For fits, which need it by the thousand.
+/* The whole responses of friction contacts to one given speed in one call: what the unit computes when it is stepped
+ * with the slope of n_fr, without the FMI in between. For fits, which need them by the thousand: a difference quotient
+ * asks for a contact a parameter, and side by side they share what their parameters have in common.
  *
  * With free_axis.h one of the two functions of the library that are not of the FMI. It keeps nothing between calls, so
  * calls from several threads do not know of each other. */
@@ -22,21 +23,25 @@
 #define RESPONSE_EXPORT
 #endif
 
-#define response PREFIXED(response) /* friction_response */
+#define responses PREFIXED(responses) /* friction_responses */
 
 /* Torque and state at the instants 0, every, 2 every .. of the instants 0 .. steps, h [s] apart.
  *
- *   parameters  every parameter of the unit, in the order of variables.def (and of modelDescription.xml)
+ *   count       > 0 contacts
+ *   parameters  of one contact after the other every parameter of the unit, in the order of variables.def (and of
+ *               modelDescription.xml)
  *   n           (steps + 1) speed [rad/s], linear between the instants
  *   substeps    >= 1 equal steps from one instant to the next: the solution is of second order in h/substeps
  *   every       >= 1
- *   z, c        state at the first instant [rad]; a c beyond the engaging zone is put to its end
- *   M_fr, z_out, c_out  (steps/every + 1) [N.m], [rad], [rad]; z_out and c_out may be NULL
+ *   z, c        (count) state at the first instant [rad]; a c beyond the engaging zone is put to its end
+ *   M_fr, z_out, c_out  (count, steps/every + 1) [N.m], [rad], [rad]; z_out and c_out may be NULL
  *
- * Returns how many instants were written: all steps/every + 1 of them where it went well; fewer where M_fr is no finite
- * number at the next one; 0, besides, where the parameters are refused as the unit refuses them, where substeps or
- * every is 0, or where h is not finite and above 0. */
-RESPONSE_EXPORT size_t response(const double parameters[], const double n[], size_t steps, double h, size_t substeps,
-                                size_t every, double z, double c, double M_fr[], double z_out[], double c_out[]);
+ * Returns for how many instants: all steps/every + 1 of them where it went well; fewer where M_fr of a contact is no
+ * finite number at the next one, from which on outputs are undefined; 0, besides, where parameters are refused as the
+ * unit refuses them, where count, substeps or every is 0, where h is not finite and above 0, or where there is no
+ * memory. */
+RESPONSE_EXPORT size_t responses(size_t count, const double parameters[], const double n[], size_t steps, double h,
+                                 size_t substeps, size_t every, const double z[], const double c[], double M_fr[],
+                                 double z_out[], double c_out[]);
 
 #endif

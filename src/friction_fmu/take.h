@@ -10,6 +10,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 
 static bool within(double value, double min, double max) {
     return isfinite(value) && value >= min && value <= max;
@@ -34,10 +35,10 @@ static bool within(double value, double min, double max) {
 #define PUT(kind, field, name, causality, ...) PUT_##causality(field)
 
 #define VARIABLE(...) TAKE(__VA_ARGS__)
-bool parameters_take(const double values[], Scalars *v) {
+const double *parameters_take(const double values[], Scalars *v) {
     bool good = true;
 #include UNIT_TABLE
-    return good;
+    return good ? values : NULL;
 }
 #undef VARIABLE
 

@@ -173,3 +173,20 @@ double contact_torque_by_speed(const Contact *p, const ContactState *state, doub
     }
     return p->sigma_1 / p->sigma_0 * rate + p->sigma_2;
 }
+
+void contacts_relate(ContactInRow row[], size_t count) {
+    (void)row;
+    (void)count;
+}
+
+void contacts_advance(ContactInRow row[], size_t count, double n_start, double n_end, double h) {
+    for (size_t i = 0; i < count; i++) {
+        row[i].state = contact_advance(&row[i].contact, row[i].state, n_start, n_end, h);
+    }
+}
+
+void contacts_torque(ContactInRow row[], size_t count, double n, double M_fr[], size_t stride) {
+    for (size_t i = 0; i < count; i++) {
+        M_fr[i * stride] = contact_torque(&row[i].contact, row[i].state, n, NULL);
+    }
+}

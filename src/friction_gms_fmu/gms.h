@@ -25,6 +25,9 @@
 
 #define contact_make PREFIXED(contact_make)
 #define contact_at PREFIXED(contact_at)
+#define contacts_relate PREFIXED(contacts_relate)
+#define contacts_advance PREFIXED(contacts_advance)
+#define contacts_torque PREFIXED(contacts_torque)
 #define contact_advance PREFIXED(contact_advance)
 #define contact_torque PREFIXED(contact_torque)
 #define contact_deflection PREFIXED(contact_deflection)
@@ -70,6 +73,21 @@ double contact_deflection(const Contact *p, const ContactState *state);
 
 /* c [rad] of the engaging model, which this law does not have: 0. */
 double contact_engaged(const Contact *p, const ContactState *state);
+
+/* Contacts that move alike, side by side: to the bit what each of them would do alone. */
+typedef struct ContactInRow {
+    Contact contact;
+    ContactState state;
+} ContactInRow;
+
+/* Nothing to be done ahead. */
+void contacts_relate(ContactInRow row[], size_t count);
+
+/* contact_advance() of all of them. */
+void contacts_advance(ContactInRow row[], size_t count, double n_start, double n_end, double h);
+
+/* contact_torque() of all of them, to M_fr[0], M_fr[stride] .. */
+void contacts_torque(ContactInRow row[], size_t count, double n, double M_fr[], size_t stride);
 
 /* Partial derivative of M_fr by n [N.m.s/rad], all F_i held. */
 double contact_torque_by_speed(const Contact *p, const ContactState *state, double n);

@@ -226,7 +226,7 @@ def test_archive_of_other_resources_is_refused(archive: Archive) -> None:
 
 
 # What a unit exports besides the functions of the standard.
-OWN_FUNCTIONS = {unit: {f"{unit}_response", f"{unit}_free_axis"} for unit in ("friction", "friction_gms")}
+OWN_FUNCTIONS = {unit: {f"{unit}_responses", f"{unit}_free_axis"} for unit in ("friction", "friction_gms")}
 
 
 def test_exactly_the_functions_of_the_standard_are_exported(archive: Archive) -> None:

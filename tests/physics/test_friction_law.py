@@ -165,6 +165,18 @@ def test_threads_do_not_meet(law: FrictionLaw) -> None:
         np.testing.assert_array_equal(a, b)
 
 
+def test_sets_side_by_side_have_the_same_bits(law: FrictionLaw) -> None:
+    """Those that share the shape of the torque over speed, and those that do not."""
+    n = speeds(5000)
+    sets = [{name: value * (1 + 1e-6)} for name, value in law.start_values.items() if value != 0] + [{}, {"F_log": 0.0}]
+    z, c = np.linspace(-3e-3, 3e-3, len(sets)), np.linspace(-0.01, 0.01, len(sets))
+    together = law.torques(sets, n, H, z=z, c=c, substeps=2, every=3)
+    for k, each in enumerate(sets):
+        np.testing.assert_array_equal(together[k], law(each, n, H, z=z[k], c=c[k], substeps=2, every=3))
+    with pytest.raises(InputError, match="F_C"):
+        law.torques([{}, {"F_C": 3.0, "F_S": 2.0}], n, H, z=[0, 0], c=[0, 0])
+
+
 # --- the free axis
 
 J, M_0 = 0.0164, 0.3  # synthetic, like the default machine's Z axis
@@ -302,7 +314,7 @@ def test_a_torque_that_is_no_number_says_when(law: FrictionLaw) -> None:
 
 def test_a_library_without_the_function(fmus: Path, tmp_path: Path) -> None:
     shutil.copy(fmus / "controller.fmu", tmp_path / "friction.fmu")  # a sound unit that has none
-    with pytest.raises(InputError, match=r"friction\.fmu: its library has no function friction_response; .*make fmus"):
+    with pytest.raises(InputError, match=r"friction\.fmu: its library has no function friction_responses; .*make fmus"):
         FrictionLaw(tmp_path)
 
 

@@ -22,6 +22,12 @@ static const double H = 1e-3;
 
 static double speeds[STEPS + 1], M_fr[STEPS + 2], z[STEPS + 2], c[STEPS + 2];
 
+/* Of one contact alone. */
+static size_t response(const double values[], const double n[], size_t steps, double h, size_t substeps, size_t every,
+                       double z_0, double c_0, double torque[], double z_out[], double c_out[]) {
+    return responses(1, values, n, steps, h, substeps, every, &z_0, &c_0, torque, z_out, c_out);
+}
+
 /* A sine with reversals within steps and, at the end, standstill. */
 static void prepare(void) {
     for (int i = 0; i <= STEPS; i++) {
@@ -130,11 +136,43 @@ static void refusals(void) {
 
 static void stops_where_the_torque_is_no_number(void) {
     const double wild[] = {0, 1, NAN, 1}, far[] = {0, 1, INFINITY, 1};
-    mark(2);
+    mark(3);
     CHECK(response(VALUES, wild, 3, H, 1, 1, 0, 0, M_fr, z, c) == 2);
     CHECK(response(VALUES, far, 3, H, 1, 1, 0, 0, M_fr, z, c) == 2);
-    check_mark(2);
+    check_mark(3);
     CHECK(response(VALUES, wild, 3, H, 1, 1, NAN, 0, M_fr, z, c) == 0);
+}
+
+/* Changes of one parameter, and of several: contacts of the same shape of the torque over speed, and of others. */
+static void contacts_side_by_side_do_what_each_does_alone(void) {
+    enum { COUNT = PARAMETERS + 4, ROWS = STEPS / 3 + 1 };
+    static double values[COUNT][PARAMETERS], torque[COUNT][ROWS], z_out[COUNT][ROWS], c_out[COUNT][ROWS];
+    double z_0[COUNT], c_0[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        memcpy(values[i], VALUES, sizeof values[i]);
+        z_0[i] = 1e-4 * i;
+        c_0[i] = 1e-3 * (i - 4);
+        if (i < PARAMETERS) {
+            values[i][i] *= 1 + 1e-7;
+        }
+    }
+    values[PARAMETERS][AT_F_log] = values[PARAMETERS + 1][AT_F_log] = 0; /* no logarithm, whatever v_log is */
+    values[PARAMETERS + 1][AT_v_log] *= 2;
+    values[PARAMETERS + 2][AT_v_s] = values[AT_v_s][AT_v_s]; /* that of another one which is not the first */
+    values[PARAMETERS + 3][AT_beta] = 1;
+    CHECK(responses(COUNT, values[0], speeds, STEPS, H, 2, 3, z_0, c_0, torque[0], z_out[0], c_out[0]) == ROWS);
+    for (int i = 0; i < COUNT; i++) {
+        CHECK(response(values[i], speeds, STEPS, H, 2, 3, z_0[i], c_0[i], M_fr, z, c) == ROWS);
+        CHECK(memcmp(torque[i], M_fr, sizeof torque[i]) == 0);
+        CHECK(memcmp(z_out[i], z, sizeof z_out[i]) == 0);
+        CHECK(memcmp(c_out[i], c, sizeof c_out[i]) == 0);
+        CHECK(i == 0 || memcmp(torque[i], torque[0], sizeof torque[i]) != 0);
+    }
+    values[3][AT_F_C] = -1; /* one that is refused refuses them all */
+    mark(0);
+    CHECK(responses(COUNT, values[0], speeds, STEPS, H, 2, STEPS, z_0, c_0, M_fr, z, c) == 0);
+    CHECK(responses(0, values[0], speeds, STEPS, H, 1, 1, z_0, c_0, M_fr, z, c) == 0);
+    check_mark(0);
 }
 
 int main(void) {
@@ -145,5 +183,6 @@ int main(void) {
     start_beyond_the_zone_is_put_to_its_end();
     refusals();
     stops_where_the_torque_is_no_number();
+    contacts_side_by_side_do_what_each_does_alone();
     return CHECK_RESULT;
 }

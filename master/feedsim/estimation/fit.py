@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -76,6 +76,7 @@ def fit(
     parameters: Sequence[Parameter],
     *,
     prior: Prior | None = None,
+    prepare: Callable[[Sequence[Mapping[str, float]]], None] = lambda sets: None,
     starts: int = 1,
     seed: int = 0,
     normalised: bool = True,
@@ -89,6 +90,7 @@ def fit(
     Args:
         residuals: name -> value to (N,), N the same at every call.
         prior: its rows are added to the residuals; asks for normalised ones.
+        prepare: hears which values the residuals are asked for next, one set after the other.
         starts: how many in all; the further ones are drawn with `seed`.
         normalised: the residuals have unit variance, and the covariance is (J^T J)^-1. If not, it is multiplied by the
             residual variance.
@@ -106,6 +108,12 @@ def fit(
     if prior is not None and not normalised:
         raise InputError("fit: a prior asks for normalised residuals, or its weight against the data is unknown")
     problem, beside = _with_prior(residuals, tuple(parameters), prior, difference)
+
+    def apply(of: Callable[[Array], Array], positions: Sequence[Array]) -> Iterable[Array]:
+        prepare([problem.values(x) for x in positions])
+        return map(of, positions)
+
+    problem.apply = apply
     whole = _AllResiduals(problem)
     random = np.random.default_rng(seed)
     made: list[tuple[Start, Array | None]] = []

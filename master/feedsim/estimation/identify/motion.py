@@ -279,6 +279,9 @@ QUANTISATION_SHARE = 0.1  # of the noise: steps of samples that are drawn as suc
 # results of the law kept per record: a difference quotient of another record's start asks for the same again
 MAX_CACHED_RESPONSES = 4
 
+# Parameters, and what z and c were at the record's begin, as shares.
+Point = tuple[Mapping[str, float], float, float]
+
 
 def deflection(values: Mapping[str, float]) -> float:
     """Largest bristle deflection at rest, F_S/sigma_0 [rad]."""
@@ -317,6 +320,7 @@ class RecordTorque:
         self.stretch = np.repeat(np.arange(len(chosen)), [len(rows) for rows in chosen])
         self.measured = record.torque[self.rows]
         self._law: dict[tuple[float, ...], Array] = {}
+        self._prepared: dict[tuple[float, ...], Array] = {}
         self._moved: dict[float, tuple[Array, Array, Array, Array]] = {}
 
     def recorded_rms(self) -> Array:
@@ -326,17 +330,51 @@ class RecordTorque:
 
     def friction(self, values: Mapping[str, float], z: float, c: float) -> Array:
         """(rows,) friction torque [N.m] without its viscous part."""
-        key = (*(values[name] for name in self.law.names if name != "sigma_2"), values["delay"], z, c)
-        if key not in self._law:
-            fine = self.moved(values["delay"])[0]
-            # Linear in sigma_2: that part is added outside and costs no run.
-            law = {name: values[name] for name in self.law.names} | {"sigma_2": 0.0}
-            h, start = self.record.interval / self.count, z * deflection(values)
-            result = self.law(law, fine, h, z=start, c=c * values.get("W", 0.0))
+        key = self._key(values, z, c)
+        known = self._prepared if key in self._prepared else self._law
+        if key not in known:
             if len(self._law) >= MAX_CACHED_RESPONSES:
                 del self._law[next(iter(self._law))]
-            self._law[key] = np.asarray(result[:: self.count][self.rows], dtype=np.float64)
-        return self._law[key]
+            (self._law[key],) = self.respond(self.moved(values["delay"])[0], [(values, z, c)])
+        return known[key]
+
+    def work_ahead(self, points: Sequence[Point], parts: int) -> list[tuple[Array, list[Point]]]:
+        """Arguments of :meth:`respond` for what :meth:`friction` is asked for next, in so many parts or more."""
+        self._prepared = {}
+        new: dict[float, dict[tuple[float, ...], Point]] = {}
+        for point in points:
+            key = self._key(*point)
+            if key not in self._law:
+                new.setdefault(point[0]["delay"], {})[key] = point
+        result = []
+        for delay, asked in new.items():
+            alike, fine = list(asked.values()), self.moved(delay)[0]
+            result += [(fine, alike[first::parts]) for first in range(min(parts, len(alike)))]
+        return result
+
+    def remember(self, points: Sequence[Point], responses: Sequence[Array]) -> None:
+        """What :meth:`respond` has returned, until the next work ahead."""
+        self._prepared |= {self._key(*point): row for point, row in zip(points, responses, strict=True)}
+
+    def _key(self, values: Mapping[str, float], z: float, c: float) -> tuple[float, ...]:
+        """What the friction torque without its viscous part depends on."""
+        return (*(values[name] for name in self.law.names if name != "sigma_2"), values["delay"], z, c)
+
+    def respond(self, fine: Array, points: Sequence[Point]) -> list[Array]:
+        """(rows,) friction torque [N.m] without its viscous part at points of one delay, whose speed is `fine`.
+
+        Several threads may call it.
+        """
+        # Linear in sigma_2: that part is added outside and costs no run.
+        M_fr = self.law.torques(
+            [{name: values[name] for name in self.law.names} | {"sigma_2": 0.0} for values, _, _ in points],
+            fine,
+            self.record.interval / self.count,
+            z=[z * deflection(values) for values, z, _ in points],
+            c=[c * values.get("W", 0.0) for values, _, c in points],
+            every=self.count,
+        )
+        return [row[self.rows] for row in M_fr]
 
     def moved(self, delay: float) -> tuple[Array, Array, Array, Array]:
         """Speed at the law's instants; speed, acceleration and known load at the rows; all `delay` before the log."""
@@ -396,7 +434,7 @@ class RecordTorque:
     def _with_motion(self, other: Motion) -> RecordTorque:
         moved = copy(self)
         moved.motion = other
-        moved._law, moved._moved = {}, {}
+        moved._law, moved._prepared, moved._moved = {}, {}, {}
         return moved
 
 

@@ -14,6 +14,8 @@ from feedsim.estimation.identify.parameters import EXCESS, inner_to_outer, rever
 from feedsim.estimation.identify.record import Array
 from feedsim.estimation.least_squares import correlation_length
 from feedsim.estimation.parameter import Parameter, Prior
+from feedsim.foundation.errors import InputError, SimulationError
+from feedsim.foundation.parallel import cores, in_threads
 
 REACH = {"z": 1.0, "c": 0.5}
 VALLEYS, REACHED = 6, 1.5  # tried beside a solution, drawn within so many standard deviations of it
@@ -158,9 +160,13 @@ class Search:
         def residuals(moved: Mapping[str, float]) -> Array:
             return np.concatenate(self.residuals(*full(moved)))
 
+        def prepare(sets: Sequence[Mapping[str, float]]) -> None:
+            self._work_ahead([full(moved) for moved in sets])
+
         result = fit(
             residuals,
             parameters,
+            prepare=prepare,
             prior=Prior.join([self.prior, loose]),
             difference=1e-3 if self.jumps else 1e-5,
             jumps=self.jumps,
@@ -169,6 +175,23 @@ class Search:
         )
         point, shares = full(result.mapping())
         return Solution(point, shares, result)
+
+    def _work_ahead(self, points: Sequence[tuple[Mapping[str, float], Array]]) -> None:
+        """Let the models know the friction at parameters and states that are asked for next: side by side, as many as
+        there are cores at once."""
+        work = [
+            (model, *one)
+            for k, model in enumerate(self.models)
+            for one in model.work_ahead(
+                [(values, float(states[k, 0]), float(states[k, 1])) for values, states in points], cores()
+            )
+        ]
+        try:
+            done = in_threads(lambda task: task[0].respond(*task[1:]), work)
+        except (InputError, SimulationError):
+            return  # the one that has none says so when it is asked for
+        for (model, _, asked), responses in zip(work, done, strict=True):
+            model.remember(asked, responses)
 
 
 def _root(covariance: Array) -> Array:

@@ -55,6 +55,7 @@ SOLE_USERS = {
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},
     "tqdm": {"cli"},
+    "threadpoolctl": {"jobs/parameters.py"},
     "pandas": {"analysis/figures.py", "jobs/run.py", "jobs/sweep.py", "files/trace/trace.py", "design/sweep/table.py"},
     "pyuff": {"files/trace/response_files.py"},
     "h5py": {"files/trace/mat.py"},

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,8 +20,9 @@ from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.files.trace.response import FrequencyResponse
 from feedsim.files.trace.response_files import read_response_csv, write_response
+from feedsim.foundation import parallel
 from feedsim.foundation.errors import Finding, InputError, OutputError
-from feedsim.jobs.frf import MachineResponses, result_of
+from feedsim.jobs.frf import MachineResponses, frf, result_of
 from feedsim.linear.loops import names, response, unit_of
 from feedsim.report import frf as report
 from feedsim.report.content import Picture
@@ -28,6 +31,7 @@ from feedsim.report.frf.bode_plots import curves_of, speed_controlled_pictures
 from feedsim.report.frf.report import report_of
 from feedsim.report.page import html, script
 from feedsim.scenario import load_machine, load_subject
+from feedsim.simulation.cosim import excite
 from feedsim.structure import checked_modes
 from frf_helpers import responses, subject
 from report_helpers import Page, contents
@@ -35,6 +39,28 @@ from scenario_helpers import MACHINE, default_machine
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIO = ROOT / "scenarios" / "z_positioning.yaml"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
+def test_axes_and_measurements_side_by_side_have_the_same_bits(fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threading, "active_count", lambda: 1)
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+        assert parallel.may_fork() == (cores > 1)
+        with monkeypatch.context() as here:
+            measured_here = []
+            here.setattr(excite, "checked_modes", lambda machine, m=measured_here: m.append(machine))
+            found.append(frf(MACHINE, "X,Z", band=(5.0, 200.0), settle=1, full_model=False, fmus=fmus).value.responses)
+        assert len(measured_here) == (5 if cores == 1 else 0)  # two axes, three directions of the tool
+    one, several = found
+    assert one.result == several.result
+    assert one.campaign is not None
+    assert several.campaign is not None
+    assert list(one.campaign.response.columns) == list(several.campaign.response.columns)
+    for name, column in one.campaign.response.columns.items():
+        np.testing.assert_array_equal(column, several.campaign.response.columns[name])
+    assert list(map(vars, one.campaign.excited)) == list(map(vars, several.campaign.excited))
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import savemat
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import feedsim as fs
 from feedsim.cli import main
+from feedsim.jobs.parameters import job
 from feedsim.scenario.schema import json_schema
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
@@ -92,3 +94,26 @@ def test_tables_of_others_stay(tmp_path: Path) -> None:
     fs.convert(RECORD, out, **words)  # the same once more
     with pytest.raises(fs.OutputError, match="is an input"):
         fs.convert(out, out, **words)
+
+
+@pytest.mark.parametrize("asked", [None, "2"])
+def test_linear_algebra_of_a_job_has_one_thread(asked: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its bits do not depend on the number of cores; afterwards it has as many as before. Whoever asks for some has
+    them."""
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if asked is not None:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", asked)
+
+    def threads() -> list[int]:
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    @job("count threads")
+    def counted() -> list[int]:
+        """Threads."""
+        return threads()
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        assert set(before) == {2}
+        assert set(counted()) == ({1} if asked is None else {2})
+        assert threads() == before

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +15,10 @@ from numpy.typing import NDArray
 from feedsim.files.trace import Trace
 from feedsim.files.trace.response import FrequencyResponse, quotient_unit
 from feedsim.foundation.errors import Finding, InputError
+from feedsim.foundation.installation import fmus_directory
+from feedsim.foundation.parallel import in_parallel
 from feedsim.scenario import Coupling, Machine
+from feedsim.simulation.cosim.exchange import any_foreign
 from feedsim.simulation.cosim.excitation import Excitation, binary_sequence, multisine
 from feedsim.simulation.cosim.excite import Measurement, measure, usual_rms
 
@@ -246,7 +250,7 @@ def run_campaign(
     machine: Machine, axes: Sequence[str], plan: Plan, *, fmus: Path | None = None, progress: Progress | None = None,
     call_limit: float = Coupling().call_limit,
 ) -> Campaign:  # fmt: skip
-    """Measure the responses of `axes`, one after the other.
+    """Measure the responses of `axes`, as many at once as there are cores; with units of other makers one by one.
 
     progress: called with what is being measured, cycles done and cycles in all. call_limit: time [s] after which a call
     of another maker's unit is ended.
@@ -261,11 +265,19 @@ def run_campaign(
     instances: dict[str, Mapping[str, str]] = {}
     frequency, excited, warnings = None, [], list[Finding]()
     wall_time = simulated = 0.0
-    for axis, inject, pairs in _inputs(machine, axes, plan):
-        measurements = [
-            _measure(machine, axis, inject, plan, realisation, fmus, progress, call_limit)
-            for realisation in range(plan.realisations)
-        ]
+    inputs = list(_inputs(machine, axes, plan))
+    tasks = [
+        partial(_measure, machine, axis, inject, plan, realisation, fmus, call_limit)
+        for axis, inject, _ in inputs
+        for realisation in range(plan.realisations)
+    ]
+    say = progress or (lambda what, done, total: None)
+    if any_foreign(machine, fmus or fmus_directory()):
+        done = iter([task(say) for task in tasks])
+    else:
+        done = iter(in_parallel(tasks, say))
+    for _, _, pairs in inputs:
+        measurements = [next(done) for _ in range(plan.realisations)]
         frequency_response = estimate_responses(measurements, pairs)
         frequency = frequency_response.frequency
         columns |= frequency_response.columns
@@ -324,15 +336,14 @@ def _inputs(machine: Machine, axes: Sequence[str], plan: Plan) -> Iterator[tuple
 
 
 def _measure(
-    machine: Machine, axis: str, inject: str, plan: Plan, realisation: int, fmus: Path | None,
-    progress: Progress | None, call_limit: float,
+    machine: Machine, axis: str, inject: str, plan: Plan, realisation: int, fmus: Path | None, call_limit: float,
+    progress: Callable[..., None],
 ) -> Measurement:  # fmt: skip
     rms = plan.rms if plan.rms is not None and inject == plan.inject else usual_rms(machine, axis, inject)
     what = inject if inject.startswith("tool.") else f"{axis}.{inject}"
 
     def tell(done: int, total: int) -> None:
-        if progress is not None:
-            progress(what if plan.realisations == 1 else f"{what}, realisation {realisation + 1}", done, total)
+        progress(what if plan.realisations == 1 else f"{what}, realisation {realisation + 1}", done, total)
 
     return measure(
         machine,

@@ -7,10 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from feedsim.analysis.figures import Figure
+from feedsim.foundation.parallel import Reporter, in_parallel
 from feedsim.linear import loops
 from feedsim.linear.loops import (
     compliance,
@@ -134,7 +136,8 @@ class LinearResult:
 
 
 def evaluate(system: LinearSystem, axes: Sequence[str] | None = None) -> LinearResult:
-    """Evaluate the system with the loops that it has closed; of the axes, only those named where any are.
+    """Evaluate the system with the loops that it has closed; of the axes, only those named where any are. Behind the
+    first axis, which finds what all of them share, as many at once as there are cores.
 
     Raises:
         InputError: a pole lies on the limit of stability.
@@ -143,8 +146,15 @@ def evaluate(system: LinearSystem, axes: Sequence[str] | None = None) -> LinearR
     modal = system.modes.frequency.max() * RESONANCE_MARGIN
     frequency = grid(system.modes, LOWEST_FREQUENCY, min(modal, highest) if modal > LOWEST_FREQUENCY else highest)
     structure = system.closing("none")
+    names = tuple(system.axes if axes is None else axes)
+
+    def one(axis: str, say: Reporter) -> AxisResult:
+        return _axis(system, axis, frequency)
+
+    of_axes = [_axis(system, axis, frequency) for axis in names[:1]]
+    of_axes += in_parallel([partial(one, axis) for axis in names[1:]])
     return LinearResult(
-        axes={axis: _axis(system, axis, frequency) for axis in (system.axes if axes is None else axes)},
+        axes=dict(zip(names, of_axes, strict=True)),
         compliance={d: _compliance(system, d, frequency) for d in TOOL_DIRECTIONS},
         structure_compliance={d: _compliance(structure, d, frequency) for d in TOOL_DIRECTIONS},
         unstable_poles=unstable_poles(system),

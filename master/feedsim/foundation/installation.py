@@ -77,7 +77,7 @@ def repair_advice(what: str) -> str:
 
 
 # Extra of pyproject.toml -> the modules that it brings, smaller extras first.
-_RUN = ("fmpy", "scipy", "ruckig")
+_RUN = ("fmpy", "scipy", "ruckig", "threadpoolctl")
 EXTRAS = {
     "run": _RUN, "figures": (*_RUN, "PIL", "resvg_py"), "sweep": (*_RUN, "distributed"), "uff": (*_RUN, "pyuff"),
     "xlsx": (*_RUN, "xlsxwriter"), "hdf5": ("h5py",),

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import ast
 import inspect
+import os
 import re
 import shlex
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cache, wraps
 from numbers import Real
@@ -22,6 +24,7 @@ from typing import Annotated, Any, TypeVar
 
 from feedsim.foundation.arguments import Call, Changes, Pairs, Value, call_context, settings
 from feedsim.foundation.errors import Finding
+from feedsim.foundation.installation import require_module
 
 F = TypeVar("F", bound=Callable[..., Any])
 File = str | Path
@@ -268,7 +271,8 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
                 arguments = signature.bind(*given, **named).arguments
             except TypeError:  # the function says itself what it was not given
                 return function(*given, **named)
-            with call_context(Call({key: value for key, value in arguments.items() if key != "watch"}, command_line)):
+            own = Call({key: value for key, value in arguments.items() if key != "watch"}, command_line)
+            with call_context(own), _one_thread_of_algebra() if needs else nullcontext():
                 return function(*given, **named)
 
         lines = [_argument_line(entry) for entry in _parameters(inspect.signature(function))]
@@ -290,6 +294,16 @@ def job(help: str, *, needs: Sequence[str] = ("run",)) -> Callable[[F], F]:
         return called  # type: ignore[return-value]
 
     return documented
+
+
+def _one_thread_of_algebra() -> AbstractContextManager[Any]:
+    """A block in which linear algebra has one thread: the same bits on any number of cores, and small matrices by the
+    thousand, for which several threads only wait for one another. Whoever says how many there are is obeyed."""
+    if "OPENBLAS_NUM_THREADS" in os.environ:
+        return nullcontext()
+    library = require_module("threadpoolctl", "limiting linear algebra to one thread")
+    limits: AbstractContextManager[Any] = library.threadpool_limits(1, user_api="blas")
+    return limits
 
 
 class _UnquotedText(str):

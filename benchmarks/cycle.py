@@ -1,4 +1,4 @@
-"""What a 125 us control cycle costs: each unit's doStep (measured in C), and the master's loops (on the circle).
+"""What a 125 us control cycle costs: each unit's doStep (measured in C), the master's loops (on the circle), effects.
 
 Units and loops take turns. Read the ratios, not the nanoseconds.
 """
@@ -29,7 +29,14 @@ DEFAULT = ROOT / "scenarios" / "machines" / "test_centre"
 STEPS = 200_000
 ROUNDS = 5
 LOOPS = {"native loop": True, "Python loop": False}
-MOUNTED = "native loop, four mounts that are not linear"
+MOUNTED = "four mounts that are not linear"
+CONTACT = "stiffness: 200 N/um, damping: 3e4 N.s/m, inertia: 0.004 kg.m^2"
+# Effect of one axis -> settings of the circle's scenario.
+EFFECTS = {
+    "friction at a guide": ("machine.axes.X.guide.share=60 %",),
+    "transmission": (f"machine.axes.X.transmission={{{CONTACT}}}",),
+    "transmission with play": (f"machine.axes.X.transmission={{{CONTACT}, play: 8 um}}",),
+}
 SPRINGS = "      - nodes: [B0.0, B0.4, B0.8, B2.0, B2.4, B2.8]\n"
 RUBBER = """\
       - {nodes: [B0.4, B2.4], offset: [0 mm, -450 mm, 0 mm], stiffness: [45 N/um, 65 N/um, 45 N/um]}
@@ -88,7 +95,7 @@ def mounted(directory: Path) -> Path:
 
 
 def main(given: Sequence[str] | None = None) -> int:
-    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS, MOUNTED), more=_beside)
+    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS, *EFFECTS, MOUNTED), more=_beside)
     program = build(ROOT / "build" / "bench")
     circle = scenario.load(CIRCLE, bench.circle)
     planned = nc.plan(circle)
@@ -113,10 +120,16 @@ def main(given: Sequence[str] | None = None) -> int:
 
     contestants = [Contestant(name, lambda name=name: stepped(name)) for name in CASES]  # type: ignore[misc]
     contestants += [Contestant(name, lambda native=native: looped(native)) for name, native in LOOPS.items()]  # type: ignore[misc]
+    settings = {name: (*EFFECTS[name], *bench.circle) for name in EFFECTS if name in bench.only}
     if MOUNTED in bench.only:
-        rubber = scenario.load(CIRCLE, [f"machine={mounted(program.parent)}", *bench.circle])
-        on_rubber = nc.plan(rubber)
-        contestants.append(Contestant(MOUNTED, lambda: 1e6 * cosim.run(rubber, program=on_rubber).cpu_time / cycles))
+        settings[MOUNTED] = (f"machine={mounted(program.parent)}", *bench.circle)
+    changed = {name: scenario.load(CIRCLE, given) for name, given in settings.items()}
+
+    def affected(name: str) -> float:
+        return 1e6 * cosim.run(changed[name], program=plans[name]).cpu_time / cycles
+
+    plans = {name: nc.plan(one) for name, one in changed.items()}
+    contestants += [Contestant(name, lambda name=name: affected(name)) for name in changed]  # type: ignore[misc]
     chosen = [each for each in contestants if each.name in bench.only]
     others = {f"native loop, {folder}": folder for folder in bench.given.beside}
     chosen += [Contestant(name, lambda folder=folder: looped(True, folder)) for name, folder in others.items()]  # type: ignore[misc]
@@ -134,15 +147,16 @@ def main(given: Sequence[str] | None = None) -> int:
             if name in costs.costs:
                 told = [f"the whole {name}", "", f"{digits(costs.median(name))} us", 7, costs.ratio_text(name, "units")]
                 rows.append(list(told))
-    told_besides = [*others, *([MOUNTED] if MOUNTED in costs.costs else [])]
-    rows += [[name, "", f"{digits(costs.median(name))} us", 7, ""] for name in told_besides]
-    if told_besides and "native loop" in costs.costs:
-        print(
-            *(f"{name}: {costs.ratio_text(name, 'native loop')} of the native loop" for name in told_besides), sep="\n"
-        )
+    rows += [[name, "", f"{digits(costs.median(name))} us", 7, ""] for name in others]
     header = ["per 125 us cycle", "doStep alone", "with set, slope and get", "instances", "of all units (quartiles)"]
+    tables = [table(header, rows)]
+    if "native loop" in costs.costs and (besides := [*others, *changed]):
+        header = ["the circle with", "exchange steps in a cycle", "of a cycle without (quartiles)"]
+        steps = {name: one.coupling.steps(one.machine) for name, one in changed.items()}
+        shares = [[name, steps.get(name, 1), costs.ratio_text(name, "native loop")] for name in besides]
+        tables.append(table(header, shares))
     baseline = "units" if "units" in costs.costs else None
-    bench.tell(table(header, rows), {"us": costs.as_json(baseline), "us, set, slope and get": exchanged.as_json()})
+    bench.tell("\n\n".join(tables), {"us": costs.as_json(baseline), "us, set, slope and get": exchanged.as_json()})
     return 0
 
 

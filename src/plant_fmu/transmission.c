@@ -106,6 +106,31 @@ static Seen transmission_see(const Transmission *p, const Cubic *x) {
     return seen;
 }
 
+/* What a step's end is by the torque's mean C and its change: the way of delta, and the end speed times h. */
+typedef struct Slopes {
+    double way_by_C, way_by_change, v_by_C, v_by_change;
+} Slopes;
+
+/* The step of Newton's method by what the contact's torque is above C, and what its line is steeper than the change. */
+typedef struct Newton {
+    double C_by_more, C_by_steeper, change_by_more, change_by_steeper;
+} Newton;
+
+/* In contact all along: e has the mean way/2 - v/12, the line's change 6/5 way - v/10 and the end `way` beside what is
+ * known at the start. */
+static Newton transmission_newton(const Transmission *p, const Slopes *x, double h) {
+    const double d = p->d / h;
+    const double more_by_C = p->c * (x->way_by_C / 2 - x->v_by_C / 12) + d * x->way_by_C - 1;
+    const double more_by_change = p->c * (x->way_by_change / 2 - x->v_by_change / 12) + d * x->way_by_change;
+    const double steeper_by_C = p->c * (1.2 * x->way_by_C - 0.1 * x->v_by_C) + d * x->v_by_C;
+    const double steeper_by_change = p->c * (1.2 * x->way_by_change - 0.1 * x->v_by_change) + d * x->v_by_change - 1;
+    const double per = 1 / (more_by_C * steeper_by_change - more_by_change * steeper_by_C);
+    return (Newton){.C_by_more = -steeper_by_change * per,
+                    .C_by_steeper = more_by_change * per,
+                    .change_by_more = steeper_by_C * per,
+                    .change_by_steeper = -more_by_C * per};
+}
+
 /* One axis, with what the torques of the others do to the structure in way_free and n_free; by_...: its own. */
 static bool transmission_settle(const Transmission *p, double u, double du, double way_free, double n_free,
                                 double by_way, double by_n, double by_way_ramp, double by_n_ramp,
@@ -117,6 +142,12 @@ static bool transmission_settle(const Transmission *p, double u, double du, doub
     const double way_by_T = by_way + by_way_ramp * by_T, n_by_T = by_n + by_n_ramp * by_T;
     const double share = 1 - p->J * n_by_T / h, per_J = h * h / p->J;
     const double way_motor = h * a->n + per_J * (u / 2 + du / 6), n = a->n + h / p->J * (u + du / 2);
+    const double T_by_change = p->J / h * by_n_ramp / (own * share);
+    const Slopes slopes = {.way_by_C = -per_J / 2 - way_by_T / share,
+                           .way_by_change = per_J / 12 - by_way_ramp / own - way_by_T * T_by_change,
+                           .v_by_C = -h * (h / p->J + n_by_T / share),
+                           .v_by_change = -h * (by_n_ramp / own + n_by_T * T_by_change)};
+    const Newton newton = transmission_newton(p, &slopes, h);
     const double stiff = (per_J / 2 + way_by_T / share) * (p->c / 2 + p->d / h);
     /* What the last places of delta make of C; of its change a dozen times as much. */
     const double last = 2 * DBL_EPSILON * (fabs(a->delta) + fabs(way_motor) + fabs(way_free));
@@ -141,8 +172,13 @@ static bool transmission_settle(const Transmission *p, double u, double du, doub
         seen = transmission_see(p, &path);
         const double more = p->c * seen.mean + p->d * (seen.e_end - seen.e) / h - C;
         const double steeper = p->c * seen.change + 12 * p->d / h * ((seen.e + seen.e_end) / 2 - seen.mean) - change;
-        C += more / (1 + (fabs(seen.e_end) > 0 ? stiff : 0));
-        change += steeper;
+        if (!(p->half > 0) || seen.e * seen.e_end > 0) { /* in contact all along, mostly */
+            C += newton.C_by_more * more + newton.C_by_steeper * steeper;
+            change += newton.change_by_more * more + newton.change_by_steeper * steeper;
+        } else {
+            C += more / (1 + (fabs(seen.e_end) > 0 ? stiff : 0));
+            change += steeper;
+        }
         off = fabs(more) + fabs(steeper) / 12;
     }
     const double damping = p->d * (seen.e_end - seen.e) / h;

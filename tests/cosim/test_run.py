@@ -49,6 +49,34 @@ def test_two_runs_are_bit_identical(short: Path, fmus: Path) -> None:
         np.testing.assert_array_equal(first.trace[name], second.trace[name], err_msg=name)
 
 
+def test_units_that_stay_open_serve_runs_as_new_ones_do(short: Path, fmus: Path) -> None:
+    """Other values, effects, loads, poses, cycles, laws and one unit for all, and the first machine again."""
+    changes: list[list[str]] = [
+        [],
+        ["machine.axes.Z.drive.K_v=3 (m/min)/mm", "machine.axes.X.friction.W=0.001 rad"],  # of which a unit warns
+        ["machine.axes.X.guide.share=60 %", "machine.axes.Y.constant_load=2 N.m", "machine.pose.X=300 mm"],
+        ["machine.axes.X.transmission={stiffness: 200 N/um, damping: 3e4 N.s/m, play: 8 um, inertia: 0.004 kg.m^2}"],
+        ["machine.axes.Z.drive.M_max=3 N.m", "machine.cycles.position=2 ms"],
+        ["machine.axes.Z.friction={law: gms, sigma_0: 300 N.m/rad, sigma_1: 0.8 N.m.s/rad, sigma_2: 0.006 N.m.s/rad, "
+         "F_C: 1.6 N.m, F_S: 2 N.m, v_s: 0.6 rad/s}"],
+        ["coupling.units=one"],
+        [],
+    ]  # fmt: skip
+    with cosim.OpenUnits() as units:
+        for k, overrides in enumerate(changes):
+            loaded = scenario.load(short, overrides)
+            fresh, again = (judge_run(cosim.run(loaded, fmus=fmus, units=one)) for one in (None, units))
+            assert again.trace.columns.keys() == fresh.trace.columns.keys()
+            for name in fresh.trace.columns:
+                np.testing.assert_array_equal(again.trace[name], fresh.trace[name], err_msg=f"{k}: {name}")
+            assert again.warnings == fresh.warnings
+            assert again.coupling == fresh.coupling
+            assert again.units == fresh.units
+        with pytest.raises(InputError, match="refuses its parameters"):
+            cosim.run(with_filter_beyond_nyquist(short), fmus=fmus, units=units)
+        assert np.array_equal(cosim.run(loaded, fmus=fmus, units=units).trace["Z.x_a"], fresh.trace["Z.x_a"])
+
+
 def test_every_row_is_on_the_recording_grid(short: Path, fmus: Path) -> None:
     fine = run(short, fmus, "recording.interval=125 us").trace
     coarse = run(short, fmus, "recording.interval=1 ms").trace

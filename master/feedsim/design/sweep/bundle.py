@@ -129,7 +129,7 @@ class Workplace:
             fmus: archives and native cycle loop, by file name.
             within: where the folder is made; None: where the system keeps what is temporary.
         """
-        self._folder = TemporaryFolder(within)
+        self._folder, self._units = TemporaryFolder(within), cosim.OpenUnits()
         folder = self._folder.path
         try:
             moved = {}
@@ -172,7 +172,7 @@ class Workplace:
     def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[Finding]]:
         scenario = self._base.with_changes(task.changes)
         program = self._program(scenario)
-        result = judge_run(cosim.run(scenario, program=program, fmus=self._fmus), keep=False)
+        result = judge_run(cosim.run(scenario, program=program, fmus=self._fmus, units=self._units), keep=False)
         results = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
         return results, result.warnings
 
@@ -191,6 +191,7 @@ class Workplace:
 
     def close(self) -> None:
         """Leave nothing behind."""
+        self._units.close()
         self._folder.close()
 
 

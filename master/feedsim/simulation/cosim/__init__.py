@@ -6,12 +6,13 @@ Start with run.py: ``run``; then schedule.py, which says once what a control cyc
 
 from feedsim.foundation.installation import fmus_directory
 from feedsim.simulation.cosim.exchange import describe_archive_programs, describe_programs
-from feedsim.simulation.cosim.run import Crossings, Follower, Run, check, follow, logged, run
+from feedsim.simulation.cosim.run import Crossings, Follower, OpenUnits, Run, check, follow, logged, run
 from feedsim.simulation.cosim.schedule import Progress
 
 __all__ = [
     "Crossings",
     "Follower",
+    "OpenUnits",
     "Progress",
     "Run",
     "check",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -317,6 +318,36 @@ class Run:
         return f"Run of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows"
 
 
+class OpenUnits(BlockResource):
+    """The units of runs that follow one another, shipped ones: a machine that differs from the one before in values and
+    modes alone gets them again, reset."""
+
+    def __init__(self) -> None:
+        self._system: System | None = None
+
+    @contextmanager
+    def of(self, machine: Machine, coupling: Coupling, fmus: Path) -> Iterator[System]:
+        """A block with the units of a machine. A unit that has failed does not serve again.
+
+        InputError: a unit refuses a value, or the archives do not fit the machine.
+        """
+        try:
+            if self._system is not None and coupling.units != "one" and self._system.serves(machine, fmus):
+                self._system.renew(machine)
+            else:
+                self.close()
+                self._system = system_of(machine, coupling, fmus)
+            yield self._system
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        if self._system is not None:
+            self._system.close()
+            self._system = None
+
+
 def run(
     scenario: Scenario,
     *,
@@ -327,6 +358,7 @@ def run(
     native: bool | None = None,
     scratch: Path | None = None,
     sink: Sink | None = None,
+    units: OpenUnits | None = None,
 ) -> Run:
     """Run `scenario` and return its trace.
 
@@ -342,6 +374,8 @@ def run(
         scratch: folder for the files without names that hold what is long; default: the system's for temporary files.
         sink: called with the rows of the trace, a stretch at a time, while the run goes on; of one that fails or is
             interrupted it has got all rows up to there when the exception arrives.
+        units: those of the runs before, which stay open; None: they are opened for this run. Units of other makers
+            are.
 
     Raises:
         InputError: the motion violates a limit, a load cannot be read, the archives do not fit the machine, `native`
@@ -361,7 +395,7 @@ def run(
         )  # fmt: skip
     return _run(
         scenario, program, fmus, progress=progress, torque_feedforward=torque_feedforward, native=native,
-        scratch=scratch, sink=sink,
+        scratch=scratch, sink=sink, units=units,
     )  # fmt: skip
 
 
@@ -375,6 +409,7 @@ def _run(
     native: bool | None = None,
     scratch: Path | None = None,
     sink: Sink | None = None,
+    units: OpenUnits | None = None,
 ) -> Run:
     """A run in this process."""
     recorded = recorded_columns(scenario)
@@ -387,7 +422,8 @@ def _run(
     library, executor_notes = choose_native_loop(
         native, fmus, fmus_directory()
     )  # archives out of an SSP file bring none along
-    with system_of(scenario.machine, scenario.coupling, fmus) as system:
+    opened = system_of if units is None else units.of
+    with opened(scenario.machine, scenario.coupling, fmus) as system:
         cycle = cycle_of(system, scenario.coupling)
         recording = Recording(cycle, loaded, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
         recordings, at_full_rate = [recording], None
@@ -455,14 +491,14 @@ def _energies(cycle: Cycle) -> dict[str, float]:
 class Follower(BlockResource):
     """The axes of machines on setpoints from anywhere: their units, exchanged as :func:`run` does, and nothing judged.
 
-    Units stay open: a machine that differs from the one before in values and modes alone gets them again, reset.
+    Units stay open, as :class:`OpenUnits` does.
     """
 
     def __init__(
         self, *, coupling: Coupling | None = None, fmus: Path | None = None, native: bool | None = None
     ) -> None:
         self._coupling, self._fmus, self._native = coupling or Coupling(), fmus or fmus_directory(), native
-        self._system: System | None = None
+        self._units = OpenUnits()
 
     def follow(
         self, machine: Machine, program: Program, columns: Collection[str], interval: float,
@@ -492,8 +528,7 @@ class Follower(BlockResource):
         ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
         total = (len(program.time) - 1) * ratio
         library, _ = choose_native_loop(self._native, self._fmus, fmus_directory())
-        try:
-            system = self._open_system(machine)
+        with self._units.of(machine, self._coupling, self._fmus) as system:
             cycle = cycle_of(system, self._coupling)
             recording = Recording(cycle, (), program, total, ratio, every, columns)
             drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
@@ -504,22 +539,9 @@ class Follower(BlockResource):
             recording.record(total)
             recording.collect(total + 1)
             return recording.trace()
-        except BaseException:  # a unit that has failed need not serve again
-            self.close()
-            raise
-
-    def _open_system(self, machine: Machine) -> System:
-        if self._system is not None and self._system.serves(machine, self._fmus):
-            self._system.renew(machine)
-        else:
-            self.close()
-            self._system = system_of(machine, self._coupling, self._fmus)
-        return self._system
 
     def close(self) -> None:
-        if self._system is not None:
-            self._system.close()
-            self._system = None
+        self._units.close()
 
 
 def follow(

@@ -12,8 +12,6 @@ import sys
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as version_of
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -34,9 +32,11 @@ def checkout() -> Path | None:
 @cache
 def version(package: str) -> str | None:
     """Version of an installed package; None where it is not installed as one. Kept, as finding it reads a file."""
+    from importlib import metadata  # a sixth of the start of a command, most of which never ask
+
     try:
-        return version_of(package)
-    except PackageNotFoundError:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
         return None
 
 

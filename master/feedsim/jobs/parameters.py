@@ -24,7 +24,6 @@ from typing import Annotated, Any, TypeVar
 
 from feedsim.foundation.arguments import Call, Changes, Pairs, Value, call_context, settings
 from feedsim.foundation.errors import Finding
-from feedsim.foundation.installation import require_module
 
 F = TypeVar("F", bound=Callable[..., Any])
 File = str | Path
@@ -301,6 +300,8 @@ def _one_thread_of_algebra() -> AbstractContextManager[Any]:
     thousand, for which several threads only wait for one another. Whoever says how many there are is obeyed."""
     if "OPENBLAS_NUM_THREADS" in os.environ:
         return nullcontext()
+    from feedsim.foundation.installation import require_module  # a command sets the variable, and does without
+
     library = require_module("threadpoolctl", "limiting linear algebra to one thread")
     limits: AbstractContextManager[Any] = library.threadpool_limits(1, user_api="blas")
     return limits

@@ -14,7 +14,7 @@ from .targets import Target
 LIBRARIES = {
     "exchange": (("exchange.c",), frozenset({"exchange_run", "exchange_run_marked", "exchange_interface"})),
     "planner": (
-        ("nearest.c", "path.c", "planner.c", "speed.c", "spline.c"),
+        ("corner.c", "element.c", "nearest.c", "path.c", "planner.c", "speed.c", "spline.c"),
         frozenset({
             "planner_interface", "planner_create", "planner_destroy", "planner_advance", "planner_duration",
             "planner_sections", "planner_section", "planner_sample", "planner_nearest",

@@ -151,9 +151,13 @@ def main(given: Sequence[str] | None = None) -> int:
     header = ["per 125 us cycle", "doStep alone", "with set, slope and get", "instances", "of all units (quartiles)"]
     tables = [table(header, rows)]
     if "native loop" in costs.costs and (besides := [*others, *changed]):
-        header = ["the circle with", "exchange steps in a cycle", "of a cycle without (quartiles)"]
+        header = ["the circle with", "over a cycle without (quartiles)"]
         steps = {name: one.coupling.steps(one.machine) for name, one in changed.items()}
-        shares = [[name, steps.get(name, 1), costs.ratio_text(name, "native loop")] for name in besides]
+        shares = [
+            [f"{name}, {steps[name]} exchange steps" if steps.get(name, 1) > 1 else name,
+             costs.ratio_text(name, "native loop")]
+            for name in besides
+        ]  # fmt: skip
         tables.append(table(header, shares))
     baseline = "units" if "units" in costs.costs else None
     bench.tell("\n\n".join(tables), {"us": costs.as_json(baseline), "us, set, slope and get": exchanged.as_json()})

@@ -244,6 +244,7 @@ class Campaign:
 
 
 Progress = Callable[[str, int, int], None]
+PER_TASK = 1000  # steps of a progress bar that one measurement takes
 
 
 def run_campaign(
@@ -252,8 +253,8 @@ def run_campaign(
 ) -> Campaign:  # fmt: skip
     """Measure the responses of `axes`, as many at once as there are cores; with units of other makers one by one.
 
-    progress: called with what is being measured, cycles done and cycles in all. call_limit: time [s] after which a call
-    of another maker's unit is ended.
+    progress: called with what is done, how far, and how far in all. call_limit: time [s] after which a call of another
+    maker's unit is ended.
 
     Raises:
         InputError: as cosim.excite.measure: an argument out of range, a limit was met.
@@ -271,11 +272,16 @@ def run_campaign(
         for axis, inject, _ in inputs
         for realisation in range(plan.realisations)
     ]
-    say = progress or (lambda what, done, total: None)
-    if any_foreign(machine, fmus or fmus_directory()):
-        done = iter([task(say) for task in tasks])
-    else:
-        done = iter(in_parallel(tasks, say))
+    reached: dict[str, float] = {}
+
+    def say(what: str, done: int, total: int) -> None:
+        """Of one of them; people see one bar of all, which run at once."""
+        reached[what] = done / total
+        if progress is not None:
+            progress("measurement on the units", round(PER_TASK * sum(reached.values())), PER_TASK * len(tasks))
+
+    foreign = any_foreign(machine, fmus or fmus_directory())
+    done = iter([task(say) for task in tasks] if foreign else in_parallel(tasks, say))
     for _, _, pairs in inputs:
         measurements = [next(done) for _ in range(plan.realisations)]
         frequency_response = estimate_responses(measurements, pairs)
@@ -343,7 +349,7 @@ def _measure(
     what = inject if inject.startswith("tool.") else f"{axis}.{inject}"
 
     def tell(done: int, total: int) -> None:
-        progress(what if plan.realisations == 1 else f"{what}, realisation {realisation + 1}", done, total)
+        progress(f"{what} {realisation}", done, total)
 
     return measure(
         machine,

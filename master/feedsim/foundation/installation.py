@@ -32,7 +32,7 @@ def checkout() -> Path | None:
 @cache
 def version(package: str) -> str | None:
     """Version of an installed package; None where it is not installed as one. Kept, as finding it reads a file."""
-    from importlib import metadata  # a sixth of the start of a command, most of which never ask
+    from importlib import metadata  # loads that of e-mail; most commands never ask
 
     try:
         return metadata.version(package)

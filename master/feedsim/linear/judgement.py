@@ -13,10 +13,10 @@ n = 0, c = 0): M_fr = (1 + gamma)/2 sigma_0 (angle) + (sigma_1 + sigma_2) n, the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +96,11 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
         return ()
     frictions = machine.shipped_frictions
     bristles = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
-    driven = tuple((name, axis.drive, axis.I_P) for name, axis in axes.items() if isinstance(axis.drive, Drive))
+    driven = tuple(
+        (name, axis.drive.model_copy(update=dict.fromkeys(OUTSIDE_LOOPS)), axis.I_P)
+        for name, axis in axes.items()
+        if isinstance(axis.drive, Drive)
+    )
     return _judged_axes(driven, bristles, machine.cycles, modes)
 
 
@@ -106,7 +110,7 @@ def locked_modes(machine: Machine, modes: Modes) -> tuple[Floats, Floats, Floats
     drives = tuple(LinearDrive(machine.shipped_drive(name, "a page"), machine.cycles, axis.I_P)
                    for name, axis in machine.axes.items())  # fmt: skip
     axes = tuple(machine.axes)
-    return SampledAxes(axes, drives, (None,) * len(axes), ModalPlant.of(modes, axes)).locked_modes()
+    return SampledAxes(axes, drives, (None,) * len(axes), _plant(modes, axes)).locked_modes()
 
 
 class Bristles(NamedTuple):
@@ -131,7 +135,76 @@ def _judged_axes(
     """`driven`: name, drive and I_P of the axes judged; `bristles`: what holds each at rest, where that is known."""
     axes = tuple(name for name, _, _ in driven)
     drives = tuple(LinearDrive(drive, cycles, I_P) for _, drive, I_P in driven)
-    return SampledAxes(axes, drives, bristles, ModalPlant.of(modes, axes)).judged()
+    return SampledAxes(axes, drives, bristles, _plant(modes, axes)).judged()
+
+
+# --- What machines that differ in a few values have in common: thousands of a study, drives that are tried in turn ----
+# Each answer is that of the contour as a whole: to the same bits, whichever machine was the first to need it.
+
+
+# Of a drive, what its loops do not see, and what each block of them does.
+OUTSIDE_LOOPS = (
+    "k_ffw", "T_dyn", "T_sym", "symmetry_lag", "setpoint_resolution", "M_max", "u_max", "encoder", "measuring_table",
+    "cogging_1", "cogging_2", "cogging_3", "ripple_1", "ripple_2", "ripple_3", "periodic_error_1", "periodic_error_2",
+    "periodic_error_3", "backlash_compensation", "leadscrew_compensation", "leadscrew_compensation_minus",
+    "friction_pulse", "friction_table",
+)  # fmt: skip
+FILTERS = ("filter_1", "filter_2", "filter_3", "filter_4")
+MOTOR = ("current", "R", "L_d", "L_q", "p", "K_t", "ideal_current_loop")  # what the current loop consists of
+SPEED_CONTROLLER = ("K_p", "speed_integrator", "T_n")
+SEEN: Mapping[str, tuple[str, ...]] = {
+    "torque": (*MOTOR, *FILTERS),
+    "ramp": ("ramp_speed_setpoint",),
+    "from_speed": SPEED_CONTROLLER,
+    "from_setpoint": (*SPEED_CONTROLLER, "reference_model", "omega_0", "D", "T_ref"),
+}
+# Contours of both levels, in both holds, of a few structures, and the short ones in between that are refined.
+KNOWN_PORTS, KNOWN_BLOCKS = 16, 256
+
+
+@lru_cache(maxsize=8)
+def _plant(modes: Modes, axes: tuple[str, ...]) -> ModalPlant:
+    return ModalPlant.of(modes, axes)
+
+
+@lru_cache(maxsize=KNOWN_PORTS)
+def _ports(plant: ModalPlant, T_c: float, hold: InputHold, contour: bytes) -> tuple[Complexes, Complexes]:
+    """(C, A, A) speeds and positions of the axes per torque, at the values of s that `contour` holds."""
+    s, A = np.frombuffer(contour, dtype=np.complex128), plant.rotor.shape[1]
+    speeds = (plant.rotor[:, :, None] * plant.rotor[:, None]).reshape(-1, A * A)
+    places = (plant.scale[:, :, None] * plant.rotor[:, None]).reshape(-1, A * A)
+    n, x = (np.empty((len(s), A * A), dtype=np.complex128) for _ in range(2))
+    for start in range(0, len(s), CHUNK):
+        part = slice(start, start + CHUNK)
+        q, v = plant.modal(s[part], T_c, hold)
+        n[part], x[part] = modal_sums(v, speeds), modal_sums(q, places)
+    return n.reshape(-1, A, A), x.reshape(-1, A, A)
+
+
+@lru_cache(maxsize=KNOWN_BLOCKS)
+def _block(name: str, seen: tuple[Any, ...], cycles: Cycles, contour: bytes) -> Any:
+    """A block of drives with these values of what it sees (SEEN)."""
+    drive = Drive.model_construct(**dict(zip(SEEN[name], seen, strict=True)))
+    return getattr(LinearDrive(drive, cycles, math.nan), name)(np.frombuffer(contour, dtype=np.complex128))
+
+
+def _block_of(drive: LinearDrive, name: str, contour: bytes) -> Any:
+    return _block(name, tuple(getattr(drive.drive, field) for field in SEEN[name]), drive.cycles, contour)
+
+
+@lru_cache(maxsize=8)
+def _locked_modes(plant: ModalPlant, leads: tuple[float, ...]) -> tuple[Floats, Floats, Floats]:
+    """As :meth:`SampledAxes.locked_modes`, of axes with leads I_P [m/rad]."""
+    A = len(leads)
+    stiffness = plant.omega_0**2
+    null = np.linalg.qr(plant.rotor, mode="complete")[0][:, A:]
+    squares, shapes = np.linalg.eigh(null.T @ (stiffness[:, None] * null))
+    elastic = squares > (2 * np.pi) ** 2
+    shapes, omega = null @ shapes[:, elastic], np.sqrt(squares[elastic])
+    damping = (shapes**2).T @ plant.damping
+    moved = np.abs(shapes.T @ (stiffness[:, None] * np.linalg.pinv(plant.rotor).T)).max(axis=1)
+    seen = (np.abs(shapes.T @ plant.scale) / leads).max(axis=1)
+    return omega, damping, seen * moved / np.maximum(2 * damping * omega, GROWTH) / omega**2
 
 
 def _judge_loop(
@@ -207,12 +280,16 @@ def _windings(values: Complexes) -> int:
 
 @dataclass(frozen=True, eq=False)
 class SampledAxes:
-    """The axes that are judged, and what their loops consist of."""
+    """The axes that are judged, and what their loops consist of.
+
+    near: frequencies [Hz] about the resonances, free and with the motors held; None: those that show with these drives.
+    """
 
     axes: tuple[str, ...]
     drives: tuple[LinearDrive, ...]
     bristles: tuple[Bristles | None, ...]
     plant: ModalPlant
+    near: tuple[Floats, Floats] | None = None
 
     def judged(self, axes: Sequence[int] | None = None) -> tuple[Loop, ...]:
         """All loops in all states; axes: indices of those asked for."""
@@ -222,11 +299,12 @@ class SampledAxes:
         """The same, with the frequencies (F,) [Hz] of the speed loops and their determinants (2, 1 + asked, F)."""
         asked = tuple(range(len(self.axes))) if axes is None else tuple(axes)
         cycles = self.drives[0].cycles
+        free, locked = self.near or self.resonances()
         frequency, speed = self._sample_contour(
-            partial(self._speed_level, asked), self._frequencies(0.5 / cycles.T_c, self.free_resonances())
+            partial(self._speed_level, asked), self._frequencies(0.5 / cycles.T_c, free)
         )
         _, position = self._sample_contour(
-            partial(self._position_level, asked), self._frequencies(0.5 / cycles.T_pos, self.locked_resonances())
+            partial(self._position_level, asked), self._frequencies(0.5 / cycles.T_pos, locked)
         )
         loops: list[Loop] = []
         kind: Kind
@@ -274,18 +352,16 @@ class SampledAxes:
         fast = np.geomspace(1.0, highest, math.ceil(math.log(highest) / FREQUENCY_STEP))
         return np.unique(np.concatenate([[0.0], slow, fast, near[(near > 0) & (near < highest)]]))
 
-    def free_resonances(self) -> Floats:
-        """Frequencies [Hz] about the modes that show in the speed loops: K_p n/M is n^2 K_p/(2 D omega) at the peak."""
+    def resonances(self) -> tuple[Floats, Floats]:
+        """Frequencies [Hz] about the modes that show in the speed loops: K_p n/M is n^2 K_p/(2 D omega) at the peak;
+        and about those that show in the position loops."""
         plant, elastic = self.plant, self.plant.omega_0 > 0
         seen = np.maximum(np.abs(plant.rotor), np.abs(plant.scale) / self._leads)[elastic].max(axis=1)
         driven = (np.abs(plant.rotor[elastic]) * [drive.drive.K_p for drive in self.drives]).max(axis=1)
         omega, damping = plant.omega_0[elastic], plant.damping[elastic]
-        return _frequencies_about(omega, damping, seen * driven / np.maximum(2 * damping * omega, GROWTH))
-
-    def locked_resonances(self) -> Floats:
-        """The same of the position loops."""
+        free = _frequencies_about(omega, damping, seen * driven / np.maximum(2 * damping * omega, GROWTH))
         omega, damping, peak = self.locked_modes()
-        return _frequencies_about(omega, damping, max(drive.drive.K_v for drive in self.drives) * peak)
+        return free, _frequencies_about(omega, damping, max(drive.drive.K_v for drive in self.drives) * peak)
 
     def locked_modes(self) -> tuple[Floats, Floats, Floats]:
         """Modes with the motors held, which stiff speed loops come close to: frequency (N,) [rad/s], damping ratio
@@ -294,16 +370,7 @@ class SampledAxes:
         With the motors' angles phi given, modal coordinates are q = R phi + N p, N the null space of the shapes at the
         rotors: p'' + N' Omega^2 N p = -N' Omega^2 R phi; the scales see p, and K_v/s makes phi of what they see.
         """
-        plant, A = self.plant, len(self.axes)
-        stiffness = plant.omega_0**2
-        null = np.linalg.qr(plant.rotor, mode="complete")[0][:, A:]
-        squares, shapes = np.linalg.eigh(null.T @ (stiffness[:, None] * null))
-        elastic = squares > (2 * np.pi) ** 2
-        shapes, omega = null @ shapes[:, elastic], np.sqrt(squares[elastic])
-        damping = (shapes**2).T @ plant.damping
-        moved = np.abs(shapes.T @ (stiffness[:, None] * np.linalg.pinv(plant.rotor).T)).max(axis=1)
-        seen = (np.abs(shapes.T @ plant.scale) / self._leads).max(axis=1)
-        return omega, damping, seen * moved / np.maximum(2 * damping * omega, GROWTH) / omega**2
+        return _locked_modes(self.plant, tuple(drive.I_P for drive in self.drives))
 
     @property
     def _leads(self) -> Floats:
@@ -319,10 +386,14 @@ class SampledAxes:
         A, m, T_pos = len(self.axes), self.drives[0].ticks, self.drives[0].cycles.T_pos
         components = range(-IMAGE_COUNT, IMAGE_COUNT + 1) if m > 2 * IMAGE_COUNT else range(m)
         every = (s[:, None] + 2j * np.pi * np.array(components) / T_pos).ravel()
+        contour = every.tobytes()
         gains = np.array([drive.position_gain for drive in self.drives])
         answer = np.empty((len(every), A), dtype=np.complex128)
         for i, drive in enumerate(self.drives):
-            answer[:, i] = drive.torque(every)[0] * drive.from_setpoint(every) * drive.ramp(every)
+            torque, from_setpoint, ramp = (
+                _block_of(drive, name, contour) for name in ("torque", "from_setpoint", "ramp")
+            )
+            answer[:, i] = torque[0] * from_setpoint * ramp
         result = []
         for x, loop, _ in self._speed_loops(every):
             torques = np.linalg.solve(np.eye(A) + loop, np.eye(A) * answer[:, None])
@@ -333,16 +404,16 @@ class SampledAxes:
     def _speed_loops(self, s: Complexes) -> Iterator[tuple[Complexes, Complexes, Complexes]]:
         """Per state, (C, A, A) each: positions per torque, what the speed loops take off the torques, and what of that
         does not go through the speed controllers."""
-        A = len(self.axes)
-        n_M, x_M = n_fr, x_fr = self.ports(s, "linear")
+        A, contour, T_c = len(self.axes), s.tobytes(), self.drives[0].cycles.T_c
+        n_M, x_M = n_fr, x_fr = _ports(self.plant, T_c, "linear", contour)
         ideal = np.array([drive.drive.ideal_current_loop for drive in self.drives])
         if ideal.any():
-            fixed = self.ports(s, "held")
+            fixed = _ports(self.plant, T_c, "held", contour)
             n_M, x_M = (np.asarray(np.where(ideal, h, linear)) for h, linear in zip(fixed, (n_M, x_M), strict=True))
         through, past = (np.empty((len(s), A, 1), dtype=np.complex128) for _ in range(2))
         for i, drive in enumerate(self.drives):
-            E, past[:, i, 0] = drive.torque(s)
-            through[:, i, 0] = E * drive.from_speed(s)
+            E, past[:, i, 0] = _block_of(drive, "torque", contour)
+            through[:, i, 0] = E * _block_of(drive, "from_speed", contour)
         windows = [drive.speed_of_position(s) for drive in self.drives]
         for state in STATES:
             n, x = n_M, x_M
@@ -358,18 +429,6 @@ class SampledAxes:
                 if V is not None:
                     seen[:, i] = V[:, None] * x[:, i]
             yield x, through * seen + past * n, past * n
-
-    def ports(self, s: Complexes, hold: InputHold) -> tuple[Complexes, Complexes]:
-        """(C, A, A) speeds and positions of the axes per torque."""
-        plant, A = self.plant, len(self.axes)
-        speeds = (plant.rotor[:, :, None] * plant.rotor[:, None]).reshape(-1, A * A)
-        places = (plant.scale[:, :, None] * plant.rotor[:, None]).reshape(-1, A * A)
-        n, x = (np.empty((len(s), A * A), dtype=np.complex128) for _ in range(2))
-        for start in range(0, len(s), CHUNK):
-            part = slice(start, start + CHUNK)
-            q, v = plant.modal(s[part], self.drives[0].cycles.T_c, hold)
-            n[part], x[part] = modal_sums(v, speeds), modal_sums(q, places)
-        return n.reshape(-1, A, A), x.reshape(-1, A, A)
 
     def _bristles(self, s: Complexes) -> Complexes:
         """(C, A) friction torque at rest per speed [N.m.s/rad], sampled: the angle by the trapezoidal rule."""
@@ -402,23 +461,19 @@ def _determinants(loop: Complexes, opened: Complexes, rows: Sequence[int]) -> Co
     return np.asarray(np.linalg.det(np.eye(loop.shape[1]) + every))
 
 
-# --- Many drives of one axis on the same structure: loops judged as in judgement.py, and the torque that noise
+# --- Many drives of one axis on the same structure: their loops, along the same contour, and the torque that noise
 #     makes
-# What depends on the structure alone is worked out once per frequency and kept. So a further drive of the axis costs
-# small matrices only.
-#
 # Noise: a motor encoder whose angle is off by white noise of standard deviation sigma [rad] at every control instant.
 # The speed is formed from differences over N cycles, N = 1 or the drive's speed_window. With the open-loop gain L of
 # the speed loop, position loops open, the motor torque answers to the angle by
 #
 #     G = E C (1 - 1/z^N)/(N T_c) / (1 + L)        sigma_M^2 = sigma^2 T_c/pi Int_0^(pi/T_c) |G|^2 d omega
 #
-# (Parseval's theorem for sampled signals; E, C as in drive.py).
+# (Parseval's theorem for sampled signals; E, C as in plant.py).
 
 
 # resonances that show with gains so many times the present ones are looked at closely from the start
 MAX_GAIN_RATIO = 4.0
-MOTOR = ("current", "R", "L_d", "L_q", "p", "K_t", "ideal_current_loop")  # what the current loop consists of
 
 
 class JudgedAxis(NamedTuple):
@@ -443,57 +498,6 @@ class JudgedAxis(NamedTuple):
         return min(loop.phase_margin for loop in self.loops) if self.stable else -math.inf
 
 
-@dataclass(eq=False)
-class Ports:
-    """Speeds and positions per torque (F, A, A) at values of s (F,) whose imaginary parts ascend."""
-
-    s: Complexes
-    n: Complexes
-    x: Complexes
-
-    def at(self, s: Complexes, plant: SampledAxes, hold: InputHold) -> tuple[Complexes, Complexes]:
-        """Those at s; what is not known yet is worked out and kept."""
-        at, missing = self._places(s)
-        if missing.any():
-            new = np.unique(s[missing])
-            new = new[np.argsort(new.imag)]
-            n, x = SampledAxes.ports(plant, new, hold)
-            order = np.argsort(np.concatenate([self.s, new]).imag, kind="stable")
-            self.s = np.concatenate([self.s, new])[order]
-            self.n, self.x = np.concatenate([self.n, n])[order], np.concatenate([self.x, x])[order]
-            at, _ = self._places(s)
-        return self.n[at], self.x[at]
-
-    def _places(
-        self, s: Complexes
-    ) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.bool_]]]:
-        at = np.searchsorted(self.s.imag, s.imag)
-        inside = np.minimum(at, len(self.s) - 1)
-        known = self.s[inside] == s if len(self.s) else np.zeros(len(s), dtype=bool)
-        return inside, ~known
-
-
-@dataclass(frozen=True, eq=False)
-class Structure(SampledAxes):
-    """Loops whose structure is kept: frequencies about resonances, and ports per hold."""
-
-    near: tuple[Floats, Floats]
-    kept: dict[InputHold, Ports] = field(default_factory=dict)
-
-    def free_resonances(self) -> Floats:
-        return self.near[0]
-
-    def locked_resonances(self) -> Floats:
-        return self.near[1]
-
-    def ports(self, s: Complexes, hold: InputHold) -> tuple[Complexes, Complexes]:
-        A = len(self.axes)
-        if hold not in self.kept:
-            none = np.empty((0, A, A), dtype=np.complex128)
-            self.kept[hold] = Ports(np.empty(0, dtype=np.complex128), none, none)
-        return self.kept[hold].at(s, self, hold)
-
-
 class Candidates:
     """Judges drives of one axis of a machine, with the modes of one pose. All drives are shipped ones."""
 
@@ -506,23 +510,19 @@ class Candidates:
         )
         frictions = machine.shipped_frictions
         bristles = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
-        plant = ModalPlant.of(modes, axes)
         self._index = axes.index(axis)
+        base = SampledAxes(axes, drives, bristles, ModalPlant.of(modes, axes))
         own = drives[self._index].drive
         stiff = own.model_copy(update={"K_p": MAX_GAIN_RATIO * own.K_p, "K_v": MAX_GAIN_RATIO * own.K_v})
-        wide = SampledAxes(axes, self._replace_drive(drives, stiff), bristles, plant)
-        self._base = Structure(axes, drives, bristles, plant, (wide.free_resonances(), wide.locked_resonances()))
+        self._base = replace(base, near=self._with_drive(base, stiff).resonances())
 
-    def _replace_drive(self, drives: tuple[LinearDrive, ...], drive: Drive) -> tuple[LinearDrive, ...]:
-        before = drives[self._index]
-        own = replace(before, drive=drive)
-        if not drive.ideal_current_loop and all(getattr(drive, n) == getattr(before.drive, n) for n in MOTOR):
-            own.__dict__["_motor"] = before._motor  # the same motor: a matrix exponential less
-        return (*drives[: self._index], own, *drives[self._index + 1 :])
+    def _with_drive(self, base: SampledAxes, drive: Drive) -> SampledAxes:
+        own = replace(base.drives[self._index], drive=drive)
+        return replace(base, drives=(*base.drives[: self._index], own, *base.drives[self._index + 1 :]))
 
     def judge(self, drive: Drive) -> JudgedAxis:
         """The loops of the axis with another drive. InputError: gains beyond all numbers."""
-        changed = replace(self._base, drives=self._replace_drive(self._base.drives, drive))
+        changed = self._with_drive(self._base, drive)
         loops, frequency, levels = changed.judged_with_levels((self._index,))
         return JudgedAxis(loops, _noise(changed.drives[self._index], frequency, levels))
 

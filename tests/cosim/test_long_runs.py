@@ -6,6 +6,8 @@ import gc
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from feedsim.foundation.errors import InputError, OutputError, SimulationError
 from feedsim.foundation.outputs import allow_replacement
 from feedsim.motions import circular
 from feedsim.motions.kind import HeldPoints, JoinedPoints
+from feedsim.report import page
 from feedsim.report import run as report
 from feedsim.simulation import cosim, nc
 from feedsim.simulation import nc as program
@@ -287,6 +290,41 @@ def test_run_that_never_begins_takes_no_rows_away(fmus: Path, tmp_path: Path) ->
     assert partial.has_rows
     assert kept.read_text().startswith("time [s],")
     assert target.read_text() == "of another run"
+
+
+def test_rows_are_written_in_order_up_to_a_fault_and_not_behind_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However much slower the writing is than what brings the rows; then no thread is there any more."""
+    write = page.Partial._write
+    monkeypatch.setattr(page.Partial, "_write", lambda self, part: (time.sleep(0.01), write(self, part)))
+    threads = threading.active_count()
+
+    def bring(partial: page.Partial, count: int) -> int:
+        """How many parts were brought, one of which has a fault."""
+        for k in range(count):
+            at = np.arange(3.0 * k, 3 * k + 3)
+            try:
+                partial(Trace(at, {"x": np.where(at == 31, np.nan, at)}, {"x": "m"}))
+            except OutputError:
+                return k
+        return count
+
+    with report.growing_result(tmp_path) as partial:
+        assert 10 < bring(partial, 1000) < 30
+        with pytest.raises(OutputError, match="x is nan at 31 s"):
+            partial.catch_up()
+        assert (partial.rows, partial.time) == (30, 29.0)
+        np.testing.assert_array_equal(read_csv(partial.path).time, np.arange(30.0))
+    with report.growing_result(tmp_path) as partial:
+        bring(partial, 11)
+        with pytest.raises(OutputError):
+            partial.finished()
+    with report.growing_result(tmp_path) as partial:
+        assert bring(partial, 9) == 9
+        partial.catch_up()
+        assert (partial.rows, threading.active_count()) == (27, threads)
+    assert not partial.path.exists()
 
 
 MEMORY = """

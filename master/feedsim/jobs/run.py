@@ -268,6 +268,8 @@ def _run(subject: OpenedRun, recorded: Partial | None, page: bool, friction_shar
         scratch=recorded.scratch if recorded is not None else None,
         sink=recorded,
     )
+    if recorded is not None:
+        recorded.catch_up()  # what follows may work in processes, which no thread may be beside
     if friction_share and analysis.evaluates_contours(subject.plan, subject.program):
         raw = analysis.with_frictionless(raw, subject.fmus, watch.of(f"{subject.plan.name} nearly without friction"))
     if analysis.evaluates_stops(subject.plan, subject.program):

@@ -8,7 +8,9 @@ import hashlib
 import json
 import os
 import re
+from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
 from importlib import resources
@@ -125,13 +127,16 @@ def policy(text: str) -> str:
 
 
 PARTIAL = "result.partial.csv"
+MAX_WAITING = 1  # stretches of rows that wait to be written, until who brings more waits, too
 
 
 class Partial:
     """result.partial.csv in a directory: called with the rows of a run, a stretch at a time (``cosim.run(sink=...)``).
 
-    A context: behind it the file is there if the block failed, unless there was no row, and gone if it ended well. That
-    of another run is replaced with the first row, no sooner: a run that never begins takes nothing away.
+    A thread writes them: to make text of numbers takes longer than to compute them, and the cycle loop leaves the
+    interpreter to it. A context: behind it the file is there if the block failed, unless there was no row, and gone if
+    it ended well. That of another run is replaced with the first row, no sooner: a run that never begins takes nothing
+    away.
 
     rows, time: what it holds so far, up to time [s].
     """
@@ -142,9 +147,39 @@ class Partial:
         self.path = self._directory / PARTIAL
         self.rows, self.time = 0, 0.0
         self._file: IO[bytes] | None = None
+        self._writer: ThreadPoolExecutor | None = None
+        self._waiting: deque[Future[None]] = deque()
+        self._fault: OutputError | None = None
 
     def __call__(self, part: Trace) -> None:
-        """Append rows. OutputError: a value is not finite, or the file cannot be written."""
+        """Append rows. OutputError: a value is not finite, or the file cannot be written; also of rows before."""
+        if self._writer is None:
+            self._writer = ThreadPoolExecutor(1)
+        self._waiting.append(self._writer.submit(self._append, part))
+        while len(self._waiting) > MAX_WAITING or (self._waiting and self._waiting[0].done()):
+            self._waiting.popleft().result()
+
+    def catch_up(self) -> None:
+        """Have all rows written. OutputError: as of a call."""
+        try:
+            while self._waiting:
+                self._waiting.popleft().result()
+        finally:
+            if self._writer is not None:
+                self._writer.shutdown()
+                self._writer = None
+
+    def _append(self, part: Trace) -> None:
+        """In the thread. Behind a fault nothing is written: no rows are missing between others."""
+        if self._fault is not None:
+            raise self._fault
+        try:
+            self._write(part)
+        except OutputError as error:
+            self._fault = error
+            raise
+
+    def _write(self, part: Trace) -> None:
         for name, values in part.columns.items():
             if (row := first_not_finite(values)) is not None:
                 raise OutputError(
@@ -172,11 +207,13 @@ class Partial:
 
     @property
     def has_rows(self) -> bool:
-        """Whether the file is there, with rows."""
+        """Whether the file is there, with rows. OutputError: as of a call."""
+        self.catch_up()
         return self.rows > 0 and self.path.exists()
 
     def finished(self) -> None:
         """Close the file, its bytes being on the disk. OutputError."""
+        self.catch_up()
         if self._file is None:
             return
         try:
@@ -192,6 +229,8 @@ class Partial:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        with contextlib.suppress(OutputError):  # of rows behind those that the caller has learnt of
+            self.catch_up()
         with contextlib.suppress(OSError):
             if self._file is not None:
                 self._file.close()

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union, get_args, get_origin
@@ -44,10 +45,7 @@ def expected_annotation(model: Any, data: Any, place: Place) -> Any:
 def child(annotation: Any, key: str | int) -> Any:
     """Annotation of what `key` names inside a value of `annotation` (resolved); None where there is no such key."""
     if is_model(annotation):
-        info = field(annotation, key)
-        if info is None:
-            return None
-        return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
+        return _annotation_of_field(annotation, key)
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is dict:
         return arguments[1]
@@ -106,6 +104,13 @@ def suggest_key(annotation: Any, key: str, known: list[str]) -> str:
     """Tail of a message about a `key` that a group of `annotation` lacks: where it belongs, else what is `known`."""
     place = getattr(annotation, "ELSEWHERE", {}).get(key)
     return f"; it belongs to the {place}" if place else did_you_mean(key, known)
+
+
+@lru_cache(maxsize=4096)  # a study asks thousands of times
+def _annotation_of_field(model: Any, key: str | int) -> Any:
+    """Annotation of what `key` names in a model; None where there is no such key."""
+    info = field(model, key)
+    return info and (Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation)
 
 
 def field(model: Any, key: str | int) -> FieldInfo | None:

@@ -70,9 +70,13 @@ def fill_role(machine: Machine, axis: str, role: Role, archive: Archive) -> Role
     described = getattr(machine.axes[axis], role.name)
     if isinstance(described, ForeignUnit):
         return connect_foreign_unit(role, axis, described, archive)
-    parameters = controller_parameters(machine, axis) if role is DRIVE else machine.axes[axis].friction_at_motor
     signals = {name: Alias(name) for name in archive.variables}
-    return RoleUnit(role, axis, archive, signals, parameters)
+    return RoleUnit(role, axis, archive, signals, shipped_parameters(machine, axis, role))
+
+
+def shipped_parameters(machine: Machine, axis: str, role: Role) -> Mapping[str, Parameter]:
+    """Parameters of the shipped unit in a role on an axis."""
+    return controller_parameters(machine, axis) if role is DRIVE else machine.axes[axis].friction_at_motor
 
 
 def controller_parameters(machine: Machine, axis: str) -> dict[str, Parameter]:

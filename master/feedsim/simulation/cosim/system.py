@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.simulation.cosim.archive import Archive
 from feedsim.simulation.cosim.exchange import is_shipped
 from feedsim.simulation.cosim.plant import axes_of, modes_file, open_plant
-from feedsim.simulation.cosim.roles import RoleUnit, archive_path, check_instances, fill_role
+from feedsim.simulation.cosim.roles import RoleUnit, archive_path, check_instances, fill_role, shipped_parameters
 from feedsim.simulation.cosim.unit import Floats, Port, Unit, UnloadedUnit
 from feedsim.simulation.nc import Program
 
@@ -218,6 +218,8 @@ class System(BlockResource):
         self.units = {name: self._instantiate(archive, name) for name, archive in instances.items()}
         self.plant = self.units[PLANT]
         self.plant_axes = axes_of(plant)
+        self._share_buffers()
+        self._wire()
         self._parameterise(machine)
 
     def serves(self, machine: Machine, fmus: Path) -> bool:
@@ -226,6 +228,7 @@ class System(BlockResource):
         return (
             type(self) is System
             and tuple(machine.axes) == self.axes
+            and not any(role.foreign for role in self.roles.values())
             and machine.plant == own.plant
             and machine.mounts_table == own.mounts_table
             and (machine.plant is machine.mounts_table is None or machine.modes.content == own.modes.content)
@@ -240,7 +243,11 @@ class System(BlockResource):
         self.machine = machine
         if machine.plant is machine.mounts_table is None:  # packed for its axes, the archive's own modes are others
             self.takes_modes = True
-        self.roles = {name: fill_role(machine, r.axis, r.role, r.archive) for name, r in self.roles.items()}
+        self.roles = {
+            name: replace(r, parameters=shipped_parameters(machine, r.axis, r.role)) for name, r in self.roles.items()
+        }
+        for buffer in self._buffers:
+            buffer[:] = 0.0
         for unit in self.instances.values():
             unit.reset()
         self._parameterise(machine)
@@ -251,8 +258,6 @@ class System(BlockResource):
             self.units[name].set_parameters(role.parameters)
             if RELEASE in role.signals:
                 self.units[name].set_parameters({role.signals[RELEASE].name: True})
-        self._share_buffers()
-        self._wire()
 
     def _fill(self, machine: Machine, fmus: Path) -> dict[str, RoleUnit]:
         """Instance -> what fills its role; nothing of it is executed yet."""
@@ -298,6 +303,8 @@ class System(BlockResource):
         self.n_start, self.n, self.n_slope, self.n_slope_last = (buffer() for _ in range(4))
         # What the plant takes and gives lies together, for one call each.
         inputs, slopes, outputs = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3 * count)
+        own = self.M_a_start, self.M_a_end, self.n_start, self.n, self.n_slope, self.n_slope_last
+        self._buffers = (*own, inputs, slopes, outputs)
         self.M_a, self.M_a_slope = inputs[:count], slopes[:count]
         self.M_fr, self.M_fr_slope = inputs[count:], slopes[count:]
         self.n_end, self.measured = outputs[:count], outputs[count:]

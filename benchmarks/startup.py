@@ -40,7 +40,7 @@ PARTS = {
     "open": "archives, units",
     "initialise": "units",
     "loop": "cycles",
-    "rows": "result.csv",
+    "rows": "result.csv, beyond the loop",
     "pose": "modes over the motion",
     "trace": "energies, warnings",
     "evaluate": "figures, diagnosis",

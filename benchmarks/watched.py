@@ -1,8 +1,9 @@
 """A command of feedsim as it is, in a process of its own, with the time of its parts and the memory that it takes.
 
 ``python watched.py FILE TIMES run SCENARIO ...`` makes that command TIMES times and writes a JSON file: per time the
-seconds of every part, without those of parts within it, and the process's memory. Rows go into result.csv while the
-loop works, libraries are loaded where they are needed first; each is a part of its own.
+seconds of every part, without those of parts within it, and the process's memory. The time is the main thread's: of
+rows, which another thread writes while the loop works, what it waits for. Libraries are loaded where they are needed
+first, and are a part of their own.
 """
 
 from __future__ import annotations
@@ -105,6 +106,8 @@ class Clock:
 
     def timed(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
         def wrapper(*arguments: Any, **named: Any) -> Any:
+            if threading.current_thread() is not threading.main_thread():
+                return call(*arguments, **named)
             self.turn()
             self._now.append(part)
             try:
@@ -143,6 +146,7 @@ def main() -> int:
     for home, name, part in (
         (scenario, "load", "read"), (nc, "plan", "plan"), (System, "__init__", "open"),
         (System, "initialise", "initialise"), (of_runs, "pose_use", "pose"), (Partial, "__call__", "rows"),
+        (Partial, "catch_up", "rows"),
         (analysis, "evaluate", "evaluate"), (Result, "save", "report"), (builtins, "__import__", "libraries"),
     ):  # fmt: skip
         setattr(home, name, clock.timed(part, getattr(home, name)))

@@ -11,6 +11,7 @@ from feedsim.estimation.replay.machine_files import ElasticMode, with_modes
 from feedsim.files.trace import Trace
 from feedsim.foundation.errors import SimulationError
 from feedsim.scenario import Machine, load_machine
+from feedsim.scenario.axis_units import Measuring
 from feedsim.simulation.cosim import Follower, follow
 from feedsim.simulation.nc import Program
 from machine_helpers import rigid_copy
@@ -64,3 +65,28 @@ def test_a_failed_run_leaves_nothing_behind(tmp_path: Path) -> None:
         with pytest.raises(SimulationError):
             follower.follow(machine, Program(given.time, broken, given.n_ffw), COLUMNS, 1e-3)
         assert same(follower.follow(machine, given, COLUMNS, 1e-3), before)
+
+
+@pytest.mark.parametrize("native", [True, False])
+def test_a_loop_that_served_before_leaves_the_same_bits(native: bool, tmp_path: Path) -> None:
+    """Other setpoints, as many and fewer, other rows, a drive that shows more, and all of it again."""
+    first = load_machine(rigid_copy(MACHINES / "one_axis", tmp_path / "rigid"))
+    axis = first.axes["X"]
+    measuring = axis.drive.model_copy(update={"measuring": Measuring(indirect=True)})
+    second = first.model_copy(update={"axes": {"X": axis.model_copy(update={"drive": measuring})}})
+    way = program(first)
+    back = Program(way.time, {"X": 2 * first.pose["X"] - way.x_s["X"]}, {"X": -way.n_ffw["X"]})
+    rows = len(way.time) // 2
+    short = Program(way.time[:rows], {"X": way.x_s["X"][:rows]}, {"X": way.n_ffw["X"][:rows]})
+    energies = (*COLUMNS, "X.x_s", "X.residual")
+    asked = [
+        (first, way, COLUMNS, 1e-3), (first, back, COLUMNS, 1e-3), (second, back, energies, 1e-3),
+        (second, way, energies, 1e-3), (second, short, energies, 1e-3), (first, short, COLUMNS, 125e-6),
+        (first, way, ("X.*",), 1e-3), (second, way, ("X.*",), 1e-3),
+    ]  # fmt: skip
+    alone = [follow(*each, native=native) for each in asked]
+    with Follower(native=native) as follower:
+        for k in (0, 1, 0, 2, 3, 2, 4, 4, 5, 5, 0, 6, 7, 6):
+            found = follower.follow(*asked[k])
+            assert [*found.columns] == [*alone[k].columns], k
+            assert all(np.array_equal(found[name], alone[k][name]) for name in found.columns), k

@@ -152,7 +152,7 @@ OUTSIDE_LOOPS = (
 FILTERS = ("filter_1", "filter_2", "filter_3", "filter_4")
 MOTOR = ("current", "R", "L_d", "L_q", "p", "K_t", "ideal_current_loop")  # what the current loop consists of
 SPEED_CONTROLLER = ("K_p", "speed_integrator", "T_n")
-SEEN: Mapping[str, tuple[str, ...]] = {
+SEEN_FIELDS: Mapping[str, tuple[str, ...]] = {
     "torque": (*MOTOR, *FILTERS),
     "ramp": ("ramp_speed_setpoint",),
     "from_speed": SPEED_CONTROLLER,
@@ -183,13 +183,13 @@ def _ports(plant: ModalPlant, T_c: float, hold: InputHold, contour: bytes) -> tu
 
 @lru_cache(maxsize=KNOWN_BLOCKS)
 def _block(name: str, seen: tuple[Any, ...], cycles: Cycles, contour: bytes) -> Any:
-    """A block of drives with these values of what it sees (SEEN)."""
-    drive = Drive.model_construct(**dict(zip(SEEN[name], seen, strict=True)))
+    """A block of drives with these values of what it sees (SEEN_FIELDS)."""
+    drive = Drive.model_construct(**dict(zip(SEEN_FIELDS[name], seen, strict=True)))
     return getattr(LinearDrive(drive, cycles, math.nan), name)(np.frombuffer(contour, dtype=np.complex128))
 
 
 def _block_of(drive: LinearDrive, name: str, contour: bytes) -> Any:
-    return _block(name, tuple(getattr(drive.drive, field) for field in SEEN[name]), drive.cycles, contour)
+    return _block(name, tuple(getattr(drive.drive, field) for field in SEEN_FIELDS[name]), drive.cycles, contour)
 
 
 @lru_cache(maxsize=8)

@@ -112,6 +112,11 @@ class Exchange(Executor):
         self._table["kind"] = OPERATION_CODES.index("end")
         for at, operation in enumerate(self._operations):
             self._table[at] = self._row(operation)
+        self._begin_table = self._table.copy()  # the loop counts rows in it
+
+    def restart(self) -> None:
+        super().restart()
+        self._table[:] = self._begin_table
 
     def _row(self, o: Operation) -> tuple[float, ...]:
         """Its fields, in their order. A row at once is written in a tenth of the time of its fields one by one."""

@@ -233,6 +233,10 @@ class Executor:
             here.describe(T_c, [(o.unit.name if o.unit else "", o.about or o.kind, o.s if o.kind == "do_step" else 0.0)
                                 for o in self._operations])  # fmt: skip
 
+    def restart(self) -> None:
+        """Begin anew with cycle 0 and the first rows of all tables."""
+        self.done = 0
+
     def run(self, begin: int, end: int) -> None:
         """Work the cycles `begin` to `end` - 1; they follow those of the last call.
 

@@ -114,18 +114,13 @@ class Recording:
         self._axes = system.axes
         self.every, self._ratio, self._T_c = every, ratio, cycle.cycle
         self._columns = match_names(columns_of(system.machine, loaded, residual=True), columns)
-        total = cycles // every + 1
-        self._ring = min(total, max(RING, 2 * (REPORTED_EVERY // every + 1)))
-        self._table = Table(1 + len(self._columns), total, scratch)
+        self._total, self._scratch = cycles // every + 1, scratch
+        self._ring = min(self._total, max(RING, 2 * (REPORTED_EVERY // every + 1)))
         self._sink, self.sinking = sink, 0.0
         self._units: dict[str, str] = {}
         self._logs: list[tuple[Log, dict[str, str]]] = []  # with the names that its signals have in the trace
-        self._setpoints: dict[str, Floats] = {}
-        for axis in system.axes:
-            for setpoint, values in (("x_s", program.x_s), ("n_ffw", program.n_ffw)):
-                if (name := f"{axis}.{setpoint}") in self._columns:
-                    self._setpoints[name] = values[axis]
-                    self._units[name] = wiring.SETPOINT_UNITS[setpoint]
+        setpoints = {f"{axis}.{name}": unit for axis in system.axes for name, unit in wiring.SETPOINT_UNITS.items()}
+        self._units |= {name: unit for name, unit in setpoints.items() if name in self._columns}
         plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS]
         self._log(
             wiring.PLANT, {name: name for name in (*plant, *_effects(system.machine), *TOOL_SIGNALS, *loaded)}, cycle
@@ -146,6 +141,19 @@ class Recording:
         self._residual_names = residuals if any(name in self._columns for name in residuals) else []
         self._units |= {name: RESIDUAL_UNIT for name in residuals if name in self._columns}
         self._cycle = cycle
+        self.restart(program)
+
+    def restart(self, program: Program) -> None:
+        """Begin anew with no row, on setpoints at as many instants."""
+        self._table = Table(1 + len(self._columns), self._total, self._scratch)
+        self.limited = dict.fromkeys(self.limited, 0)
+        planned = {"x_s": program.x_s, "n_ffw": program.n_ffw}
+        self._setpoints = {
+            name: planned[setpoint][axis]
+            for axis in self._axes
+            for setpoint in planned
+            if (name := f"{axis}.{setpoint}") in self._columns
+        }
 
     def _log(self, instance: str, names: dict[str, str], cycle: Cycle) -> None:
         """Record the signals of a unit that are among the columns; `names`: signal -> column."""

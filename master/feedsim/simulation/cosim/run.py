@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from feedsim.scenario import Coupling, Drive, Level, Logging, Machine, Scenario
 from feedsim.simulation.cosim.exchange import any_foreign, choose_native_loop
 from feedsim.simulation.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.simulation.cosim.loads import ActingLoad, Loads, Work, compute_acting_loads
-from feedsim.simulation.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
+from feedsim.simulation.cosim.recording import Recording, Sink, columns_of, loaded_inputs, recorded_columns
 from feedsim.simulation.cosim.schedule import Cycle, Loop, Progress, Setpoints
 from feedsim.simulation.cosim.system import System
 from feedsim.simulation.cosim.unit import Floats
@@ -488,10 +488,28 @@ def _energies(cycle: Cycle) -> dict[str, float]:
     return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(cycle.system.axes) for kind in kinds}
 
 
+@dataclass(frozen=True, eq=False)
+class PreparedLoop:
+    """The cycle loop of a system with what it works on, for runs of one length; shape: what they have in common."""
+
+    shape: tuple[Any, ...]
+    cycle: Cycle
+    setpoints: Setpoints
+    recording: Recording
+    loop: Loop
+
+    def restart(self, program: Program) -> None:
+        """Begin anew, of a system that was renewed."""
+        self.cycle.restart()
+        self.setpoints.restart(program)
+        self.recording.restart(program)
+        self.loop.restart()
+
+
 class Follower(BlockResource):
     """The axes of machines on setpoints from anywhere: their units, exchanged as :func:`run` does, and nothing judged.
 
-    Units stay open, as :class:`OpenUnits` does.
+    Units stay open, as :class:`OpenUnits` does; without loads, so does the loop of runs that differ in values alone.
     """
 
     def __init__(
@@ -499,6 +517,7 @@ class Follower(BlockResource):
     ) -> None:
         self._coupling, self._fmus, self._native = coupling or Coupling(), fmus or fmus_directory(), native
         self._units = OpenUnits()
+        self._prepared: PreparedLoop | None = None
 
     def follow(
         self, machine: Machine, program: Program, columns: Collection[str], interval: float,
@@ -529,18 +548,27 @@ class Follower(BlockResource):
         total = (len(program.time) - 1) * ratio
         library, _ = choose_native_loop(self._native, self._fmus, fmus_directory())
         with self._units.of(machine, self._coupling, self._fmus) as system:
-            cycle = cycle_of(system, self._coupling)
-            recording = Recording(cycle, (), program, total, ratio, every, columns)
-            drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
-            before = [*drives.operations, *loading.before, *recording.operations]
-            loop = Loop(cycle, before, loading.after, library, (drives, loading, recording))
+            substeps, known = self._coupling.steps(machine), tuple(columns_of(machine, residual=True))
+            shape = system, cycles.T_c, substeps, total, ratio, every, tuple(columns), known
+            prepared = self._prepared
+            if prepared is not None and prepared.shape == shape and not loads:
+                prepared.restart(program)
+            else:
+                cycle = cycle_of(system, self._coupling)
+                recording = Recording(cycle, (), program, total, ratio, every, columns)
+                setpoints, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
+                before = [*setpoints.operations, *loading.before, *recording.operations]
+                loop = Loop(cycle, before, loading.after, library, (setpoints, loading, recording))
+                prepared = PreparedLoop(shape, cycle, setpoints, recording, loop)
+            self._prepared = None if loads else prepared
             system.initialise(program, stop=total * cycles.T_c)
-            loop.run(total)
-            recording.record(total)
-            recording.collect(total + 1)
-            return recording.trace()
+            prepared.loop.run(total)
+            prepared.recording.record(total)
+            prepared.recording.collect(total + 1)
+            return prepared.recording.trace()
 
     def close(self) -> None:
+        self._prepared = None
         self._units.close()
 
 

@@ -65,6 +65,13 @@ class Cycle:
         self._warnings = self._check()
         self._without_slope: dict[str, Floats] = {}  # unit -> how often its slopes were not finite
 
+    def restart(self) -> None:
+        """Begin anew with the first cycle, of a system of shipped units."""
+        bond = self.bond
+        for buffer in (self.M_fr_start, self.M_a_before, self.assumed_torque,
+                       bond.residual, bond.residual_peak, bond.dissipated):  # fmt: skip
+            buffer[:] = 0.0
+
     @property
     def warnings(self) -> tuple[Finding, ...]:
         """What a user should know of it."""
@@ -258,6 +265,10 @@ class Loop:
         """Cycles so far."""
         return self._executor.done
 
+    def restart(self) -> None:
+        """Begin anew with the first cycle; so must cycle and buffered parts."""
+        self._executor.restart()
+
     def run(self, total: int, progress: Progress | None = None) -> None:
         """Work `total` cycles from the first one on.
 
@@ -292,14 +303,10 @@ class Setpoints:
 
     def __init__(self, system: System, program: Program, ratio: int) -> None:
         ports = [control.setpoint for control in system.controllers]
-        planned = {"x_s": program.x_s, "n_ffw": program.n_ffw}
-        self._columns = [
-            [(alias, planned[name][axis]) for alias, name in zip(port.aliases, port.names, strict=True)]
-            for axis, port in zip(system.axes, ports, strict=True)
-        ]
+        self._ports = list(zip(system.axes, ports, strict=True))
         self._ratio, self._length = ratio, len(program.time)
         self._rows = min(len(program.time), max(RING, 2 * (REPORTED_EVERY // ratio + 1)))
-        self._filled_rows = 0
+        self.restart(program)
         when = DueCycles(every=ratio)
         self._tables = [np.zeros((self._rows, len(port.names))) for port in ports]
         self.operations = [
@@ -307,6 +314,15 @@ class Setpoints:
             for port, table in zip(ports, self._tables, strict=True)
             for operation in set_real(port, table, when)
         ]
+
+    def restart(self, program: Program) -> None:
+        """Begin anew with the first cycle, on setpoints at as many instants."""
+        planned = {"x_s": program.x_s, "n_ffw": program.n_ffw}
+        self._columns = [
+            [(alias, planned[name][axis]) for alias, name in zip(port.aliases, port.names, strict=True)]
+            for axis, port in self._ports
+        ]
+        self._filled_rows = 0
 
     def ahead(self, begin: int, end: int) -> None:
         done, needed = -(-begin // self._ratio), -(-end // self._ratio)

@@ -91,7 +91,7 @@ def forget() -> None:
         memory.cache_clear()
 
 
-def test_what_machines_have_in_common_changes_no_bit_of_their_loops() -> None:
+def test_what_machines_have_in_common_changes_no_bit_of_their_loops(monkeypatch: pytest.MonkeyPatch) -> None:
     """Machines of a study one after the other, and each of them alone."""
     subjects = [machine(), *(machine(*(f"machine.axes.Z.{each}" for each in change)) for change in CHANGES)]
     alone = [judged_alone(subject) for subject in subjects]
@@ -101,6 +101,10 @@ def test_what_machines_have_in_common_changes_no_bit_of_their_loops() -> None:
         judgement._judged_axes.cache_clear()
         for k in order:
             assert judge(subjects[k], checked_modes(subjects[k])) == alone[k], CHANGES[k - 1]
+    forget()
+    monkeypatch.setattr(judgement, "MAX_KNOWN_VALUES", 0)  # contours that are too long to be remembered
+    assert judge(subjects[1], checked_modes(subjects[1])) == alone[1]
+    assert judgement._ports.cache_info().currsize == judgement._block.cache_info().currsize == 0
 
 
 def test_every_field_of_a_drive_is_known_to_the_loops_or_outside_of_them() -> None:

@@ -158,8 +158,10 @@ SEEN_FIELDS: Mapping[str, tuple[str, ...]] = {
     "from_speed": SPEED_CONTROLLER,
     "from_setpoint": (*SPEED_CONTROLLER, "reference_model", "omega_0", "D", "T_ref"),
 }
-# Contours of both levels, in both holds, of a few structures, and the short ones in between that are refined.
+# Contours of both levels, in both holds, of a few structures, and the short ones in between that are refined. Longer
+# ones are forgotten: of 5000 modes or 12 axes, whose answers would take hundreds of MB.
 KNOWN_PORTS, KNOWN_BLOCKS = 16, 256
+MAX_KNOWN_VALUES = 1 << 16  # of s, times the squared number of axes
 
 
 @lru_cache(maxsize=8)
@@ -186,10 +188,6 @@ def _block(name: str, seen: tuple[Any, ...], cycles: Cycles, contour: bytes) -> 
     """A block of drives with these values of what it sees (SEEN_FIELDS)."""
     drive = Drive.model_construct(**dict(zip(SEEN_FIELDS[name], seen, strict=True)))
     return getattr(LinearDrive(drive, cycles, math.nan), name)(np.frombuffer(contour, dtype=np.complex128))
-
-
-def _block_of(drive: LinearDrive, name: str, contour: bytes) -> Any:
-    return _block(name, tuple(getattr(drive.drive, field) for field in SEEN_FIELDS[name]), drive.cycles, contour)
 
 
 @lru_cache(maxsize=8)
@@ -391,7 +389,7 @@ class SampledAxes:
         answer = np.empty((len(every), A), dtype=np.complex128)
         for i, drive in enumerate(self.drives):
             torque, from_setpoint, ramp = (
-                _block_of(drive, name, contour) for name in ("torque", "from_setpoint", "ramp")
+                self._block(drive, name, contour) for name in ("torque", "from_setpoint", "ramp")
             )
             answer[:, i] = torque[0] * from_setpoint * ramp
         result = []
@@ -404,16 +402,16 @@ class SampledAxes:
     def _speed_loops(self, s: Complexes) -> Iterator[tuple[Complexes, Complexes, Complexes]]:
         """Per state, (C, A, A) each: positions per torque, what the speed loops take off the torques, and what of that
         does not go through the speed controllers."""
-        A, contour, T_c = len(self.axes), s.tobytes(), self.drives[0].cycles.T_c
-        n_M, x_M = n_fr, x_fr = _ports(self.plant, T_c, "linear", contour)
+        A, contour = len(self.axes), s.tobytes()
+        n_M, x_M = n_fr, x_fr = self._ports("linear", contour)
         ideal = np.array([drive.drive.ideal_current_loop for drive in self.drives])
         if ideal.any():
-            fixed = _ports(self.plant, T_c, "held", contour)
+            fixed = self._ports("held", contour)
             n_M, x_M = (np.asarray(np.where(ideal, h, linear)) for h, linear in zip(fixed, (n_M, x_M), strict=True))
         through, past = (np.empty((len(s), A, 1), dtype=np.complex128) for _ in range(2))
         for i, drive in enumerate(self.drives):
-            E, past[:, i, 0] = _block_of(drive, "torque", contour)
-            through[:, i, 0] = E * _block_of(drive, "from_speed", contour)
+            E, past[:, i, 0] = self._block(drive, "torque", contour)
+            through[:, i, 0] = E * self._block(drive, "from_speed", contour)
         windows = [drive.speed_of_position(s) for drive in self.drives]
         for state in STATES:
             n, x = n_M, x_M
@@ -429,6 +427,19 @@ class SampledAxes:
                 if V is not None:
                     seen[:, i] = V[:, None] * x[:, i]
             yield x, through * seen + past * n, past * n
+
+    def _ports(self, hold: InputHold, contour: bytes) -> tuple[Complexes, Complexes]:
+        ports = _ports if self._is_known(contour) else _ports.__wrapped__
+        return ports(self.plant, self.drives[0].cycles.T_c, hold, contour)
+
+    def _block(self, drive: LinearDrive, name: str, contour: bytes) -> Any:
+        block = _block if self._is_known(contour) else _block.__wrapped__
+        seen = tuple(getattr(drive.drive, field) for field in SEEN_FIELDS[name])
+        return block(name, seen, drive.cycles, contour)
+
+    def _is_known(self, contour: bytes) -> bool:
+        """Whether answers along it are remembered."""
+        return len(contour) // 16 * len(self.axes) ** 2 <= MAX_KNOWN_VALUES
 
     def _bristles(self, s: Complexes) -> Complexes:
         """(C, A) friction torque at rest per speed [N.m.s/rad], sampled: the angle by the trapezoidal rule."""

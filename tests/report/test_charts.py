@@ -251,3 +251,23 @@ def test_a_file_of_its_own_needs_no_style_sheet() -> None:
     words = {element.text for element in ElementTree.fromstring(text).iter() if element.tag.endswith("text")}
     assert {"A title", "What it shows.", "a remark", "time [s]"} <= words
     assert picture.content("png") == picture.content("png")
+
+
+def test_points_in_no_order_are_thinned_to_a_sample_of_them() -> None:
+    """A study of many runs: as dense in the middle as its runs are, the extremes among them, in picture and page."""
+    rng = np.random.default_rng(4)
+    x = rng.uniform(0.0, 1.0, 50_000)
+    y = np.where(rng.uniform(size=50_000) < 0.01, np.nan, x**2 + rng.normal(0.0, 0.1, 50_000))
+    curve = Curve("a run", x, y, dots=True, most=3000)
+    shown = curve.thinned()
+    assert 2900 < len(shown.x) <= 3004
+    for few, all_of_them in ((shown.x, x), (shown.y, y)):
+        few, all_of_them = few[np.isfinite(few)], all_of_them[np.isfinite(all_of_them)]
+        assert (few.min(), few.max()) == (all_of_them.min(), all_of_them.max())
+        parts = np.linspace(0.05, 0.95, 10)
+        np.testing.assert_allclose(np.quantile(few, parts), np.quantile(all_of_them, parts), atol=0.03)
+    picture = svg(Chart([Panel("runs", Axis("x"), Axis("y"), [curve])]), "s", "runs")
+    drawn = re.findall(r"M(-?[\d.]+) (-?[\d.]+)h0", picture)
+    assert len(drawn) == int(np.isfinite(shown.y).sum())
+    few = Curve("a run", x[:3000], y[:3000], dots=True, most=3000)
+    assert few.thinned() is few

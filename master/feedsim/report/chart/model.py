@@ -41,6 +41,7 @@ FAINT = 0.4  # opacity of faint curves
 RING_GAPS = {1: 0.36, 2: 0.24}  # between rings, by their number to either side; the programmed circle's radius is 1
 OUTER_RADIUS = 1.16  # outermost radius, in gaps beyond the outermost ring
 DASHES = {"": "", "dashed": "6 3", "dotted": "2 3"}
+SAMPLE_STEP = 2**0.5 - 1  # multiples of it, less whole numbers, fill an interval evenly
 CURVE_MARGIN = 0.07  # of their range, above and below the curves
 MIN_TICKS, TICK_WIDTH, TICK_HEIGHT = 3, 74.0, 34.0
 MAX_DIGITS = 7  # of a tick; with more, what ticks have in common stands at the axis
@@ -131,10 +132,14 @@ class Curve:
         return bool(np.all(np.diff(self.x) >= 0))
 
     def thinned(self) -> Curve:
-        """The same curve in at most ``most`` rows (and its ends), keeping the extremes of every bin."""
+        """The same curve in at most ``most`` rows (and its ends), keeping the extremes of every bin; of points in no
+        order a part of them."""
         if len(self.x) <= self.most:
             return self
-        rows = extremes(self.y, self.most) if self.ascending else loop_rows(self.x, self.y, self.most)
+        if self.ascending:
+            rows = extremes(self.y, self.most)
+        else:
+            rows = (sample_rows if self.dots else loop_rows)(self.x, self.y, self.most)
         return replace(self, x=self.x[rows], y=self.y[rows])
 
 
@@ -289,6 +294,17 @@ def loop_rows(x: Array, y: Array, most: int) -> NDArray[np.intp]:
     gaps = np.flatnonzero(~np.isfinite(x))
     ends = np.clip(np.concatenate([gaps - 1, gaps, gaps + 1]), 0, len(x) - 1)
     return np.unique(np.concatenate([extremes(x, most // 2), extremes(y, most // 2), ends]))
+
+
+def sample_rows(x: Array, y: Array, most: int) -> NDArray[np.intp]:
+    """Rows of points in no order: a part of them, as dense as they are, and the extremes of both coordinates; most + 4
+    at most. Every row has its place in a sequence that fills an interval evenly, so that no grid of rows shows."""
+    chosen = (np.arange(len(x)) * SAMPLE_STEP) % 1 < (most - 1) / len(x)
+    for values in (x, y):
+        finite = np.flatnonzero(np.isfinite(values))
+        if len(finite):
+            chosen[[finite[values[finite].argmin()], finite[values[finite].argmax()]]] = True
+    return np.flatnonzero(chosen)
 
 
 def spans(values: Sequence[Array]) -> tuple[float, float] | None:

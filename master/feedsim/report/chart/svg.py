@@ -484,7 +484,10 @@ def _curve(
         x, y = x[max(0, first - 1) : last + 1], y[max(0, first - 1) : last + 1]
     # A loop of which the page keeps more rows than usual is one whose shape is looked at closely.
     most = MOST_ROWS if curve.ascending or curve.most == MOST_IN_PAGE else curve.most
-    if len(x) > most and not curve.dots:
+    if curve.dots and not curve.ascending:
+        curve = curve.thinned()
+        x, y = curve.x, curve.y
+    elif len(x) > most and not curve.dots:
         rows = extremes(y, most) if curve.ascending else loop_rows(x, y, 2 * most)
         x, y = x[rows], y[rows]
     if not len(x):

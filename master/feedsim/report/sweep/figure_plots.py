@@ -12,6 +12,8 @@ from feedsim.report.formatting import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, S
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
 
 MOST_BARS = 14
+MOST_POINTS = 3000  # of a panel
+GOLDEN = 0.6180339887498949  # spreads points evenly beside a level
 MOST_PANELS = 12
 PANELS = 3  # in a row
 FEW_BINS, MANY_BINS = 8, 50
@@ -19,7 +21,6 @@ MOST_FEET = 200  # strokes of runs without a value
 LEAST_OF_BIN = 25  # rows behind a point of the running median
 MEDIANS = 24  # points of it at most
 LINES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)  # over a grid
-GOLDEN = 0.6180339887498949  # spreads points evenly beside a level
 
 
 def of_account(account: Account, output: Output, measure: Measure, stem: str) -> list[Picture]:
@@ -155,7 +156,9 @@ def scatter_picture(
         return None
     missing = len(output.known) < len(output.sample)
     left_out = len(inputs) - len(shown)
-    caption = "A point per run, a stroke at the foot one without a value" if missing else "A point per run"
+    caption = "A point per run"
+    caption += f", {MOST_POINTS} of {len(output.known)}" if len(output.known) > MOST_POINTS else ""
+    caption += ", a stroke at the foot one without a value" if missing else ""
     caption += "; the line is the running median"
     caption += ", the marks the medians of each value" if any(len(entry.levels) for entry in shown) else ""
     caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
@@ -172,7 +175,7 @@ def _panel(output: Output, entry: Input, best: int | None = None) -> Panel:
     curves, marks = [], []
     if len(entry.levels):
         at = np.searchsorted(entry.levels, x)
-        curves.append(Curve("a run", at + _spread_offsets(len(at)), y, BLUE, width=1.4, dots=True, most=3000))
+        curves.append(Curve("a run", at + _spread_offsets(len(at)), y, BLUE, width=1.4, dots=True, most=MOST_POINTS))
         marks = [
             Mark(float(k), float(np.median(y[at == k])), "", VERMILLION)
             for k in range(len(entry.levels))
@@ -186,7 +189,7 @@ def _panel(output: Output, entry: Input, best: int | None = None) -> Panel:
             span=(-0.6, len(entry.levels) - 0.4),
         )
     else:
-        curves.append(Curve("a run", x, y, BLUE, width=1.4, dots=True, most=3000))
+        curves.append(Curve("a run", x, y, BLUE, width=1.4, dots=True, most=MOST_POINTS))
         median = running_median(x, y)
         if len(median[0]):
             curves.append(Curve("running median", *median, VERMILLION, width=1.8))

@@ -108,7 +108,7 @@ def test_what_machines_have_in_common_changes_no_bit_of_their_loops(monkeypatch:
 
 
 def test_every_field_of_a_drive_is_known_to_the_loops_or_outside_of_them() -> None:
-    """A new field has to be sorted in: what one block sees makes its answers differ."""
+    """A new field of a drive has to be sorted in, or two machines would have the answer of one."""
     seen = {field for fields in judgement.SEEN_FIELDS.values() for field in fields}
     elsewhere = {"K_v", "speed_window", "measuring"}  # in the loops themselves, not in a block
     assert {*judgement.OUTSIDE_LOOPS, *seen, *elsewhere} == set(Drive.model_fields)

@@ -277,7 +277,8 @@ class Run:
     Attributes:
         trace: recorded signals, columns "X.x_a" ... in SI units.
         coupling: per axis, interface energy residual [J], its peak, and the friction work [J] to hold it against.
-        wall_time: duration of the cycle loop [s], without what a `sink` has taken. cpu_time: of this thread in it.
+        wall_time: duration of the cycle loop [s], without the calls of a `sink`, but with what the loop waits for where
+            a sink works in a thread beside it. cpu_time: of this thread in it.
         native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
         notes: what the units and their exchange say of themselves.
